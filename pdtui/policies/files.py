@@ -1,0 +1,83 @@
+"""Weights on disk: safetensors, with metadata that makes them whole. Nothing is ever unpickled."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import asdict
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+
+from pdtui.errors import PolicyError
+from pdtui.policies.network import NetworkSpec, PolicyNetwork
+
+WEIGHTS = Path(__file__).parent / "weights"
+_KEY = "pdtui"
+
+
+def find_weights(name: str) -> Path:
+    """Path of a weights file: as given, or a shipped one by its name.
+
+    Raises:
+        PolicyError: there is neither; the message lists the shipped ones.
+    """
+    for candidate in (Path(name), WEIGHTS / f"{name}.safetensors"):
+        if candidate.is_file():
+            return candidate
+    shipped = ", ".join(sorted(path.stem for path in WEIGHTS.glob("*.safetensors"))) or "none"
+    raise PolicyError(f"no policy '{name}': neither a file nor a shipped policy; shipped are: {shipped}")
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal.
+
+    Raises:
+        PolicyError: the file cannot be read.
+    """
+    try:
+        return sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise PolicyError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def save_network(path: Path, network: PolicyNetwork) -> None:
+    """Write weights and metadata, float32, replacing the file in one step."""
+    tensors = {name: tensor.detach().float().contiguous() for name, tensor in network.state_dict().items()}
+    payload = save(tensors, metadata={_KEY: json.dumps(asdict(network.spec), sort_keys=True)})
+    partial = path.with_name(path.name + ".part")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial.write_bytes(payload)
+    os.replace(partial, path)
+
+
+def load_network(path: Path) -> PolicyNetwork:
+    """Read weights that `save_network` wrote.
+
+    Raises:
+        PolicyError: not a safetensors file, no metadata of ours, or tensors that do not fit it.
+    """
+    try:
+        with safe_open(str(path), framework="pt") as handle:  # type: ignore[no-untyped-call]
+            metadata: dict[str, str] = handle.metadata() or {}
+            tensors: dict[str, torch.Tensor] = {name: handle.get_tensor(name) for name in handle.keys()}
+    except (OSError, SafetensorError) as error:
+        raise PolicyError(f"{path}: expected a safetensors file: {error}") from error
+    if _KEY not in metadata:
+        found = ", ".join(sorted(tensors)[:6])
+        raise PolicyError(f"{path}: expected metadata '{_KEY}' in the file; it holds tensors {found}")
+    try:
+        fields: dict[str, Any] = json.loads(metadata[_KEY])
+        for name in ("layers", "action_low", "action_high"):
+            fields[name] = tuple(fields[name])
+        network = PolicyNetwork(NetworkSpec(**fields))
+        network.load_tensors(tensors)
+    except (TypeError, KeyError, ValueError) as error:
+        raise PolicyError(f"{path}: metadata '{_KEY}' is not complete: {error}") from error
+    except PolicyError as error:
+        raise PolicyError(f"{path}: {error}") from error
+    return network.eval()

@@ -1,0 +1,73 @@
+"""Rotations and poses, vectorised over leading axes. Quaternions are w x y z, unit length."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pdtui.robots.base import Floats, Link
+
+
+def wrap_angle(angle: float) -> float:
+    """The same angle in (−π, π], rad."""
+    wrapped = (angle + np.pi) % (2.0 * np.pi) - np.pi
+    return float(np.pi if wrapped == -np.pi else wrapped)
+
+
+def multiply_quaternions(a: Floats, b: Floats) -> Floats:
+    """Hamilton product, shapes (..., 4): the rotation b followed by a."""
+    aw, ax, ay, az = np.moveaxis(a, -1, 0)
+    bw, bx, by, bz = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def rotate(quaternion: Floats, vector: Floats) -> Floats:
+    """Rotate vectors (..., 3) by quaternions (..., 4)."""
+    w, xyz = quaternion[..., :1], quaternion[..., 1:]
+    t = 2.0 * np.cross(xyz, vector)
+    rotated: Floats = vector + w * t + np.cross(xyz, t)
+    return rotated
+
+
+def roll_pitch_yaw(quaternion: Floats) -> tuple[float, float, float]:
+    """Intrinsic z-y'-x'' Euler angles of one quaternion, rad."""
+    w, x, y, z = (float(value) for value in quaternion)
+    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = np.arcsin(min(1.0, max(-1.0, 2 * (w * y - z * x))))
+    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return float(roll), float(pitch), float(yaw)
+
+
+def place_links(links: Sequence[Link], poses: Floats) -> Floats:
+    """World poses of links, shape (..., L, 7), from body poses, shape (..., B, 7)."""
+    bodies = poses[..., [link.body for link in links], :]
+    offsets = np.array([link.position for link in links], dtype=np.float64)
+    turns = np.array([link.quaternion for link in links], dtype=np.float64)
+    position = bodies[..., :3] + rotate(bodies[..., 3:], offsets)
+    return np.concatenate([position, multiply_quaternions(bodies[..., 3:], turns)], axis=-1)
+
+
+def capsule_ends(links: Sequence[Link], placed: Floats) -> Floats:
+    """Both ends of each link's axis, shape (..., L, 2, 3); a sphere's two ends coincide.
+
+    Args:
+        links: the shapes; a box counts as a segment along its longest side.
+        placed: their world poses from `place_links`, shape (..., L, 7).
+    """
+    axes = np.zeros((len(links), 3))
+    for row, link in enumerate(links):
+        if link.shape == "capsule":
+            axes[row, 2] = link.size[1]
+        elif link.shape == "box":
+            axes[row, int(np.argmax(link.size))] = max(link.size)
+    half = rotate(placed[..., 3:], axes)
+    return np.stack([placed[..., :3] - half, placed[..., :3] + half], axis=-2)

@@ -1,0 +1,29 @@
+"""Everything that changes a run: events, each stamped with the control step before which it applies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+EventKind = Literal["behavior", "default", "target", "factor", "reset", "rewind"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """One change of the run.
+
+    Attributes:
+        step: it applies before this control step; the first is 0.
+        kind: ``behavior`` latches `name`; ``default`` clears everything; ``target`` moves the target of
+            `name` to `value`; ``factor`` scales the magnitudes of `name` to `value` times the map's; ``reset``
+            starts the next episode; ``rewind`` restores the state before step `value`.
+        name: of the behavior.
+        value: target, factor or step.
+        key: what the operator pressed, empty if no key did it.
+    """
+
+    step: int
+    kind: EventKind
+    name: str = ""
+    value: float = 0.0
+    key: str = ""

@@ -1,0 +1,178 @@
+"""Which behaviors are active now, and what they overwrite in this control step."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+
+from pdtui.errors import EventError
+from pdtui.policies.units import Stimulation, parse_unit
+from pdtui.robots.base import Attribute, Floats
+from pdtui.stimulation.magnitude import PidMagnitude
+from pdtui.stimulation.maps import Behavior, StimulationMap
+
+
+@dataclass(frozen=True)
+class ActiveBehavior:
+    """A latched behavior as the screen and the session see it.
+
+    Attributes:
+        name: of the behavior.
+        remaining: control steps until its period ends; None lasts until another key.
+        factor: by how much the operator scaled the map's magnitudes.
+        target, value, error, magnitude: of the controller in mode ``pid``, else None.
+    """
+
+    name: str
+    remaining: int | None
+    factor: float = 1.0
+    target: float | None = None
+    value: float | None = None
+    error: float | None = None
+    magnitude: float | None = None
+
+
+class _Latched:
+    def __init__(self, behavior: Behavior, weights: dict[int, float], steps: int | None) -> None:
+        self.behavior, self.weights, self.remaining = behavior, weights, steps
+        self.factor = 1.0
+        self.controller: PidMagnitude | None = None
+        self.column = 0
+
+
+class Latch:
+    """The state machine between key presses and stimulations.
+
+    Args:
+        stimulation_map: the behaviors.
+        layers: widths of the policy's layers.
+        attributes: of the robot.
+        dt: s per control step.
+
+    Raises:
+        MapError, PolicyError: a unit of the map does not exist.
+    """
+
+    def __init__(
+        self,
+        stimulation_map: StimulationMap,
+        layers: tuple[int, ...],
+        attributes: tuple[Attribute, ...],
+        dt: float,
+    ) -> None:
+        self._map, self._attributes, self._dt = stimulation_map, attributes, dt
+        self._weights = {
+            name: {parse_unit(unit, layers): v for unit, v in stimulation_map.units_of(behavior).items()}
+            for name, behavior in stimulation_map.behaviors.items()
+        }
+        self._latched: list[_Latched] = []
+
+    @property
+    def active(self) -> tuple[ActiveBehavior, ...]:
+        """Latched behaviors, the latest last."""
+        views = []
+        for latched in self._latched:
+            pid = latched.controller
+            views.append(
+                ActiveBehavior(
+                    latched.behavior.name,
+                    latched.remaining,
+                    latched.factor,
+                    *((pid.target, pid.value, pid.error, pid.magnitude) if pid else ()),
+                )
+            )
+        return tuple(views)
+
+    def press(self, name: str, attributes: Floats) -> None:
+        """Latch a behavior; those that may not run beside it end. A latched one starts over.
+
+        In mode ``pid`` the target starts at the present value; pressing the key again turns it off.
+
+        Raises:
+            EventError: the map has no such behavior.
+        """
+        behavior = self._behavior(name)
+        was_on = any(latched.behavior.name == name for latched in self._latched)
+        self._latched = [
+            latched
+            for latched in self._latched
+            if latched.behavior.name != name
+            and (name in latched.behavior.together or latched.behavior.name in behavior.together)
+        ]
+        if was_on and behavior.pid is not None:
+            return
+        steps = None if behavior.period is None else max(1, round(behavior.period / self._dt))
+        latched = _Latched(behavior, self._weights[name], steps)
+        if behavior.pid is not None:
+            names = [attribute.name for attribute in self._attributes]
+            latched.column = names.index(behavior.pid.attribute)
+            wraps = self._attributes[latched.column].wraps
+            latched.controller = PidMagnitude(behavior.pid, wraps, self._dt)
+            latched.controller.start(float(attributes[latched.column]))
+        self._latched.append(latched)
+
+    def clear(self) -> None:
+        """The default key: nothing is overwritten any more."""
+        self._latched = []
+
+    def set_target(self, name: str, target: float) -> None:
+        """Move the target of a latched behavior of mode ``pid``.
+
+        Raises:
+            EventError: it is not latched or has no target.
+        """
+        controller = self._find(name).controller
+        if controller is None:
+            raise EventError(f"behavior '{name}' holds no target; its mode is fixed")
+        controller.set_target(target)
+
+    def set_factor(self, name: str, factor: float) -> None:
+        """Scale the magnitudes of a latched behavior.
+
+        Raises:
+            EventError: it is not latched.
+        """
+        self._find(name).factor = factor
+
+    def stimulate(self, attributes: Floats) -> Stimulation:
+        """What this control step overwrites; ends the behaviors whose period is over.
+
+        Where two latched behaviors share a unit, the one latched last decides.
+
+        Args:
+            attributes: the robot's present values, shape (J,).
+        """
+        values: dict[int, float] = {}
+        for latched in self._latched:
+            factor = latched.factor
+            if latched.controller is not None:
+                factor *= latched.controller.update(float(attributes[latched.column]))
+            values |= {unit: weight * factor for unit, weight in latched.weights.items()}
+        return Stimulation.of(values)
+
+    def tick(self) -> None:
+        """A control step has passed: periods run down, and what is over ends."""
+        for latched in self._latched:
+            if latched.remaining is not None:
+                latched.remaining -= 1
+        self._latched = [latched for latched in self._latched if latched.remaining != 0]
+
+    def save(self) -> list[_Latched]:
+        """A copy of the state, for `load`."""
+        return copy.deepcopy(self._latched)
+
+    def load(self, state: list[_Latched]) -> None:
+        """Return to a state that `save` gave."""
+        self._latched = copy.deepcopy(state)
+
+    def _behavior(self, name: str) -> Behavior:
+        if name not in self._map.behaviors:
+            known = ", ".join(self._map.behaviors)
+            raise EventError(f"{self._map.source}: no behavior '{name}'; there are {known}")
+        return self._map.behaviors[name]
+
+    def _find(self, name: str) -> _Latched:
+        for latched in self._latched:
+            if latched.behavior.name == name:
+                return latched
+        raise EventError(f"behavior '{name}' is not latched")

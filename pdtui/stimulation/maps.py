@@ -1,0 +1,180 @@
+"""The stimulation-evoked map: all behaviors of one policy, as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from pdtui.errors import MapError
+from pdtui.policies.units import parse_unit
+
+SCHEMA = 1
+RESERVED_KEYS: dict[str, str] = {
+    "up": "raises the target",
+    "down": "lowers the target",
+    "left": "turns the target left",
+    "right": "turns the target right",
+    "plus": "strengthens the behavior",
+    "minus": "weakens the behavior",
+    "r": "starts over",
+    "backspace": "rewinds",
+    "p": "pauses",
+    "n": "steps once",
+    "comma": "slower",
+    "full_stop": "faster",
+    "question_mark": "help",
+    "v": "changes the view",
+    "q": "quits",
+}
+
+Mode = Literal["fixed", "pid"]
+Direction = Literal["increase", "decrease", "stop"]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """An effect and its 95 % interval, in the attribute's unit."""
+
+    effect: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """The unit that steers one attribute.
+
+    Attributes:
+        name: how behaviors of the map refer to it.
+        attribute: what it steers.
+        unit: its address, ``layer:index``.
+        rho: correlation ρ with the attribute; `v = c ρ`.
+        discrepancy: distance of the spectrograms, None where matching was not run.
+        value: the output v at which `measured` was taken.
+        measured: change of the attribute at that v.
+    """
+
+    name: str
+    attribute: str
+    unit: str
+    rho: float
+    discrepancy: float | None = None
+    value: float | None = None
+    measured: Measured | None = None
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What a behavior is meant to do, which `pdtui evaluate` measures."""
+
+    attribute: str
+    direction: Direction
+
+
+@dataclass(frozen=True)
+class Pid:
+    """Gains of a behavior that holds an attribute at a target.
+
+    Attributes:
+        attribute: the controlled attribute.
+        kp, ki, kd: gains, from the attribute's unit to c.
+        limit: c stays within ±limit, which the robot survives.
+        step: by how much one press of an arrow key moves the target, in the attribute's unit.
+    """
+
+    attribute: str
+    kp: float
+    ki: float
+    kd: float
+    limit: float
+    step: float
+
+
+@dataclass(frozen=True)
+class Behavior:
+    """A named stimulation bound to a key.
+
+    Attributes:
+        name: what the screen calls it.
+        key: the key that latches it.
+        says: one sentence on what one sees.
+        magnitudes: c for the name of a primitive, v for a ``layer:index``. In mode ``pid`` these are weights
+            that the controller's output multiplies.
+        period: activation period T in s; None lasts until another key.
+        together: names of behaviors that may stay latched with this one.
+        mode: ``fixed`` magnitudes, or ``pid``.
+        aim: what it is meant to do.
+        pid: the controller of mode ``pid``.
+    """
+
+    name: str
+    key: str
+    says: str
+    magnitudes: dict[str, float]
+    period: float | None = None
+    together: tuple[str, ...] = ()
+    mode: Mode = "fixed"
+    aim: Aim | None = None
+    pid: Pid | None = None
+
+
+@dataclass(frozen=True)
+class StimulationMap:
+    """All behaviors of one policy.
+
+    Attributes:
+        robot: name of the robot.
+        policy: weights file, or name of a shipped policy.
+        policy_hash: SHA-256 of the weights.
+        default_key: the key that clears everything.
+        primitives: by name.
+        behaviors: by name, in the order of the file.
+        text: the file's text.
+        source: where it came from, for messages.
+    """
+
+    robot: str
+    policy: str
+    policy_hash: str
+    default_key: str
+    primitives: dict[str, Primitive]
+    behaviors: dict[str, Behavior]
+    text: str = field(default="", repr=False)
+    source: str = "map"
+
+    def units_of(self, behavior: Behavior) -> dict[str, float]:
+        """The behavior's outputs v by unit address; ``v = c ρ`` for a primitive (section 3.3)."""
+        outputs: dict[str, float] = {}
+        for name, magnitude in behavior.magnitudes.items():
+            if name in self.primitives:
+                primitive = self.primitives[name]
+                outputs[primitive.unit] = magnitude * primitive.rho
+            else:
+                outputs[name] = magnitude
+        return outputs
+
+    def behavior_of_key(self, key: str) -> Behavior | None:
+        """The behavior that a key latches."""
+        return next((behavior for behavior in self.behaviors.values() if behavior.key == key), None)
+
+    def check(self, robot: str, layers: tuple[int, ...], policy_hash: str, *, force: bool = False) -> None:
+        """See that the map fits a policy.
+
+        Raises:
+            MapError: another robot, another policy (unless forced), or a unit that does not exist.
+        """
+        from pdtui.errors import PolicyError
+
+        if self.robot != robot:
+            raise MapError(f"{self.source}: made for robot '{self.robot}', not for '{robot}'")
+        if self.policy_hash != policy_hash and not force:
+            raise MapError(
+                f"{self.source}: made for a policy with SHA-256 {self.policy_hash[:12]}…, "
+                f"the policy here has {policy_hash[:12]}…; --force drives all the same"
+            )
+        for behavior in self.behaviors.values():
+            for address in self.units_of(behavior):
+                try:
+                    parse_unit(address, layers)
+                except PolicyError as error:
+                    raise MapError(f"{self.source}: behavior '{behavior.name}': {error}") from error

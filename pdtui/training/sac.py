@@ -1,0 +1,195 @@
+"""Soft Actor-Critic on a jitted JAX learner.
+
+Haarnoja et al., "Soft Actor-Critic Algorithms and Applications" (2018), with what made the paper's robots
+walk on two cores: LayerNorm in the critics, the actor updated every second time, several updates in one call.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from numpy.typing import NDArray
+
+Params = list[dict[str, jax.Array]]
+
+
+@dataclass(frozen=True)
+class SacConfig:
+    """Hyper-parameters; `total_steps` counts control steps over all worlds."""
+
+    total_steps: int = 1_200_000
+    worlds: int = 16
+    chunk: int = 8
+    steps_per_update: int = 4
+    batch: int = 128
+    layers: tuple[int, ...] = (256, 256)
+    learning_rate: float = 3e-4
+    final_rate: float = 0.1
+    discount: float = 0.99
+    tau: float = 0.005
+    random_steps: int = 10_000
+    capacity: int = 1_000_000
+    evaluate_every: int = 100_000
+    evaluate_episodes: int = 32
+    evaluate_steps: int = 1000
+
+
+class LearnerState(NamedTuple):
+    """All that learning changes; a tree of arrays."""
+
+    actor: Params
+    critics: Params
+    targets: Params
+    log_alpha: jax.Array
+    actor_opt: Any
+    critic_opt: Any
+    alpha_opt: Any
+    key: jax.Array
+
+
+class Batch(NamedTuple):
+    """Transitions; leading axes (updates, batch)."""
+
+    observation: NDArray[np.float32]
+    action: NDArray[np.float32]
+    reward: NDArray[np.float32]
+    discount: NDArray[np.float32]
+    following: NDArray[np.float32]
+
+
+def _init_mlp(key: jax.Array, widths: tuple[int, ...], layer_norm: bool) -> Params:
+    layers = []
+    for fan_in, fan_out in zip(widths, widths[1:], strict=False):
+        key, sub_key = jax.random.split(key)
+        bound = 1.0 / np.sqrt(fan_in)
+        layer = {
+            "w": jax.random.uniform(sub_key, (fan_in, fan_out), minval=-bound, maxval=bound),
+            "b": jnp.zeros(fan_out),
+        }
+        if layer_norm:
+            layer |= {"scale": jnp.ones(fan_out), "shift": jnp.zeros(fan_out)}
+        layers.append(layer)
+    return layers
+
+
+def actor_forward(params: Params, observation: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Mean and log standard deviation before squashing, each (..., actions)."""
+    x = observation
+    for layer in params[:-1]:
+        x = jnp.tanh(x @ layer["w"] + layer["b"])
+    mean, log_std = jnp.split(x @ params[-1]["w"] + params[-1]["b"], 2, axis=-1)
+    return mean, jnp.clip(log_std, -5.0, 2.0)
+
+
+def _critic_forward(params: Params, observation: jax.Array, action: jax.Array) -> jax.Array:
+    x = jnp.concatenate([observation, action], axis=-1)
+    for layer in params[:-1]:
+        x = x @ layer["w"] + layer["b"]
+        centred = x - x.mean(-1, keepdims=True)
+        x = centred * jax.lax.rsqrt((centred**2).mean(-1, keepdims=True) + 1e-6)
+        x = jax.nn.relu(x * layer["scale"] + layer["shift"])
+    value: jax.Array = (x @ params[-1]["w"] + params[-1]["b"])[..., 0]
+    return value
+
+
+_both_critics = jax.vmap(_critic_forward, in_axes=(0, None, None))
+
+
+def _sample(params: Params, observation: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """A squashed action and its log probability."""
+    mean, log_std = actor_forward(params, observation)
+    noise = jax.random.normal(key, mean.shape)
+    raw = mean + jnp.exp(log_std) * noise
+    log_prob = -0.5 * noise**2 - log_std - 0.5 * jnp.log(2 * jnp.pi)
+    log_prob -= 2.0 * (jnp.log(2.0) - raw - jax.nn.softplus(-2.0 * raw))
+    return jnp.tanh(raw), log_prob.sum(-1)
+
+
+class SacLearner:
+    """Builds the first state and the jitted update."""
+
+    def __init__(self, config: SacConfig, observations: int, actions: int) -> None:
+        self.config, self.observations, self.actions = config, observations, actions
+        updates = config.total_steps // config.steps_per_update
+        rate = optax.schedules.linear_schedule(
+            config.learning_rate, config.learning_rate * config.final_rate, updates
+        )
+        half = optax.schedules.linear_schedule(
+            config.learning_rate, config.learning_rate * config.final_rate, max(updates // 2, 1)
+        )
+        self._critic_tx, self._actor_tx = optax.adam(rate), optax.adam(half)
+        self._alpha_tx = optax.adam(half)
+        self.update = jax.jit(self._update)
+
+    def init(self, seed: int) -> LearnerState:
+        """The untrained state."""
+        config = self.config
+        key, actor_key, *critic_keys = jax.random.split(jax.random.PRNGKey(seed), 4)
+        actor = _init_mlp(actor_key, (self.observations, *config.layers, 2 * self.actions), False)
+        widths = (self.observations + self.actions, *config.layers, 1)
+        critics = jax.vmap(partial(_init_mlp, widths=widths, layer_norm=True))(jnp.stack(critic_keys))
+        log_alpha = jnp.zeros(())
+        return LearnerState(
+            actor,
+            critics,
+            jax.tree.map(jnp.copy, critics),
+            log_alpha,
+            self._actor_tx.init(actor),
+            self._critic_tx.init(critics),
+            self._alpha_tx.init(log_alpha),
+            key,
+        )
+
+    def _critic_step(self, state: LearnerState, batch: Batch) -> LearnerState:
+        key, action_key = jax.random.split(state.key)
+        following, log_prob = _sample(state.actor, batch.following, action_key)
+        future = _both_critics(state.targets, batch.following, following).min(0)
+        future = future - jnp.exp(state.log_alpha) * log_prob
+        goal = batch.reward + batch.discount * self.config.discount * future
+
+        def loss(critics: Params) -> jax.Array:
+            value = _both_critics(critics, batch.observation, batch.action)
+            return ((value - goal) ** 2).mean(-1).sum()
+
+        changes, critic_opt = self._critic_tx.update(jax.grad(loss)(state.critics), state.critic_opt)
+        critics = optax.apply_updates(state.critics, changes)
+        tau = self.config.tau
+        targets = jax.tree.map(lambda old, new: old + tau * (new - old), state.targets, critics)
+        return state._replace(critics=critics, targets=targets, critic_opt=critic_opt, key=key)
+
+    def _actor_step(self, state: LearnerState, batch: Batch) -> LearnerState:
+        key, action_key = jax.random.split(state.key)
+        alpha = jnp.exp(state.log_alpha)
+
+        def loss(actor: Params) -> tuple[jax.Array, jax.Array]:
+            action, log_prob = _sample(actor, batch.observation, action_key)
+            value = _both_critics(state.critics, batch.observation, action).min(0)
+            return (alpha * log_prob - value).mean(), log_prob.mean()
+
+        gradient, log_prob = jax.grad(loss, has_aux=True)(state.actor)
+        changes, actor_opt = self._actor_tx.update(gradient, state.actor_opt)
+        excess = -(log_prob - self.actions)
+        alpha_changes, alpha_opt = self._alpha_tx.update(excess, state.alpha_opt)
+        return state._replace(
+            actor=optax.apply_updates(state.actor, changes),
+            actor_opt=actor_opt,
+            log_alpha=optax.apply_updates(state.log_alpha, alpha_changes),
+            alpha_opt=alpha_opt,
+            key=key,
+        )
+
+    def _update(self, state: LearnerState, batches: Batch) -> LearnerState:
+        """Run `updates` critic updates and half as many actor updates; leading axes (pairs, 2, batch)."""
+
+        def pair(state: LearnerState, batch: Batch) -> tuple[LearnerState, None]:
+            state = self._critic_step(state, Batch(*(leaf[0] for leaf in batch)))
+            second = Batch(*(leaf[1] for leaf in batch))
+            return self._actor_step(self._critic_step(state, second), second), None
+
+        return jax.lax.scan(pair, state, batches)[0]
