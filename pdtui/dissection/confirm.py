@@ -1,0 +1,157 @@
+"""Is a unit a motor primitive? Screening ranks all, refining confirms, matching is held against both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.dissection.matching import Match
+from pdtui.dissection.probe import Sweep, bootstrap_interval
+from pdtui.robots.base import Floats
+from pdtui.stimulation.maps import Measured
+
+RARE = 0.9
+"""A unit exceeds units drawn at random when it moves the attribute more than this share of all units does."""
+BEST = 10
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What probing says about one unit and one attribute.
+
+    Attributes:
+        unit: flat index.
+        value: output v at which the effect is strongest, of the values that all units were screened at.
+        measured: effect there with its 95 % interval over the starts.
+        one_sign: whether the effect had that sign from every start, without a fall.
+        exceeds: whether it is larger than that of `RARE` of all units at the same |v|.
+        both_ways: whether +v and −v move the attribute in opposite directions, each from every start.
+        survived: largest |v| up to which the robot never fell.
+    """
+
+    unit: int
+    value: float
+    measured: Measured
+    one_sign: bool
+    exceeds: bool
+    both_ways: bool
+    survived: float
+
+    @property
+    def confirmed(self) -> bool:
+        """One sign, more than units drawn at random, and an interval without zero."""
+        return self.one_sign and self.exceeds and self.measured.low * self.measured.high > 0
+
+
+@dataclass(frozen=True)
+class HitRate:
+    """How well matching alone finds what moves an attribute.
+
+    A hit is a unit whose screened strength is among the highest tenth and not zero.
+
+    Attributes:
+        first: whether the first match is one.
+        best: share of the first `BEST` matches that are.
+        random: share of all units that are.
+        correlation: rank correlation of small discrepancy with strength; NaN where either does not vary.
+    """
+
+    first: bool
+    best: float
+    random: float
+    correlation: float
+
+
+def select_units(screen: Sweep, match: Match, columns: Sequence[int], keep: int) -> tuple[int, ...]:
+    """Units worth refining: of each attribute the first match, and the best probed in each direction."""
+    chosen: set[int] = set()
+    for column in columns:
+        chosen.update(match.ranked(column)[:1].tolist())
+        for sign in (1.0, -1.0):
+            reach = screen.robust(column, sign).max(axis=1)
+            order = np.argsort(-reach, kind="stable")[:keep]
+            chosen.update(screen.units[row] for row in order if reach[row] > 0)
+    return tuple(sorted(chosen))
+
+
+def confirm(unit: int, column: int, screen: Sweep, refined: Sweep, seed: int) -> Confirmation:
+    """Judge one unit by its refined effect curve.
+
+    Args:
+        unit: flat index, refined.
+        column: of the attribute.
+        screen: every unit, at a few values.
+        refined: some units, at those values and more, from other starts.
+        seed: of the bootstrap.
+    """
+    row = refined.units.index(unit)
+    shared = [dose for dose, value in enumerate(refined.values) if value in screen.values]
+    robust = np.maximum(refined.robust(column, 1.0), refined.robust(column, -1.0))[row]
+    dose = shared[int(np.argmax(robust[shared]))]
+    samples = refined.effects[row, dose, :, column]
+    known = samples[np.isfinite(samples)]
+    effect = float(known.mean()) if known.size else float("nan")
+    value = refined.values[dose]
+    low, high = bootstrap_interval(samples, seed)
+    return Confirmation(
+        unit=unit,
+        value=value,
+        measured=Measured(effect, low, high),
+        one_sign=bool(robust[dose] > 0),
+        exceeds=bool(abs(effect) > np.quantile(_sizes(screen, column, abs(value)), RARE)),
+        both_ways=_both_ways(refined, row, column),
+        survived=refined.survived(unit),
+    )
+
+
+def best_probed(column: int, screen: Sweep, refined: Sweep, seed: int, count: int = 3) -> list[Confirmation]:
+    """The refined units that move an attribute most, confirmed ones first."""
+    order = np.argsort(-refined.strength(column), kind="stable")[: 4 * count]
+    judged = [confirm(refined.units[row], column, screen, refined, seed) for row in order]
+    return sorted(judged, key=lambda one: not one.confirmed)[:count]
+
+
+def hit_rate(column: int, screen: Sweep, match: Match) -> HitRate:
+    """Hold the ranking by discrepancy against the screening of every unit."""
+    strength = screen.strength(column)
+    hits = (strength > 0) & (strength > np.quantile(strength, RARE))
+    ranked = match.ranked(column)
+    if not ranked.size:
+        return HitRate(False, float("nan"), float(hits.mean()), float("nan"))
+    order = np.searchsorted(np.array(screen.units), ranked)
+    return HitRate(
+        first=bool(hits[order[0]]),
+        best=float(hits[order[:BEST]].mean()),
+        random=float(hits.mean()),
+        correlation=rank_correlation(-match.discrepancy[column, ranked], strength[order]),
+    )
+
+
+def rank_correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Spearman's rank correlation, ties at their mean rank; NaN where one side does not vary."""
+    from scipy.stats import rankdata
+
+    if np.ptp(a) == 0 or np.ptp(b) == 0:
+        return float("nan")
+    return float(np.corrcoef(rankdata(a), rankdata(b))[0, 1])
+
+
+def _sizes(screen: Sweep, column: int, size: float) -> Floats:
+    """How far each unit and sign of v moves the attribute, whether steadily or not, at one |v|."""
+    doses = [dose for dose, value in enumerate(screen.values) if abs(value) == size]
+    # Falls before the measured steps leave no number behind: no effect of a living robot.
+    sizes: Floats = np.abs(np.nan_to_num(screen.effects[:, doses, :, column]).mean(axis=-1)).reshape(-1)
+    return sizes
+
+
+def _both_ways(refined: Sweep, row: int, column: int) -> bool:
+    up, down = refined.robust(column, 1.0)[row] > 0, refined.robust(column, -1.0)[row] > 0
+    for dose, value in enumerate(refined.values):
+        if value > 0 and -value in refined.values:
+            mirror = refined.values.index(-value)
+            if (up[dose] and down[mirror]) or (down[dose] and up[mirror]):
+                return True
+    return False

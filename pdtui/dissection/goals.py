@@ -1,0 +1,86 @@
+"""What a behavior is meant to reach, and the score by which candidates for it are compared."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.dissection.probe import Effects
+from pdtui.robots.base import Attribute, Floats
+from pdtui.stimulation.maps import Aim
+
+
+@dataclass(frozen=True)
+class Goal:
+    """One behavior to look for.
+
+    Attributes:
+        name: of the behavior.
+        key: that latches it.
+        says: one sentence on what one sees.
+        aim: the attribute and where it is to go.
+        enough: effect that counts as reached: in the attribute's unit, or for a stop the share of its mean
+            that goes.
+    """
+
+    name: str
+    key: str
+    says: str
+    aim: Aim
+    enough: float
+
+
+# Targets for a walker of the Ant's speed; a robot without an attribute goes without its behaviors.
+GOALS: tuple[Goal, ...] = (
+    Goal("stop", "x", "stops and stands", Aim("speed", "stop"), 0.8),
+    Goal("up", "w", "walks on and drifts to +y", Aim("vy", "increase"), 0.7),
+    Goal("down", "s", "walks on and drifts to −y", Aim("vy", "decrease"), 0.7),
+    Goal("spin left", "a", "turns left on the spot, or nearly", Aim("yaw rate", "increase"), 0.5),
+    Goal("spin right", "d", "turns right on the spot, or nearly", Aim("yaw rate", "decrease"), 0.5),
+)
+_QUANTILE = 0.2
+_FALL = 2.0
+_UNIT = 0.01
+
+
+def goals_for(attributes: Sequence[Attribute]) -> tuple[Goal, ...]:
+    """The goals whose attributes a robot has."""
+    names = {attribute.name for attribute in attributes}
+    return tuple(goal for goal in GOALS if goal.aim.attribute in names)
+
+
+def gains(goal: Goal, column: int, result: Effects) -> Floats:
+    """How far each plan goes the goal's way from each start, shape (S, K).
+
+    In the attribute's unit; for a stop, the share of the unperturbed mean that is gone. A roll-out that fell
+    gains nothing, however far it was thrown.
+    """
+    if goal.aim.direction == "stop":
+        unperturbed = result.unperturbed[:, column]
+        gain = (np.abs(unperturbed) - np.abs(result.means[..., column])) / np.maximum(
+            np.abs(unperturbed), 1e-9
+        )
+    else:
+        gain = result.effects[..., column] * (1.0 if goal.aim.direction == "increase" else -1.0)
+    lost: Floats = np.where(result.falls | ~np.isfinite(gain), np.minimum(np.nan_to_num(gain), 0.0), gain)
+    return lost
+
+
+def score(goal: Goal, column: int, result: Effects, units: Sequence[int]) -> Floats:
+    """Score of each plan, in parts of what is enough; 1 is a behavior that works, shape (S,).
+
+    The lower fifth of the gains over the starts, because a behavior has to work from any state; less twice
+    the share of falls, and a little for every further unit.
+
+    Args:
+        goal: what is aimed at.
+        column: of the goal's attribute.
+        result: the plans, probed.
+        units: how many units each plan overwrites.
+    """
+    lower = np.quantile(gains(goal, column, result), _QUANTILE, axis=1) / goal.enough
+    further = np.maximum(np.array(units, np.float64) - 1.0, 0.0)
+    value: Floats = lower - _FALL * result.falls.mean(axis=1) - _UNIT * further
+    return value

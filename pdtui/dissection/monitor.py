@@ -1,0 +1,150 @@
+"""Step 1, monitor: roll the policy out unstimulated and record every hidden unit and kinematic attribute."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.errors import RobotError, SimulationDiverged
+from pdtui.policies.runtime import Policy
+from pdtui.robots.base import Attribute, Floats, Robot, RobotSnapshot
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One unstimulated roll-out.
+
+    Row t holds one control step: the activations with which the policy chose the action, and the attributes
+    of the state that this action led to (so a torque stands beside the activations that commanded it).
+
+    Attributes:
+        seed: of the reset.
+        activations: outputs after the activation functions, shape (T, U).
+        attributes: in their physical units, shape (T, J). An attribute that wraps (a yaw) is unwrapped: its
+            jumps at ±π are no motion of the robot, but would dominate its spectrum.
+        ended: why the episode ended before T, empty where it did not.
+    """
+
+    seed: int
+    activations: NDArray[np.float32]
+    attributes: Floats
+    ended: str = ""
+
+    @property
+    def steps(self) -> int:
+        """Control steps recorded."""
+        return len(self.activations)
+
+    def scaled(self, attributes: Sequence[Attribute]) -> Floats:
+        """The attributes at the scale at which matching compares them, shape (T, J)."""
+        scaled: Floats = self.attributes * np.array([attribute.scale for attribute in attributes])
+        return scaled
+
+
+@dataclass(frozen=True)
+class Start:
+    """A state of an unstimulated walk from which stimulated roll-outs start.
+
+    Attributes:
+        seed: of the reset.
+        step: control steps since the reset.
+        snapshot: the whole state.
+    """
+
+    seed: int
+    step: int
+    snapshot: RobotSnapshot
+
+
+def monitor(
+    robot: Robot, policy: Policy, seeds: Sequence[int], steps: int, progress: Progress | None = None
+) -> list[Episode]:
+    """Roll the policy out once a seed, with its mean action and no stimulation (section 3.2, "monitoring").
+
+    Args:
+        robot: the world; it is reset.
+        policy: acts.
+        seeds: one of each episode (the paper: five).
+        steps: T, at most; an episode ends earlier where the robot does.
+        progress: called with (episodes done, episodes).
+    """
+    episodes = []
+    for seed in seeds:
+        episodes.append(_record(robot, policy, seed, steps))
+        if progress is not None:
+            progress(len(episodes), len(seeds))
+    return episodes
+
+
+def _record(robot: Robot, policy: Policy, seed: int, steps: int) -> Episode:
+    observation, _ = robot.reset(seed=seed)
+    activations, attributes, ended = [], [], ""
+    for _ in range(steps):
+        acted = policy.act(observation)
+        try:
+            observation, _, terminated, truncated, info = robot.step(acted.action)
+        except SimulationDiverged as error:
+            ended = str(error)
+            break
+        activations.append(acted.activations)
+        attributes.append(robot.read_attributes())
+        if terminated or truncated:
+            ended = str(info.get("reason", "the episode is over"))
+            break
+    values = np.array(attributes, np.float64).reshape(-1, len(robot.attributes))
+    for column, attribute in enumerate(robot.attributes):
+        if attribute.wraps:
+            values[:, column] = np.unwrap(values[:, column])
+    return Episode(seed, np.array(activations, np.float32).reshape(-1, policy.units), values, ended)
+
+
+def collect_starts(
+    robot: Robot, policy: Policy, first_seed: int, count: int, *, at: int = 100, survive: int = 0
+) -> list[Start]:
+    """Snapshots of unstimulated walks, one a seed: other headings, other phases of the gait.
+
+    Seeds whose unstimulated walk falls before step ``at + survive`` are passed over, so that a fall in a
+    stimulated roll-out of that length is the stimulation's.
+
+    Args:
+        robot: the world; it is reset.
+        policy: acts.
+        first_seed: seeds count up from here.
+        count: how many snapshots to take.
+        at: control steps since the reset.
+        survive: control steps that the walk has to go on.
+
+    Raises:
+        RobotError: among four times as many seeds too few walks last that long.
+    """
+    starts: list[Start] = []
+    for seed in range(first_seed, first_seed + 4 * count):
+        start = _walk(robot, policy, seed, at, survive)
+        if start is not None:
+            starts.append(start)
+        if len(starts) == count:
+            return starts
+    raise RobotError(
+        f"{robot.name}: expected {count} walks of {at + survive} steps without a fall among {4 * count} "
+        f"seeds, found {len(starts)}; dissection needs a policy that mostly stays up"
+    )
+
+
+def _walk(robot: Robot, policy: Policy, seed: int, at: int, survive: int) -> Start | None:
+    observation, _ = robot.reset(seed=seed)
+    start = Start(seed, 0, robot.snapshot()) if at == 0 else None
+    for step in range(1, at + survive + 1):
+        try:
+            observation, _, terminated, _, _ = robot.step(policy.act(observation).action)
+        except SimulationDiverged:
+            return None
+        if terminated:
+            return None
+        if step == at:
+            start = Start(seed, at, robot.snapshot())
+    return start

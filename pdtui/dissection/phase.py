@@ -1,0 +1,83 @@
+"""Step 4, sign: correlation ρ of unit and attribute from their phases at the predominant frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.dissection.matching import usable
+from pdtui.dissection.monitor import Episode
+from pdtui.dissection.spectrum import Preset, spectrogram, transform
+from pdtui.robots.base import Attribute, Floats
+
+DISAGREE = 0.1
+"""Difference of the plain and the circular ρ from which both are reported."""
+_SILENT = 1e-12
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Correlations of every pair of attribute and unit.
+
+    Attributes:
+        bins: predominant bin of each attribute, shape (J,).
+        plain: ρ from the plain mean of the wrapped phase differences, as in the paper, shape (J, U). A phase
+            near ±π flips between the two ends, and the plain mean of such phases means nothing.
+        circular: ρ from the circular mean (the angle of the mean phasor), shape (J, U).
+
+    Both are NaN for a unit or attribute that is silent at the predominant frequency: it has no phase.
+    """
+
+    bins: NDArray[np.intp]
+    plain: Floats
+    circular: Floats
+
+    @property
+    def disagree(self) -> NDArray[np.bool_]:
+        """Pairs whose two correlations differ by more than `DISAGREE`, shape (J, U)."""
+        return np.abs(self.plain - self.circular) > DISAGREE
+
+
+def correlation(phase: Floats) -> Floats:
+    """``ρ = 1 − |2p| / π`` (section 3.2): 1 in phase, −1 in antiphase, 0 in quadrature; p in rad."""
+    return 1.0 - np.abs(2.0 * phase) / np.pi
+
+
+def correlate(episodes: Sequence[Episode], attributes: Sequence[Attribute], preset: Preset) -> Phase:
+    """Sign and strength with which units go along with attributes.
+
+    The predominant frequency ``ω* = argmax_ω Σ_d SG(d, ω | s)`` sums over the windows of all episodes. The
+    phase difference at ω* is wrapped to (−π, π] and averaged over all windows of all episodes.
+
+    Args:
+        episodes: unstimulated roll-outs, at least one of a window's length (`match` says so where none is).
+        attributes: of the robot; their scales apply.
+        preset: of the spectrum.
+    """
+    used = usable(episodes, preset)
+    units = [transform(episode.activations, preset) for episode in used]
+    targets = [transform(episode.scaled(attributes), preset) for episode in used]
+    energy = np.sum([spectrogram(target, preset).sum(axis=1) for target in targets], axis=0)
+    allowed = np.nan_to_num(energy[:, preset.phase_from_bin :], nan=-1.0)
+    bins = np.argmax(allowed, axis=1) + preset.phase_from_bin
+    shape = (len(attributes), len(units[0]))
+    plain, circular = np.full(shape, np.nan), np.full(shape, np.nan)
+    for row, bin_ in enumerate(bins):
+        signal = np.concatenate([spectra[:, :, bin_] for spectra in units], axis=1)
+        target = np.concatenate([spectra[row, :, bin_] for spectra in targets])
+        product = signal * np.conj(target)
+        size = np.abs(product)
+        heard = (size > _SILENT) & np.isfinite(size)
+        difference = np.angle(product)
+        # np.angle gives −π for a negative real with imaginary part −0; the wrap's interval is (−π, π].
+        difference[difference == -np.pi] = np.pi
+        phasor = np.where(heard, np.exp(1j * difference), 0.0).sum(axis=1)
+        count = heard.sum(axis=1)
+        known = count > 0
+        mean = np.where(heard, difference, 0.0).sum(axis=1)[known] / count[known]
+        plain[row, known] = correlation(mean)
+        circular[row, known] = correlation(np.angle(phasor[known]))
+    return Phase(bins, plain, circular)

@@ -1,0 +1,142 @@
+"""What a dissection found, as plain data."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pdtui.dissection.confirm import BEST, Confirmation, best_probed, confirm, hit_rate
+from pdtui.dissection.dissect import Dissection
+from pdtui.policies.units import Stimulation, format_unit
+
+
+def summarise(dissection: Dissection, matches: int = 3) -> dict[str, Any]:
+    """The findings as data that JSON can hold; numbers that do not exist are None.
+
+    Args:
+        dissection: the findings.
+        matches: how many of the nearest units to list for each attribute.
+    """
+    return {
+        "robot": dissection.robot,
+        "policy": dissection.policy,
+        "sha256": dissection.policy_hash,
+        "preset": dissection.preset.name,
+        "seed": dissection.seed,
+        "episodes": list(dissection.matching.used),
+        "too_short": [list(pair) for pair in dissection.matching.skipped],
+        "attributes": [
+            _attribute(dissection, column, matches) for column in range(len(dissection.attributes))
+        ],
+        "behaviors": [_behavior(dissection, number) for number in range(len(dissection.behaviors))],
+        "holds": [_hold(dissection, number) for number in range(len(dissection.holds))],
+        "rollouts": dissection.rollouts,
+        "control_steps": dissection.control_steps,
+        "minutes": round(dissection.minutes, 2),
+    }
+
+
+def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, Any]:
+    attribute = dissection.attributes[column]
+    matching, phase, layers = dissection.matching, dissection.phase, dissection.layers
+    ranked = matching.ranked(column)
+    rate = hit_rate(column, dissection.screen, matching)
+    first = None
+    if ranked.size:
+        first = confirm(int(ranked[0]), column, dissection.screen, dissection.refined, dissection.seed)
+    return {
+        "name": attribute.name,
+        "unit": attribute.unit,
+        "flaw": matching.flaws.get(attribute.name),
+        "unwrapped": attribute.wraps,
+        "frequency": float(dissection.preset.frequencies(dissection.dt)[phase.bins[column]]),
+        "matches": [
+            {
+                "unit": format_unit(int(unit), layers),
+                "discrepancy": _number(matching.discrepancy[column, unit]),
+                "level_share": _number(matching.level_share[column, unit]),
+                "rho": _number(phase.plain[column, unit]),
+                "rho_circular": _number(phase.circular[column, unit]),
+                "rho_disagree": bool(phase.disagree[column, unit]),
+            }
+            for unit in ranked[:matches]
+        ],
+        "first_match": None if first is None else _confirmation(dissection, column, first),
+        "probed": [
+            _confirmation(dissection, column, one)
+            for one in best_probed(column, dissection.screen, dissection.refined, dissection.seed)
+        ],
+        "hits": {
+            "first": rate.first,
+            f"best_{BEST}": _number(rate.best),
+            "random": _number(rate.random),
+            "rank_correlation": _number(rate.correlation),
+        },
+    }
+
+
+def _confirmation(dissection: Dissection, column: int, one: Confirmation) -> dict[str, Any]:
+    rho = float(dissection.phase.circular[column, one.unit])
+    return {
+        "unit": format_unit(one.unit, dissection.layers),
+        "value": one.value,
+        "effect": _number(one.measured.effect),
+        "low": _number(one.measured.low),
+        "high": _number(one.measured.high),
+        "confirmed": one.confirmed,
+        "both_ways": one.both_ways,
+        "survived": one.survived,
+        "rho": _number(rho),
+        # ρ > 0 says that a higher output goes with a higher attribute.
+        "sign_agrees": bool(rho * one.value * one.measured.effect > 0),
+    }
+
+
+def _behavior(dissection: Dissection, number: int) -> dict[str, Any]:
+    found = dissection.behaviors[number]
+    return {
+        "name": found.goal.name,
+        "attribute": found.goal.aim.attribute,
+        "direction": found.goal.aim.direction,
+        "enough": found.goal.enough,
+        "units": _units(dissection, found.stimulation),
+        "reached": found.reached,
+        "gain": _number(found.gain.effect),
+        "low": _number(found.gain.low),
+        "high": _number(found.gain.high),
+        "success": found.success,
+        "falls": found.falls,
+        "value": _number(found.value),
+        "unperturbed": _number(found.unperturbed),
+        "score": _number(found.score),
+        "search_score": _number(found.search_score),
+        "rollouts": found.rollouts,
+    }
+
+
+def _hold(dissection: Dissection, number: int) -> dict[str, Any]:
+    held = dissection.holds[number]
+    return {
+        "attribute": held.pid.attribute,
+        "units": _units(dissection, held.weights),
+        "kp": held.pid.kp,
+        "ki": held.pid.ki,
+        "kd": held.pid.kd,
+        "limit": held.pid.limit,
+        "holds": held.holds,
+        "error": _number(held.error),
+        "uncontrolled": _number(held.uncontrolled),
+        "falls": held.falls,
+        "targets": list(held.targets),
+        "relative": held.relative,
+    }
+
+
+def _units(dissection: Dissection, stimulation: Stimulation) -> dict[str, float]:
+    pairs = zip(stimulation.units, stimulation.values, strict=True)
+    return {format_unit(unit, dissection.layers): value for unit, value in pairs}
+
+
+def _number(value: Any) -> float | None:
+    number = float(value)
+    return number if math.isfinite(number) else None

@@ -1,0 +1,149 @@
+"""Roll-outs on several cores: each worker process has its own robot and policy."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from types import TracebackType
+
+from pdtui.dissection.monitor import Start
+from pdtui.dissection.rollout import Outcome, Plan, roll_out
+from pdtui.errors import RobotError
+from pdtui.policies.load import load_policy
+from pdtui.policies.runtime import Policy
+from pdtui.robots import make_robot
+from pdtui.robots.base import Robot
+
+Job = tuple[Plan, int]
+# Control steps handed over at once: long enough to hide the hand-over, short enough to stop within a second.
+_STEPS_A_CHUNK = 1200
+
+_worker: tuple[Robot, Policy] | None = None
+
+
+def _start_worker(robot: str, policy: str) -> None:
+    global _worker  # noqa: PLW0603  (a process's own robot is its global state)
+    # Ctrl-C reaches the whole process group; only the parent answers it, or every worker prints a traceback.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _worker = (make_robot(robot), load_policy(policy, robot))
+
+
+def _run_chunk(jobs: Sequence[Job], starts: dict[int, Start], steps: int, measure_from: int) -> list[Outcome]:
+    assert _worker is not None
+    return _run(_worker, jobs, starts, steps, measure_from)
+
+
+def _run(
+    pair: tuple[Robot, Policy], jobs: Sequence[Job], starts: dict[int, Start], steps: int, measure_from: int
+) -> list[Outcome]:
+    return [roll_out(*pair, starts[index], plan, steps, measure_from) for plan, index in jobs]
+
+
+class Crew:
+    """Runs roll-outs of one policy on one robot; with one worker in this process, else in others.
+
+    The results do not depend on the number of workers: each roll-out is a function of its snapshot and plan.
+    Processes are started by the first call of `run`, not before.
+
+    Args:
+        robot: name of the robot.
+        policy: weights file or name of a shipped policy.
+        workers: processes.
+
+    Raises:
+        RobotError: no such robot. PolicyError: no such policy, or one for another robot.
+    """
+
+    def __init__(self, robot: str, policy: str | Path, workers: int = 2) -> None:
+        # Built here too: the caller needs both, and what is wrong with them is raised in this process.
+        self.robot, self.policy = make_robot(robot), load_policy(policy, robot)
+        self._names = (robot, str(policy))
+        self._workers = max(1, workers)
+        self._pool: ProcessPoolExecutor | None = None
+        self.steps_run = 0
+        self.rollouts = 0
+
+    def __enter__(self) -> Crew:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the worker processes; a later `run` starts new ones."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+            self._pool = None
+
+    def run(
+        self,
+        jobs: Sequence[Job],
+        starts: Sequence[Start],
+        steps: int,
+        measure_from: int,
+        done: Callable[[int], None] | None = None,
+    ) -> list[Outcome]:
+        """Roll out every job; results in the order of the jobs.
+
+        Args:
+            jobs: what to overwrite, and the number of the start from which.
+            starts: snapshots.
+            steps: control steps of each roll-out.
+            measure_from: first step that counts.
+            done: called with the number of jobs finished so far.
+
+        Raises:
+            RobotError: a worker process died.
+        """
+        size = max(1, _STEPS_A_CHUNK // steps)
+        chunks = [jobs[low : low + size] for low in range(0, len(jobs), size)]
+        results: list[list[Outcome]] = [[] for _ in chunks]
+        finished = 0
+        for number, outcomes in self._chunks(chunks, starts, steps, measure_from):
+            results[number] = outcomes
+            finished += len(outcomes)
+            self.rollouts += len(outcomes)
+            self.steps_run += sum(outcome.lived for outcome in outcomes)
+            if done is not None:
+                done(finished)
+        return [outcome for outcomes in results for outcome in outcomes]
+
+    def _chunks(
+        self, chunks: Sequence[Sequence[Job]], starts: Sequence[Start], steps: int, measure_from: int
+    ) -> Iterator[tuple[int, list[Outcome]]]:
+        needed = [{index: starts[index] for _, index in chunk} for chunk in chunks]
+        if self._workers == 1:
+            for number, chunk in enumerate(chunks):
+                yield number, _run((self.robot, self.policy), chunk, needed[number], steps, measure_from)
+            return
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(
+                self._workers,
+                mp_context=multiprocessing.get_context("spawn"),
+                initializer=_start_worker,
+                initargs=self._names,
+            )
+        futures: dict[Future[list[Outcome]], int] = {}
+        try:
+            for number, chunk in enumerate(chunks):
+                future = self._pool.submit(_run_chunk, chunk, needed[number], steps, measure_from)
+                futures[future] = number
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BrokenProcessPool as error:
+            raise RobotError(
+                f"{self._names[0]}: a worker process died (out of memory, or killed); one worker runs "
+                "without other processes"
+            ) from error
+        except BaseException:
+            self.close()
+            raise
