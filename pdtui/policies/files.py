@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
@@ -52,7 +51,7 @@ def save_network(path: Path, network: PolicyNetwork) -> None:
     partial = path.with_name(path.name + ".part")
     path.parent.mkdir(parents=True, exist_ok=True)
     partial.write_bytes(payload)
-    os.replace(partial, path)
+    partial.replace(path)
 
 
 def load_network(path: Path) -> PolicyNetwork:
@@ -62,9 +61,9 @@ def load_network(path: Path) -> PolicyNetwork:
         PolicyError: not a safetensors file, no metadata of ours, or tensors that do not fit it.
     """
     try:
-        with safe_open(str(path), framework="pt") as handle:  # type: ignore[no-untyped-call]
+        with safe_open(str(path), framework="pt") as handle:
             metadata: dict[str, str] = handle.metadata() or {}
-            tensors: dict[str, torch.Tensor] = {name: handle.get_tensor(name) for name in handle.keys()}
+            tensors: dict[str, torch.Tensor] = {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118
     except (OSError, SafetensorError) as error:
         raise PolicyError(f"{path}: expected a safetensors file: {error}") from error
     if _KEY not in metadata:

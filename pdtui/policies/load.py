@@ -30,7 +30,8 @@ def decoder_for(spec: NetworkSpec) -> Decoder:
     def clipped(output: torch.Tensor, rng: np.random.Generator | None) -> NDArray[np.float32]:
         if rng is not None:
             raise PolicyError("this policy has no action distribution; it acts with its mean only")
-        return np.clip(output.numpy(), low, high)
+        action: NDArray[np.float32] = np.clip(output.numpy(), low, high)
+        return action
 
     return squashed if spec.head == "squashed_gaussian" else clipped
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Literal
 
 import torch
@@ -50,7 +51,8 @@ class NetworkSpec:
             raise PolicyError(f"unknown head '{self.head}'; there are squashed_gaussian, mean")
         if len(self.action_low) != self.actions or len(self.action_high) != self.actions:
             raise PolicyError(
-                f"expected {self.actions} action bounds, got {len(self.action_low)} and {len(self.action_high)}"
+                f"expected {self.actions} action bounds, "
+                f"got {len(self.action_low)} and {len(self.action_high)}"
             )
 
 
@@ -80,7 +82,7 @@ class PolicyNetwork(nn.Module):
         self.spec = spec
         self.normaliser = Normaliser(spec.observations)
         widths = [spec.observations, *spec.layers]
-        self.hidden = nn.ModuleList(nn.Linear(a, b) for a, b in zip(widths, widths[1:], strict=False))
+        self.hidden = nn.ModuleList(nn.Linear(a, b) for a, b in pairwise(widths))
         self.activations = nn.ModuleList(ACTIVATIONS[spec.activation]() for _ in spec.layers)
         outputs = spec.actions * (2 if spec.head == "squashed_gaussian" else 1)
         self.head = nn.Linear(widths[-1], outputs)

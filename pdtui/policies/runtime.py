@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 from numpy.typing import NDArray
 from torch import nn
 
@@ -51,7 +50,7 @@ def mean_action(output: torch.Tensor, rng: np.random.Generator | None) -> NDArra
 
 
 def chain_of(module: nn.Module) -> list[tuple[Callable[[torch.Tensor], torch.Tensor], bool]] | None:
-    """The module as a chain of plain calls, each with whether it puts out hidden units; None if it is no chain.
+    """The module as plain calls, each with whether it puts out hidden units; None if it is no chain.
 
     Calling the same PyTorch functions without the machinery of `nn.Module` gives the same bits in half the
     time, which counts at this size. A module is a chain if it is an `nn.Sequential`, or has a method
@@ -60,7 +59,7 @@ def chain_of(module: nn.Module) -> list[tuple[Callable[[torch.Tensor], torch.Ten
     if isinstance(module, nn.Sequential):
         stages: list[nn.Module] = list(module)
     elif hasattr(module, "stages"):
-        stages = module.stages()
+        stages = cast(Any, module).stages()
     else:
         return None
     if any(len(list(stage.children())) > 0 for stage in stages):
@@ -71,7 +70,7 @@ def chain_of(module: nn.Module) -> list[tuple[Callable[[torch.Tensor], torch.Ten
 def _plain_call(stage: nn.Module) -> Callable[[torch.Tensor], torch.Tensor]:
     if type(stage) is nn.Linear:
         weight, bias = stage.weight.detach(), None if stage.bias is None else stage.bias.detach()
-        return lambda x: F.linear(x, weight, bias)
+        return lambda x: nn.functional.linear(x, weight, bias)
     call: Callable[[torch.Tensor], torch.Tensor] = stage.forward
     return call
 
@@ -79,8 +78,8 @@ def _plain_call(stage: nn.Module) -> Callable[[torch.Tensor], torch.Tensor]:
 class Policy:
     """A network whose hidden units can be read and overwritten.
 
-    A unit's output is taken after its activation function and before the next layer (section 3.3 of the paper).
-    Layers count in the order in which the network calls them.
+    A unit's output is taken after its activation function and before the next layer (section 3.3 of the
+    paper). Layers count in the order in which the network calls them.
 
     Args:
         module: the network; it maps an observation, shape (observations,), to its output.
@@ -183,6 +182,7 @@ class Policy:
             natural = tuple([self._natural[unit] for unit in stimulation.units])
         except KeyError as error:
             raise PolicyError(
-                f"{self.name}: unit number {error} does not exist; the policy has {describe_layers(self.layers)}"
+                f"{self.name}: unit number {error} does not exist; "
+                f"the policy has {describe_layers(self.layers)}"
             ) from None
         return PolicyStep(action, activations, natural)

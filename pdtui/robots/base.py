@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -67,7 +68,7 @@ class RobotSnapshot:
     robot: str
     state: Floats
     extras: tuple[Floats, ...]
-    rng: dict[str, Any]
+    rng: Mapping[str, Any]
 
 
 class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):

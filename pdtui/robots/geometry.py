@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pdtui.robots.base import Floats, Link
+if TYPE_CHECKING:
+    from pdtui.robots.base import Floats, Link
 
 
 def wrap_angle(angle: float) -> float:

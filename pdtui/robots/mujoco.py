@@ -17,6 +17,8 @@ _SHAPES = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", 1),
     int(mujoco.mjtGeom.mjGEOM_BOX): ("box", 3),
 }
+# Its own handler prints and leaves a log file in the user's folder; `_check_finite` says what matters.
+mujoco.set_mju_user_warning(lambda *_: None)
 _DIVERGED = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
     mujoco.mjtWarning.mjWARN_BADQVEL,

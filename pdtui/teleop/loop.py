@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +25,7 @@ SNAPSHOTS_KEPT = 240
 class _Moment:
     robot: RobotSnapshot
     latch: list[Any]
-    noise: dict[str, Any]
+    noise: Mapping[str, Any]
     episode: int
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
-from pdtui.robots.base import Attribute, Floats, Link
-from pdtui.stimulation.latch import ActiveBehavior
+    from pdtui.robots.base import Attribute, Floats, Link
+    from pdtui.stimulation.latch import ActiveBehavior
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +48,7 @@ def save_checkpoint(
     }
     partial = path.with_name(path.name + ".part")
     save_file(arrays, partial, metadata={_KEY: json.dumps(record)})
-    os.replace(partial, path)
+    partial.replace(path)
 
 
 def load_checkpoint(
@@ -61,9 +60,9 @@ def load_checkpoint(
         TrainingError: the file is not a checkpoint of this robot and these settings.
     """
     try:
-        with safe_open(str(path), framework="numpy") as handle:  # type: ignore[no-untyped-call]
+        with safe_open(str(path), framework="numpy") as handle:
             record = json.loads((handle.metadata() or {})[_KEY])
-            arrays = {name: handle.get_tensor(name) for name in handle.keys()}
+            arrays = {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118
     except (OSError, SafetensorError, KeyError, ValueError) as error:
         raise TrainingError(f"{path}: expected a checkpoint of `pdtui train`: {error}") from error
     leaves, tree = jax.tree.flatten(learner)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from numpy.typing import NDArray
 
 Params = list[dict[str, jax.Array]]
 
@@ -54,18 +54,18 @@ class LearnerState(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """Transitions; leading axes (updates, batch)."""
+    """Transitions, NumPy or JAX, float32; those to learn from have leading axes (pairs, 2, batch)."""
 
-    observation: NDArray[np.float32]
-    action: NDArray[np.float32]
-    reward: NDArray[np.float32]
-    discount: NDArray[np.float32]
-    following: NDArray[np.float32]
+    observation: Any
+    action: Any
+    reward: Any
+    discount: Any
+    following: Any
 
 
 def _init_mlp(key: jax.Array, widths: tuple[int, ...], layer_norm: bool) -> Params:
     layers = []
-    for fan_in, fan_out in zip(widths, widths[1:], strict=False):
+    for fan_in, fan_out in pairwise(widths):
         key, sub_key = jax.random.split(key)
         bound = 1.0 / np.sqrt(fan_in)
         layer = {
@@ -155,7 +155,8 @@ class SacLearner:
 
         def loss(critics: Params) -> jax.Array:
             value = _both_critics(critics, batch.observation, batch.action)
-            return ((value - goal) ** 2).mean(-1).sum()
+            total: jax.Array = ((value - goal) ** 2).mean(-1).sum()
+            return total
 
         changes, critic_opt = self._critic_tx.update(jax.grad(loss)(state.critics), state.critic_opt)
         critics = optax.apply_updates(state.critics, changes)

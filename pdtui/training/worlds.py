@@ -92,6 +92,4 @@ def score_actor(make: Callable[[], Robot], actor: Actor, seeds: range, steps: in
             lengths[index] += 1
             fallen[index] = terminated
     mean_speed = float(np.mean(np.array(speeds) / np.maximum(lengths, 1)))
-    return Score(
-        len(robots), float(returns.mean()), float(returns.std()), mean_speed, int(fallen.sum())
-    )
+    return Score(len(robots), float(returns.mean()), float(returns.std()), mean_speed, int(fallen.sum()))

@@ -1,0 +1,79 @@
+"""The tables that the commands print."""
+
+from __future__ import annotations
+
+from rich.table import Table
+
+from pdtui.experiments.bench import LoopBench
+from pdtui.experiments.evaluate import Evaluation
+from pdtui.experiments.tracking import Tracking
+from pdtui.experiments.walking import Walking
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left")
+    for number, column in enumerate(columns):
+        table.add_column(column, justify="left" if number == 0 else "right", no_wrap=number == 0)
+    return table
+
+
+def _seeds(seeds: tuple[int, ...]) -> str:
+    return f"{len(seeds)} seeds, {seeds[0]}–{seeds[-1]}"
+
+
+def behavior_table(result: Evaluation) -> Table:
+    """One row a behavior."""
+    table = _table(
+        f"{result.robot}, policy {result.policy}, {_seeds(result.seeds)}",
+        *("behavior", "measure", "with it", "default", "effect [95 %]", "right", "falls"),
+    )
+    count = len(result.seeds)
+    for row in result.behaviors:
+        table.add_row(
+            row.behavior,
+            row.measure,
+            f"{row.value:.2f}",
+            f"{row.default:.2f}",
+            f"{row.effect:+.2f} [{row.low:+.2f}, {row.high:+.2f}]",
+            f"{row.right_sign}/{count}",
+            f"{row.falls}/{count}",
+        )
+    return table
+
+
+def tracking_table(result: Tracking) -> Table:
+    """One row a target, and the mean."""
+    unit = result.unit
+    table = _table(
+        f"{result.behavior}: {result.attribute} ({unit}), {_seeds(result.seeds)}, falls {result.falls}",
+        *(f"target ({unit})", "mean |error|", "last 25 steps"),
+    )
+    for row in result.targets:
+        table.add_row(f"{row.target:+.2f}", f"{row.error:.3f}", f"{row.settled:.3f}")
+    table.add_section()
+    table.add_row("mean", f"{result.error:.3f} [{result.low:.3f}, {result.high:.3f}]", "")
+    table.add_row("without control", f"{result.default_error:.3f}", "")
+    return table
+
+
+def walking_table(result: Walking) -> Table:
+    """The policy alone."""
+    table = _table(f"the policy alone, {_seeds(result.seeds)}, {result.steps} steps each", "measure", "value")
+    table.add_row("mean speed (m/s)", f"{result.mean_speed:.2f}")
+    table.add_row("net speed (m/s)", f"{result.net_speed:.2f}")
+    table.add_row("return", f"{result.mean_return:.0f} ± {result.std_return:.0f}")
+    table.add_row("episodes without a fall", f"{result.finished}/{len(result.seeds)}")
+    return table
+
+
+def bench_table(result: LoopBench) -> Table:
+    """Steps a second, and each share of the bare simulator."""
+    table = _table("control loop", "part", "steps/s", "of bare")
+    for name in ("bare", "policy", "stimulated", "recorded"):
+        rate = float(getattr(result, name))
+        table.add_row(name, f"{rate:.0f}", f"{rate / result.bare:.0%}")
+    table.caption = (
+        f"recorded / bare, median of rounds: {result.recorded_share:.0%}; "
+        f"forward pass with 3 stimulated units: {result.forward_us:.0f} µs"
+    )
+    return table

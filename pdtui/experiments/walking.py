@@ -1,0 +1,79 @@
+"""`pdtui evaluate --policy-only`: how the policy does by itself, over whole episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.teleop.drive import build_loop
+from pdtui.teleop.loop import ControlLoop
+from pdtui.teleop.order import DriveOrder
+
+EPISODE = 1000
+
+
+@dataclass(frozen=True)
+class Walking:
+    """The policy alone.
+
+    Attributes:
+        seeds: of the episodes.
+        steps: control steps an episode.
+        mean_speed: mean of |v| over all steps, m/s.
+        net_speed: mean over episodes of the distance between start and end, over the time, m/s.
+        mean_return, std_return: of the episodes' sums of reward.
+        finished: episodes without a fall.
+    """
+
+    seeds: tuple[int, ...]
+    steps: int
+    mean_speed: float
+    net_speed: float
+    mean_return: float
+    std_return: float
+    finished: int
+
+
+def evaluate_walking(
+    order: DriveOrder,
+    seeds: Sequence[int],
+    *,
+    steps: int = EPISODE,
+    progress: Callable[[int, int], None] | None = None,
+) -> Walking:
+    """Drive the policy untouched, one episode a seed.
+
+    Raises:
+        PdtuiError: robot, policy or map cannot be had.
+    """
+    built = build_loop(order)
+    column = built.robot.attribute_index("speed")
+    speeds, net_speeds, returns, finished = [], [], [], 0
+    for done, seed in enumerate(seeds, start=1):
+        loop = ControlLoop(built.robot, built.policy, built.map, seed)
+        total, ended = 0.0, ""
+        start = loop.robot.read_poses()[0, :2]
+        for _ in range(steps):
+            record = loop.advance()
+            total += record.reward
+            speeds.append(float(record.attributes[column]))
+            ended = record.ended
+            if ended:
+                break
+        seconds = loop.step * loop.robot.control_dt
+        net_speeds.append(float(np.linalg.norm(record.poses[0, :2] - start)) / seconds)
+        returns.append(total)
+        finished += not ended
+        if progress is not None:
+            progress(done, len(seeds))
+    return Walking(
+        tuple(seeds),
+        steps,
+        float(np.mean(speeds)),
+        float(np.mean(net_speeds)),
+        float(np.mean(returns)),
+        float(np.std(returns)),
+        finished,
+    )

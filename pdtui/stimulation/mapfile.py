@@ -1,0 +1,251 @@
+"""Maps on disk: TOML made to be edited by hand, checked field by field with line and name."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, cast
+
+from pdtui.errors import MapError
+from pdtui.stimulation.maps import (
+    RESERVED_KEYS,
+    SCHEMA,
+    Aim,
+    Behavior,
+    Direction,
+    Measured,
+    Mode,
+    Pid,
+    Primitive,
+    StimulationMap,
+)
+
+_UNIT = re.compile(r"\d{1,6}:\d{1,9}")
+_MAX_BYTES = 1_000_000
+_NUMBER = (int, float)
+
+
+class _Table:
+    """One table of the file, read field by field; what is left over at the end is an error."""
+
+    def __init__(self, source: str, text: str, where: str, data: Any, header: str, number: int) -> None:
+        self._source, self._text, self._where = source, text, where
+        self._header, self._number = header, number
+        if not isinstance(data, dict):
+            raise MapError(f"{source}: {where}: expected a table, found {_kind(data)}")
+        self._data = dict(data)
+
+    def take(self, name: str, kind: type | tuple[type, ...], default: Any = ...) -> Any:
+        if name not in self._data:
+            if default is ...:
+                raise self.error(name, "is missing")
+            return default
+        value = self._data.pop(name)
+        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+            raise self.error(name, f"expected {_name(kind)}, found {_kind(value)}")
+        if isinstance(value, float) and not math.isfinite(value):
+            raise self.error(name, "expected a finite number")
+        return value
+
+    def text(self, name: str, default: Any = ...) -> str:
+        value: str = self.take(name, str, default)
+        if not value.isprintable():
+            raise self.error(name, "expected printable text, found a control character")
+        return value
+
+    def choice(self, name: str, choices: tuple[str, ...], default: Any = ...) -> str:
+        value = self.text(name, default)
+        if value not in choices:
+            raise self.error(name, f"expected one of {', '.join(choices)}, found '{value}'")
+        return value
+
+    def table(self, name: str, default: Any = ...) -> _Table | None:
+        value = self.take(name, dict, default)
+        if value is None:
+            return None
+        return _Table(self._source, self._text, f"{self._where}, {name}", value, self._header, self._number)
+
+    def numbers(self, name: str) -> dict[str, float]:
+        data = self.take(name, dict)
+        for key, value in data.items():
+            if isinstance(value, bool) or not isinstance(value, _NUMBER) or not math.isfinite(value):
+                raise self.error(name, f"'{key}': expected a finite number, found {value!r}")
+        return {key: float(value) for key, value in data.items()}
+
+    def done(self) -> None:
+        for name in self._data:
+            raise self.error(name, "is not a field of this table")
+
+    def error(self, name: str, problem: str) -> MapError:
+        line = _line_of(self._text, self._header, self._number, name)
+        return MapError(f"{self._source}:{line}: {self._where}: field '{name}' {problem}")
+
+
+def load_map(path: Path) -> StimulationMap:
+    """Read and check a map.
+
+    Raises:
+        MapError: the file is missing, is no TOML, or a field is wrong; the message names line and field.
+    """
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise MapError(f"{path}: expected a map of at most {_MAX_BYTES} bytes")
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise MapError(f"{path}: cannot be read as a map: {error}") from error
+    return parse_map(text, str(path))
+
+
+def parse_map(text: str, source: str) -> StimulationMap:
+    """Check the text of a map; `source` names it in messages.
+
+    Raises:
+        MapError: as `load_map`.
+    """
+    try:
+        data = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise MapError(f"{source}: not a TOML file: {error}") from error
+    top = _Table(source, text, "top level", data, "", 0)
+    if (schema := top.take("schema", int)) != SCHEMA:
+        raise top.error("schema", f"expected {SCHEMA}, found {schema}")
+    robot = top.text("robot")
+    policy = _Table(source, text, "policy", top.take("policy", dict), "[policy]", 0)
+    name, sha256 = policy.text("name"), policy.text("sha256")
+    policy.done()
+    keys = _Table(source, text, "keys", top.take("keys", dict, {"default": "space"}), "[keys]", 0)
+    default_key = keys.text("default")
+    keys.done()
+    tables = {
+        kind: [
+            _Table(source, text, f"{kind[:-1]} {number + 1}", entry, f"[[{kind}]]", number)
+            for number, entry in enumerate(top.take(kind, list, []))
+        ]
+        for kind in ("primitives", "behaviors")
+    }
+    top.done()
+    primitives = {p.name: p for p in (_primitive(table) for table in tables["primitives"])}
+    behaviors: dict[str, Behavior] = {}
+    for table in tables["behaviors"]:
+        behavior = _behavior(table, primitives)
+        if behavior.name in behaviors:
+            raise table.error("name", f"'{behavior.name}' is taken by another behavior")
+        behaviors[behavior.name] = behavior
+    _check_keys(source, default_key, behaviors)
+    for behavior in behaviors.values():
+        for other in behavior.together:
+            if other not in behaviors:
+                raise MapError(
+                    f"{source}: behavior '{behavior.name}': together names '{other}', which does not exist"
+                )
+    return StimulationMap(robot, name, sha256, default_key, primitives, behaviors, text, source)
+
+
+def _primitive(table: _Table) -> Primitive:
+    unit = table.text("unit")
+    if not _UNIT.fullmatch(unit):
+        raise table.error("unit", f"expected layer:index, such as 0:12, found '{unit}'")
+    measured = table.table("measured", None)
+    effect = None
+    if measured is not None:
+        effect = Measured(*(float(measured.take(name, _NUMBER)) for name in ("effect", "low", "high")))
+        measured.done()
+    discrepancy, value = table.take("discrepancy", _NUMBER, None), table.take("value", _NUMBER, None)
+    primitive = Primitive(
+        name=table.text("name"),
+        attribute=table.text("attribute"),
+        unit=unit,
+        rho=float(table.take("rho", _NUMBER)),
+        discrepancy=None if discrepancy is None else float(discrepancy),
+        value=None if value is None else float(value),
+        measured=effect,
+    )
+    if not -1.0 <= primitive.rho <= 1.0:
+        raise table.error("rho", f"expected a number in −1..1, found {primitive.rho}")
+    table.done()
+    return primitive
+
+
+def _behavior(table: _Table, primitives: dict[str, Primitive]) -> Behavior:
+    name = table.text("name")
+    magnitudes = table.numbers("magnitudes")
+    for key in magnitudes:
+        if key not in primitives and not _UNIT.fullmatch(key):
+            known = ", ".join(primitives) or "none"
+            raise table.error("magnitudes", f"'{key}': neither layer:index nor a primitive ({known})")
+    if not magnitudes:
+        raise table.error("magnitudes", "expected at least one unit")
+    period = table.take("period", _NUMBER, None)
+    if period is not None and period <= 0:
+        raise table.error("period", f"expected more than 0 s, found {period}")
+    together = table.take("together", list, [])
+    if not all(isinstance(other, str) for other in together):
+        raise table.error("together", "expected names of behaviors")
+    mode = cast(Mode, table.choice("mode", ("fixed", "pid"), "fixed"))
+    aim_table, aim = table.table("aim", None), None
+    if aim_table is not None:
+        direction = cast(Direction, aim_table.choice("direction", ("increase", "decrease", "stop")))
+        aim = Aim(aim_table.text("attribute"), direction)
+        aim_table.done()
+    pid_table, pid = table.table("pid", None), None
+    if (pid_table is not None) != (mode == "pid"):
+        raise table.error("pid", 'expected with mode = "pid", and only there')
+    if pid_table is not None:
+        gains = {name: float(pid_table.take(name, _NUMBER)) for name in ("kp", "ki", "kd", "limit", "step")}
+        pid = Pid(attribute=pid_table.text("attribute"), **gains)
+        if pid.limit <= 0:
+            raise pid_table.error("limit", f"expected more than 0, found {pid.limit}")
+        pid_table.done()
+    behavior = Behavior(
+        name=name,
+        key=table.text("key"),
+        says=table.text("says", ""),
+        magnitudes=magnitudes,
+        period=None if period is None else float(period),
+        together=tuple(together),
+        mode=mode,
+        aim=aim,
+        pid=pid,
+    )
+    table.done()
+    return behavior
+
+
+def _check_keys(source: str, default_key: str, behaviors: dict[str, Behavior]) -> None:
+    owners = {default_key: "the default key"}
+    for behavior in behaviors.values():
+        key, own = behavior.key, f"behavior '{behavior.name}'"
+        if key in RESERVED_KEYS:
+            raise MapError(f"{source}: {own}: key '{key}' is taken: it {RESERVED_KEYS[key]}")
+        if key in owners:
+            raise MapError(f"{source}: key '{key}' is bound to both {owners[key]} and {own}")
+        if not key:
+            raise MapError(f"{source}: {own}: the key is empty")
+        owners[key] = own
+
+
+def _line_of(text: str, header: str, number: int, field: str) -> int:
+    """Line of a field in the n-th table with this header; of the header where the field is missing."""
+    lines = text.splitlines()
+    start = 0
+    if header:
+        starts = [row for row, line in enumerate(lines) if line.strip().startswith(header)]
+        start = starts[number] if number < len(starts) else 0
+    pattern = re.compile(rf"""(^|[{{,\s])["']?{re.escape(field)}["']?\s*=""")
+    for row in range(start, len(lines)):
+        if row > start and re.match(r"\s*\[", lines[row]) and header:
+            break
+        if pattern.search(lines[row].split("#")[0]):
+            return row + 1
+    return start + 1
+
+
+def _name(kind: type | tuple[type, ...]) -> str:
+    names = {str: "text", int: "a whole number", dict: "a table", list: "a list", bool: "true or false"}
+    return "a number" if isinstance(kind, tuple) else names.get(kind, kind.__name__)
+
+
+def _kind(value: Any) -> str:
+    return "a number" if type(value) in _NUMBER else _name(type(value))

@@ -1,0 +1,116 @@
+"""Putting a drive together, and running one without a screen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.errors import EventError, SimulationDiverged
+from pdtui.policies.load import load_policy
+from pdtui.robots import make_robot
+from pdtui.sessions.events import Event
+from pdtui.sessions.record import StepRecord
+from pdtui.sessions.recorder import SessionRecorder
+from pdtui.teleop.keys import key_event
+from pdtui.teleop.loop import ControlLoop
+from pdtui.teleop.order import DriveOrder
+
+
+@dataclass(frozen=True)
+class DriveSummary:
+    """How a drive without a screen went.
+
+    Attributes:
+        steps: control steps.
+        seconds: simulated time, s.
+        falls: episodes that ended.
+        involvement: control steps in which a key was pressed.
+        mean: mean of every attribute, by name.
+    """
+
+    steps: int
+    seconds: float
+    falls: int
+    involvement: int
+    mean: dict[str, float]
+
+
+def build_loop(order: DriveOrder) -> ControlLoop:
+    """Load robot and policy and set the loop at step 0.
+
+    Raises:
+        PdtuiError: the robot, the policy or the map cannot be had, or they do not fit each other.
+    """
+    policy = load_policy(order.policy or order.stimulation_map.policy, order.robot)
+    order.stimulation_map.check(order.robot, policy.layers, policy.sha256, force=order.force)
+    robot = make_robot(order.robot)
+    return ControlLoop(robot, policy, order.stimulation_map, order.seed, stochastic=order.stochastic)
+
+
+def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:
+    """The events of keys pressed before the loop's next step.
+
+    Raises:
+        EventError: a key means nothing in the present state.
+    """
+    events = []
+    for key in keys:
+        event = key_event(key, loop)
+        if isinstance(event, str):
+            raise EventError(f"step {loop.step}: key '{key}': {event}")
+        events.append(event)
+    return events
+
+
+def drive_keys(loop: ControlLoop, presses: Mapping[int, Sequence[str]], steps: int) -> Iterator[StepRecord]:
+    """Drive from keystrokes, unpaced.
+
+    Keys of one step are read together: what the second means does not depend on what the first did.
+
+    Raises:
+        EventError: a key means nothing in the state it meets.
+        SimulationDiverged: after the record of the step that diverged.
+    """
+    for _ in range(steps):
+        record = loop.advance(key_events(presses.get(loop.step, ()), loop))
+        yield record
+        if record.diverged:
+            raise SimulationDiverged(f"step {record.step}: {record.ended}")
+
+
+def drive_headless(
+    loop: ControlLoop,
+    presses: Mapping[int, Sequence[str]],
+    steps: int,
+    recorder: SessionRecorder | None,
+) -> DriveSummary:
+    """Drive from keystrokes without a screen, recording if a recorder is given, and sum it up.
+
+    Raises:
+        PdtuiError: as `drive_keys`; the recording is whole all the same.
+    """
+    falls = involvement = done = 0
+    total = np.zeros(len(loop.robot.attributes))
+    outcome = "stopped"
+    try:
+        for record in drive_keys(loop, presses, steps):
+            if recorder is not None:
+                recorder.write(record)
+            done += 1
+            falls += bool(record.ended)
+            involvement += any(event.key for event in record.events)
+            total += record.attributes
+        outcome = "finished"
+    except Exception as error:
+        outcome = str(error)
+        raise
+    finally:
+        if recorder is not None:
+            recorder.close(outcome)
+    means = {
+        attribute.name: float(value / max(done, 1))
+        for attribute, value in zip(loop.robot.attributes, total, strict=True)
+    }
+    return DriveSummary(done, done * loop.robot.control_dt, falls, involvement, means)

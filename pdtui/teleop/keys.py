@@ -1,0 +1,110 @@
+"""From pressed keys to events: on the screen and from keystroke files."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from pdtui.errors import EventError
+from pdtui.sessions.events import Event
+from pdtui.stimulation.latch import ActiveBehavior
+from pdtui.stimulation.maps import StimulationMap
+from pdtui.teleop.loop import ControlLoop
+
+FACTOR_STEP = 1.25
+REWIND_SECONDS = 3.0
+_LINE = re.compile(r"(\d{1,9})\s+(\S+)")
+_ARROWS = {"up": 1, "left": 1, "down": -1, "right": -1}
+
+
+def run_keys(stimulation_map: StimulationMap) -> tuple[str, ...]:
+    """Every key that can change a run driven with this map."""
+    fixed = ("up", "down", "left", "right", "plus", "minus", "r", "backspace")
+    return (
+        stimulation_map.default_key,
+        *(behavior.key for behavior in stimulation_map.behaviors.values()),
+        *fixed,
+    )
+
+
+def key_event(key: str, loop: ControlLoop) -> Event | str:
+    """The event that a key means in the loop's present state, or a sentence why it means nothing."""
+    step = loop.step
+    if key == loop.map.default_key:
+        return Event(step, "default", key=key)
+    behavior = loop.map.behavior_of_key(key)
+    if behavior is not None:
+        return Event(step, "behavior", behavior.name, key=key)
+    active = loop.latch.active
+    if key in _ARROWS:
+        return _move_target(key, loop, active)
+    if key in ("plus", "minus"):
+        if not active:
+            return "no behavior is latched whose strength could change"
+        latest = active[-1]
+        change = FACTOR_STEP if key == "plus" else 1.0 / FACTOR_STEP
+        return Event(step, "factor", latest.name, latest.factor * change, key)
+    if key == "r":
+        return Event(step, "reset", key=key)
+    if key == "backspace":
+        wanted = step - round(REWIND_SECONDS / loop.robot.control_dt)
+        earlier = [kept for kept in loop.rewindable if kept <= wanted]
+        if not earlier:
+            return "nothing to rewind to yet"
+        return Event(step, "rewind", value=float(earlier[-1]), key=key)
+    return f"no behavior has key '{key}'"
+
+
+def _move_target(key: str, loop: ControlLoop, active: tuple[ActiveBehavior, ...]) -> Event | str:
+    """Left and right prefer a heading, up and down anything else, where both are held."""
+    held = [view for view in active if view.target is not None]
+    if not held:
+        return "no target is held; a behavior of mode pid holds one"
+
+    def turns(view: ActiveBehavior) -> bool:
+        pid = loop.map.behaviors[view.name].pid
+        assert pid is not None
+        return loop.robot.attributes[loop.robot.attribute_index(pid.attribute)].wraps
+
+    chosen = next((view for view in held if turns(view) == (key in ("left", "right"))), held[-1])
+    pid = loop.map.behaviors[chosen.name].pid
+    assert pid is not None
+    assert chosen.target is not None
+    return Event(loop.step, "target", chosen.name, chosen.target + _ARROWS[key] * pid.step, key)
+
+
+def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, list[str]]:
+    """Key presses by control step, from a text file with a line ``STEP KEY`` for each.
+
+    ``#`` starts a comment.
+
+    Raises:
+        EventError: the file cannot be read, or a line is not what was expected; the line is named.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise EventError(f"{path}: cannot be read as keystrokes: {error}") from error
+    known = run_keys(stimulation_map)
+    presses: dict[int, list[str]] = {}
+    last = 0
+    for number, line in enumerate(lines, start=1):
+        content = line.split("#")[0].strip()
+        if not content:
+            continue
+        match = _LINE.fullmatch(content)
+        if match is None:
+            raise EventError(f"{path}:{number}: expected 'STEP KEY', found {content[:40]!r}")
+        step, key = int(match[1]), match[2]
+        if key not in known:
+            raise EventError(f"{path}:{number}: key '{key[:40]}' does nothing; keys are {', '.join(known)}")
+        if step < last:
+            raise EventError(f"{path}:{number}: step {step} comes after step {last}; steps must not go back")
+        last = step
+        presses.setdefault(step, []).append(key)
+    return presses
+
+
+def write_keystrokes(events: tuple[Event, ...]) -> str:
+    """The key presses among events as the text of a keystroke file."""
+    return "".join(f"{event.step} {event.key}\n" for event in events if event.key)

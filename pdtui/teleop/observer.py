@@ -1,0 +1,85 @@
+"""Gathers records between two frames into the snapshot that the screen draws."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pdtui.sessions.record import StepRecord
+from pdtui.stimulation.latch import ActiveBehavior
+from pdtui.teleop.loop import ControlLoop
+from pdtui.teleop.snapshot import Snapshot, UnitView
+
+_ROWS_KEPT = 4000
+
+
+class Observer:
+    """Collects since the last snapshot; nothing is lost when frames are skipped.
+
+    Args:
+        loop: the drive that is watched.
+    """
+
+    def __init__(self, loop: ControlLoop) -> None:
+        self._loop = loop
+        self._rows = {name: row for row, name in enumerate(loop.map.behaviors)}
+        self._history: list[np.ndarray] = []
+        self._path: list[tuple[float, float, float]] = []
+        self._restarted = False
+        self._episode = 0
+        self._involvement = 0
+        self._last: StepRecord | None = None
+        self.notice = ""
+
+    def see(self, record: StepRecord) -> None:
+        """Take in one control step."""
+        began = record.episode != self._episode or any(event.kind == "rewind" for event in record.events)
+        if began:
+            self._restarted, self._path = True, []
+            self._episode = record.episode
+        row = self._rows[record.behaviors[-1].name] if record.behaviors else -1
+        self._history.append(record.attributes)
+        self._path.append((float(record.poses[0, 0]), float(record.poses[0, 1]), float(row)))
+        del self._history[:-_ROWS_KEPT], self._path[:-_ROWS_KEPT]
+        self._involvement += any(event.key for event in record.events)
+        for event in record.events:
+            if event.kind == "rewind":
+                self.notice = f"rewound to step {int(event.value)}"
+            elif event.kind == "reset":
+                self.notice = f"started over: episode {record.episode}"
+        if record.ended:
+            self.notice = record.ended
+        self._last = record
+
+    def snapshot(
+        self, *, paused: bool, speed: float, achieved: float, recorded_bytes: int, finished: str
+    ) -> Snapshot:
+        """What has come since the last call, and the latest of the rest."""
+        loop, last = self._loop, self._last
+        active: tuple[ActiveBehavior, ...] = loop.latch.active
+        units: tuple[UnitView, ...] = ()
+        if last is not None and active:
+            stimulated = zip(last.stimulation.units, last.natural, last.stimulation.values, strict=True)
+            units = tuple(UnitView(*view) for view in stimulated)
+        size = len(loop.robot.attributes)
+        snapshot = Snapshot(
+            step=loop.step,
+            time=loop.step * loop.robot.control_dt,
+            episode=loop.episode,
+            active=active,
+            units=units,
+            activations=np.zeros(loop.policy.units, np.float32) if last is None else last.activations,
+            attributes=loop.attributes,
+            poses=loop.robot.read_poses() if last is None else last.poses,
+            history=np.array(self._history).reshape(-1, size),
+            path=np.array(self._path).reshape(-1, 3),
+            restarted=self._restarted,
+            paused=paused,
+            speed=speed,
+            achieved=achieved,
+            involvement=self._involvement,
+            recorded_bytes=recorded_bytes,
+            notice=self.notice,
+            finished=finished,
+        )
+        self._history, self._path, self._restarted, self.notice = [], [], False, ""
+        return snapshot

@@ -1,0 +1,35 @@
+"""What a drive is to be, as plain data: it travels to the simulation's process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pdtui.sessions.events import Event
+from pdtui.stimulation.maps import StimulationMap
+
+
+@dataclass(frozen=True)
+class DriveOrder:
+    """What a drive is to be.
+
+    Attributes:
+        robot: name of the robot.
+        stimulation_map: its behaviors.
+        seed: of the drive.
+        policy: weights file or shipped name; empty takes the map's.
+        stochastic: draw actions instead of taking the mean.
+        force: drive although the policy is not the map's.
+        recording: file to record into, empty for none.
+        script: events by step that are played instead of keys, where a session is watched.
+        digests: what the watched session left, to compare with.
+    """
+
+    robot: str
+    stimulation_map: StimulationMap
+    seed: int
+    policy: str = ""
+    stochastic: bool = False
+    force: bool = False
+    recording: str = ""
+    script: tuple[Event, ...] | None = None
+    digests: tuple[int, ...] = ()

@@ -1,0 +1,104 @@
+"""The screen's end of a drive that runs in another process."""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING
+
+from pdtui.errors import PdtuiError
+from pdtui.teleop.link import Pace
+from pdtui.teleop.snapshot import Briefing, Snapshot
+
+if TYPE_CHECKING:
+    from pdtui.teleop.order import DriveOrder
+
+_PATIENCE = 15.0
+
+
+def _simulate(connection: Connection, order: DriveOrder) -> None:
+    from pdtui.teleop.simulation import simulate  # torch and the simulator load here, not under the screen
+
+    simulate(connection, order)
+
+
+class ProcessLink:
+    """Starts the simulation's process; start it before the screen takes the terminal.
+
+    Args:
+        order: the drive.
+    """
+
+    def __init__(self, order: DriveOrder) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=_simulate, args=(theirs, order), name="pdtui simulation")
+        self._process.start()
+        theirs.close()
+        self._last_words = ""
+        self._asked = False
+        self._recording = order.recording
+
+    def poll(self) -> Briefing | Snapshot | None:
+        """The newest message that has arrived, or None; see `DriveLink.poll`."""
+        message = self._receive()
+        if isinstance(message, Briefing) or (message is None and not self._asked):
+            self._send("frame", None)
+            self._asked = True
+        elif isinstance(message, Snapshot):
+            self._send("frame", None)
+        if isinstance(message, PdtuiError):
+            raise message
+        if isinstance(message, str):
+            self._last_words = message
+            raise PdtuiError(message)
+        return message
+
+    def press(self, key: str) -> None:
+        """Send a key that changes the run."""
+        self._send("press", key)
+
+    def pace(self, request: Pace) -> None:
+        """Change the pacing."""
+        self._send("pace", request)
+
+    def close(self) -> str:
+        """End the drive, wait until the recording is whole, and say how it ended."""
+        self._send("close", None)
+        deadline = time.monotonic() + _PATIENCE
+        while not self._last_words and time.monotonic() < deadline:
+            try:
+                message = self._receive(timeout=0.1)
+            except PdtuiError as error:
+                message = error
+            if isinstance(message, str | PdtuiError):
+                self._last_words = str(message)
+            elif message is None and not self._process.is_alive():
+                break
+        self._process.join(timeout=max(0.0, deadline - time.monotonic()))
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        self._connection.close()
+        return self._last_words or self._death()
+
+    def _receive(self, timeout: float = 0.0) -> Briefing | Snapshot | PdtuiError | str | None:
+        try:
+            if not self._connection.poll(timeout):
+                return None
+            message: Briefing | Snapshot | PdtuiError | str = self._connection.recv()
+        except (EOFError, OSError):
+            self._process.join(timeout=1.0)
+            return PdtuiError(self._death())
+        return message
+
+    def _send(self, kind: str, value: str | None) -> None:
+        try:
+            self._connection.send((kind, value))
+        except OSError:
+            return  # the process is gone; the next poll says why
+
+    def _death(self) -> str:
+        line = f"the simulation's process ended with code {self._process.exitcode}"
+        return f"{line}; the recording up to then is in {self._recording}" if self._recording else line

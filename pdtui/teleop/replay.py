@@ -1,0 +1,83 @@
+"""Run a session again and compare, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from pdtui.sessions.events import Event
+from pdtui.sessions.reader import Session, read_session
+from pdtui.sessions.versions import differences, environment_versions
+from pdtui.stimulation.mapfile import parse_map
+from pdtui.teleop.drive import build_loop
+from pdtui.teleop.order import DriveOrder
+
+
+@dataclass(frozen=True)
+class ReplayResult:
+    """How a replay compares with its session.
+
+    Attributes:
+        steps: control steps that were compared.
+        first_difference: the first control step whose digest differs; None if none does.
+        detail: what differs in that step.
+        environment: how machine and versions differ from the session's.
+    """
+
+    steps: int
+    first_difference: int | None
+    detail: str
+    environment: tuple[str, ...]
+
+
+def order_of(session: Session, source: str, policy: str = "") -> DriveOrder:
+    """The drive that repeats a session.
+
+    Raises:
+        MapError: the map inside the session is broken.
+    """
+    info = session.info
+    stimulation_map = parse_map(info.map_text, f"{source} (map)")
+    return DriveOrder(
+        robot=info.robot,
+        stimulation_map=stimulation_map,
+        seed=info.seed,
+        policy=policy,
+        stochastic=info.stochastic,
+        script=session.events,
+        digests=tuple(int(digest) for digest in session.digests),
+    )
+
+
+def replay_session(
+    path: Path, *, policy: str = "", progress: Callable[[int, int], None] | None = None
+) -> ReplayResult:
+    """Run a session from its file and its policy alone, comparing the digest of every step.
+
+    Args:
+        path: the session.
+        policy: weights file, where the one that the map names is elsewhere now.
+        progress: called with steps done and steps in all.
+
+    Raises:
+        PdtuiError: the session cannot be read or its policy cannot be had.
+    """
+    session = read_session(path)
+    order = order_of(session, str(path), policy)
+    loop = build_loop(order)
+    events: dict[int, list[Event]] = {}
+    for event in session.events:
+        events.setdefault(event.step, []).append(event)
+    environment = tuple(differences(session.versions, environment_versions()))
+    for step, digest in enumerate(order.digests):
+        record = loop.advance(events.get(step, ()))
+        if record.digest != digest:
+            change = abs(record.attributes - session.attributes[step])
+            worst = int(change.argmax())
+            attribute = session.info.attributes[worst]
+            detail = f"{attribute.name} is off by {change[worst]:.3g} {attribute.unit}"
+            return ReplayResult(step + 1, step, detail, environment)
+        if progress is not None:
+            progress(step + 1, session.steps)
+    return ReplayResult(session.steps, None, "", environment)

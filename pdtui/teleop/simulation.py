@@ -1,0 +1,192 @@
+"""The simulation's own process: keys come down the pipe, snapshots go up, the newest wins."""
+
+from __future__ import annotations
+
+import signal
+import time
+from multiprocessing.connection import Connection
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from pdtui.errors import PdtuiError
+from pdtui.sessions.events import Event
+from pdtui.sessions.recorder import SessionRecorder
+from pdtui.teleop.drive import build_loop
+from pdtui.teleop.keys import key_event
+from pdtui.teleop.loop import ControlLoop
+from pdtui.teleop.observer import Observer
+from pdtui.teleop.order import DriveOrder
+from pdtui.teleop.pacing import Pacer
+from pdtui.teleop.snapshot import Briefing
+
+_IDLE = 0.05
+PACED_ROWS_PER_WRITE = 3
+
+
+class Simulation:
+    """One drive, paced, at the far end of a pipe.
+
+    A snapshot is sent only when the screen has asked for one, so a screen that sleeps never blocks the drive.
+    """
+
+    def __init__(self, connection: Connection, order: DriveOrder) -> None:
+        self._connection, self._order = connection, order
+        self._loop: ControlLoop = build_loop(order)
+        self._observer = Observer(self._loop)
+        self._recorder: SessionRecorder | None = None
+        if order.recording:
+            path = Path(order.recording)
+            self._recorder = SessionRecorder(path, self._loop.info, rows_per_write=PACED_ROWS_PER_WRITE)
+        self._pacer = Pacer(self._loop.robot.control_dt, time.monotonic())
+        self._pressed: list[str] = []
+        self._wanted = False
+        self._closing = ""
+        self._finished = ""
+        self._script: dict[int, list[Event]] = {}
+        for event in order.script or ():
+            self._script.setdefault(event.step, []).append(event)
+
+    def brief(self) -> None:
+        """Tell the screen what there is to see."""
+        loop = self._loop
+        self._connection.send(
+            Briefing(
+                title=loop.robot.title,
+                policy=loop.policy.name,
+                seed=loop.seed,
+                dt=loop.robot.control_dt,
+                attributes=loop.robot.attributes,
+                links=loop.robot.links,
+                layers=loop.policy.layers,
+                recording=self._order.recording,
+            )
+        )
+
+    def run(self) -> None:
+        """Drive until the screen closes, a signal comes, or the simulation cannot go on."""
+        try:
+            while not self._closing:
+                self._serve()
+                if self._wanted:
+                    self._send_snapshot()
+        finally:
+            self._close_recording()
+
+    def stop(self, reason: str) -> None:
+        """End the drive after the present step; safe in a signal handler."""
+        self._closing = reason
+
+    def outcome(self) -> str:
+        """How the drive ended, in one line."""
+        line = f"{self._finished or self._closing}: {self._loop.step} steps"
+        return f"{line}, recorded in {self._order.recording}" if self._order.recording else line
+
+    def _serve(self) -> None:
+        """Wait for the next step or a request, whichever is first."""
+        wait = None if self._finished else self._pacer.wait(time.monotonic())
+        try:
+            while self._connection.poll(_IDLE if wait is None else wait):
+                self._handle(*self._connection.recv())
+                wait = 0.0
+        except (EOFError, OSError):
+            self._closing = self._closing or "the screen went away"
+        if self._closing or self._finished:
+            return
+        due = self._pacer.wait(time.monotonic())
+        if due is not None and due <= 0.0:
+            self._advance()
+
+    def _handle(self, kind: str, value: Any) -> None:
+        match kind:
+            case "press":
+                self._pressed.append(value)
+            case "pace":
+                self._pacer.request(value, time.monotonic())
+            case "frame":
+                self._wanted = True
+            case "close":
+                self._closing = "stopped"
+
+    def _advance(self) -> None:
+        record = self._loop.advance(self._events())
+        if self._recorder is not None:
+            self._recorder.write(record)
+        self._observer.see(record)
+        self._pacer.stepped(time.monotonic())
+        if record.diverged:
+            self._finished = record.ended
+            self._close_recording()
+        if self._order.script is not None:
+            self._compare(record.step, record.digest)
+
+    def _events(self) -> list[Event]:
+        if self._order.script is not None:
+            return self._script.get(self._loop.step, [])
+        events = []
+        for key in self._pressed:
+            event = key_event(key, self._loop)
+            if isinstance(event, Event):
+                events.append(event)
+            else:
+                self._observer.notice = event
+        self._pressed = []
+        return events
+
+    def _compare(self, step: int, digest: int) -> None:
+        if digest != self._order.digests[step]:
+            self._finished = f"step {step} differs from the session"
+        elif step + 1 == len(self._order.digests):
+            self._finished = f"identical, {step + 1} steps"
+
+    def _send_snapshot(self) -> None:
+        snapshot = self._observer.snapshot(
+            paused=self._pacer.paused,
+            speed=self._pacer.speed,
+            achieved=self._pacer.achieved,
+            recorded_bytes=0 if self._recorder is None else self._recorder.bytes,
+            finished=self._finished,
+        )
+        self._wanted = False
+        try:
+            self._connection.send(snapshot)
+        except OSError:
+            self._closing = "the screen went away"
+
+    def _close_recording(self) -> None:
+        if self._recorder is not None:
+            self._recorder.close(self._finished or self._closing or "an error ended the drive")
+
+
+def simulate(connection: Connection, order: DriveOrder) -> None:
+    """Entry of the process. What ends it early goes up the pipe as an exception or a line of text."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # ctrl+c is the screen's to handle
+    simulation: Simulation | None = None
+    early: list[str] = []
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        reason = f"ended by {signal.Signals(number).name}"
+        early.append(reason)
+        if simulation is not None:
+            simulation.stop(reason)
+
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, stop)
+    try:
+        simulation = Simulation(connection, order)
+        for reason in early:
+            simulation.stop(reason)
+        simulation.brief()
+        simulation.run()
+        _send_quietly(connection, simulation.outcome())
+    except PdtuiError as error:
+        _send_quietly(connection, error)
+    except OSError:
+        return  # the screen went away while robot and policy were loading
+
+
+def _send_quietly(connection: Connection, message: str | PdtuiError) -> None:
+    try:
+        connection.send(message)
+    except OSError:
+        return

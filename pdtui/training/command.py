@@ -1,0 +1,50 @@
+"""What `pdtui train` runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from pdtui.errors import TrainingError
+from pdtui.robots import check_robot
+
+
+def train_policy(
+    robot: str,
+    seed: int,
+    steps: int | None,
+    learning_rate: float | None,
+    forward: str,
+    folder: Path,
+    progress: Callable[..., None] | None,
+) -> Path:
+    """Train, or go on training, in a folder; returns the best weights.
+
+    Raises:
+        TrainingError: the extra ``train`` is not installed, or the folder holds something else.
+        RobotError: no such robot.
+    """
+    check_robot(robot)
+    try:
+        from pdtui.training.run import Trainer, TrainingReport
+        from pdtui.training.sac import SacConfig
+    except ImportError as error:
+        raise TrainingError(f"training needs the extra: pip install 'pdtui[train]' ({error})") from error
+    config = SacConfig()
+    if steps is not None:
+        config = replace(config, total_steps=steps)
+    if learning_rate is not None:
+        config = replace(config, learning_rate=learning_rate)
+    command = (
+        f"pdtui train {robot} --seed {seed} --steps {config.total_steps} "
+        f"--learning-rate {config.learning_rate:g} --forward {forward}"
+    )
+
+    def report(state: TrainingReport) -> None:
+        if progress is not None:
+            best = state.best
+            note = f"best return {best.mean_return:.0f}, {best.mean_speed:.2f} m/s" if best else ""
+            progress(state.steps, state.total_steps, note)
+
+    return Trainer(robot, seed, folder, config, command, forward=forward).run(report)
