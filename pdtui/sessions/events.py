@@ -15,8 +15,8 @@ class Event:
     Attributes:
         step: it applies before this control step; the first is 0.
         kind: ``behavior`` latches `name`; ``default`` clears everything; ``target`` moves the target of
-            `name` to `value`; ``factor`` scales the magnitudes of `name` to `value` times the map's; ``reset``
-            starts the next episode; ``rewind`` restores the state before step `value`.
+            `name` to `value`; ``factor`` scales the magnitudes of `name` to `value` times the map's;
+            ``reset`` starts the next episode; ``rewind`` restores the state before step `value`.
         name: of the behavior.
         value: target, factor or step.
         key: what the operator pressed, empty if no key did it.

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from pdtui.policies.units import Stimulation
 from pdtui.robots.base import Attribute, Floats, Link
-from pdtui.stimulation.latch import ActiveBehavior
 from pdtui.sessions.events import Event
+from pdtui.stimulation.latch import ActiveBehavior
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,94 @@
+"""NumPy blocks as Arrow columns for `send_columns`, without a copy and without converters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+from numpy.typing import NDArray
+
+from pdtui.sessions.schema import STEP, TIME
+
+
+@dataclass(frozen=True)
+class Column:
+    """A component column whose Arrow array is ready."""
+
+    descriptor: rr.ComponentDescriptor
+    array: Any
+
+    def component_descriptor(self) -> rr.ComponentDescriptor:
+        return self.descriptor
+
+    def as_arrow_array(self) -> Any:
+        return self.array
+
+
+@dataclass(frozen=True)
+class Index:
+    """A time column whose Arrow array is ready."""
+
+    name: str
+    array: Any
+
+    def timeline_name(self) -> str:
+        return self.name
+
+    def as_arrow_array(self) -> Any:
+        return self.array
+
+
+def indexes(steps: Sequence[int], dt: float) -> list[Index]:
+    """Both timelines: the control step, and the simulated time at which it starts."""
+    numbers = np.array(steps, dtype=np.int64)
+    nanoseconds = np.rint(numbers * (dt * 1e9)).astype("timedelta64[ns]")
+    return [Index(STEP, pa.array(numbers)), Index(TIME, pa.array(nanoseconds))]
+
+
+def rows(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> Column:
+    """A block (n, width) as n lists; a block (n,) as n lists of one number."""
+    return _listed(descriptor, pa.array(block.reshape(-1)), _regular(len(block), block.size // len(block)))
+
+
+def nested(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> Column:
+    """A block (n, width) as n lists of one list each: only so can the viewer select one of its numbers."""
+    inner = _regular(len(block), block.shape[1])
+    values = pa.ListArray.from_arrays(pa.array(inner), pa.array(block.reshape(-1)))
+    return _listed(descriptor, values, _regular(len(block), 1))
+
+
+def vectors(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> Column:
+    """A block (n, m, k) as n lists of m vectors of length k."""
+    count, width, length = block.shape
+    item = pa.field("item", pa.from_numpy_dtype(block.dtype), nullable=False)
+    values = pa.FixedSizeListArray.from_arrays(pa.array(block.reshape(-1)), type=pa.list_(item, length))
+    return _listed(descriptor, values, _regular(count, width))
+
+
+def ragged(
+    descriptor: rr.ComponentDescriptor | str, lists: Sequence[Sequence[Any]], kind: pa.DataType
+) -> Column:
+    """One list of its own length a row."""
+    flat = [value for row in lists for value in row]
+    offsets = np.zeros(len(lists) + 1, dtype=np.int32)
+    np.cumsum([len(row) for row in lists], out=offsets[1:])
+    return _listed(descriptor, pa.array(flat, kind), offsets)
+
+
+def texts(descriptor: rr.ComponentDescriptor | str, values: Iterable[str]) -> Column:
+    """One text a row."""
+    return ragged(descriptor, [(value,) for value in values], pa.utf8())
+
+
+def _regular(count: int, width: int) -> NDArray[np.int32]:
+    return np.arange(count + 1, dtype=np.int32) * np.int32(width)
+
+
+def _listed(descriptor: rr.ComponentDescriptor | str, values: Any, offsets: NDArray[np.int32]) -> Column:
+    if isinstance(descriptor, str):
+        descriptor = rr.ComponentDescriptor(descriptor)
+    return Column(descriptor, pa.ListArray.from_arrays(pa.array(offsets), values))

@@ -1,0 +1,92 @@
+"""Control steps and events as columns: all that a reader needs, in few entities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+
+from pdtui.sessions.columns import Column, nested, ragged, rows, texts
+from pdtui.sessions.events import Event
+from pdtui.sessions.record import StepRecord
+from pdtui.sessions.schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION
+from pdtui.stimulation.latch import ActiveBehavior
+
+
+def drive_columns(records: Sequence[StepRecord]) -> list[Column]:
+    """One row a control step: everything of a `StepRecord` but its events and poses.
+
+    What no step of the batch has (behaviors, stimulation) gets no column.
+    """
+    gains = np.array([(record.reward, record.cost, *record.action) for record in records], np.float64)
+    counters = np.array([(record.digest, record.episode) for record in records], np.int64)
+    columns = [
+        nested("activations", np.stack([record.activations for record in records])),
+        nested("attributes", np.stack([record.attributes for record in records])),
+        nested(REWARD_COST_ACTION, gains),
+        rows(DIGEST_EPISODE, counters),
+    ]
+    if any(record.stimulation.units for record in records):
+        columns.append(ragged("stimulation", [_overwrites(record) for record in records], pa.float64()))
+    if any(record.behaviors for record in records):
+        names = [[behavior.name for behavior in record.behaviors] for record in records]
+        states = [
+            [value for behavior in record.behaviors for value in _state(behavior)] for record in records
+        ]
+        columns += [ragged("behaviors", names, pa.utf8()), ragged("active", states, pa.float64())]
+    return columns
+
+
+def event_columns(events: Sequence[Event], first: int) -> list[Column]:
+    """One row an event.
+
+    Args:
+        events: in the order in which they were applied.
+        first: number of the first of them in the session.
+    """
+    numbers = np.arange(first, first + len(events), dtype=np.int64)
+    return [
+        texts(rr.TextLog.descriptor_text(), [describe_event(event) for event in events]),
+        texts(rr.TextLog.descriptor_level(), ["INFO"] * len(events)),
+        rows("number", numbers),
+        texts("kind", [event.kind for event in events]),
+        texts("name", [event.name for event in events]),
+        rows("value", np.array([event.value for event in events], np.float64)),
+        texts("key", [event.key for event in events]),
+    ]
+
+
+def ending_columns(records: Sequence[StepRecord]) -> list[Column]:
+    """One row an episode that ended by itself."""
+    levels = ["ERROR" if record.diverged else "WARN" for record in records]
+    return [
+        texts(rr.TextLog.descriptor_text(), [record.ended for record in records]),
+        texts(rr.TextLog.descriptor_level(), levels),
+    ]
+
+
+def describe_event(event: Event) -> str:
+    """The event in words, as the viewer's log shows it."""
+    said = {
+        "behavior": f"behavior '{event.name}'",
+        "default": "nothing is overwritten any more",
+        "target": f"target of '{event.name}' is {event.value:g}",
+        "factor": f"magnitudes of '{event.name}' times {event.value:g}",
+        "reset": "next episode",
+        "rewind": f"rewinds to step {event.value:.0f}",
+    }[event.kind]
+    return f"[{event.key}] {said}" if event.key else said
+
+
+def _overwrites(record: StepRecord) -> list[float]:
+    stimulation = record.stimulation
+    triples = zip(stimulation.units, stimulation.values, record.natural, strict=True)
+    return [value for triple in triples for value in triple]
+
+
+def _state(behavior: ActiveBehavior) -> list[float]:
+    values = [getattr(behavior, field) for field in ACTIVE_FIELDS]
+    return [math.nan if value is None else float(value) for value in values]
