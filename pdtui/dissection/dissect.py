@@ -43,10 +43,10 @@ class Effort:
     screen_values: tuple[float, ...] = (-4.0, -2.0, 2.0, 4.0)
     screen_starts: int = 2
     screen_steps: int = 60
-    refine_keep: int = 3
-    refine_values: tuple[float, ...] = (-8.0, -4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0, 8.0)
+    refine_keep: int = 2
+    refine_values: tuple[float, ...] = (-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0)
     refine_starts: int = 6
-    refine_steps: int = 100
+    refine_steps: int = 80
     search_starts: int = 10
     selection_starts: int = 12
     held_out_starts: int = 16

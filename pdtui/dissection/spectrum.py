@@ -46,13 +46,14 @@ class Preset:
     @property
     def weights(self) -> Floats:
         """The window divided by its sum, shape (length,)."""
-        angle = 2 * np.pi * np.arange(self.length, dtype=np.float64) / self.length
+        angle = 2 * np.pi * np.arange(self.length) / self.length
+        window: Floats
         if self.window == "blackman":
             window = 0.42 - 0.5 * np.cos(angle) + 0.08 * np.cos(2 * angle)
         else:
             window = 0.5 - 0.5 * np.cos(angle)
-        weights: Floats = np.asarray(window / window.sum(), np.float64)
-        return weights
+        window /= window.sum()
+        return window
 
     @property
     def bins(self) -> int:
@@ -61,7 +62,7 @@ class Preset:
 
     def frequencies(self, dt: float) -> Floats:
         """Frequency of each bin in Hz, shape (F,), for samples `dt` seconds apart."""
-        frequencies: Floats = np.fft.rfftfreq(self.length, dt)
+        frequencies: Floats = np.asarray(np.fft.rfftfreq(self.length, dt), np.float64)
         return frequencies
 
 

@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import json
+import tomllib
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from pdtui.dissection.combine import Found, Sizes
+from pdtui.dissection.confirm import rank_correlation
+from pdtui.dissection.dissect import Dissection, Effort, dissect
+from pdtui.dissection.goals import GOALS, gains, score
+from pdtui.dissection.hold import Held, HoldSizes
+from pdtui.dissection.probe import Effects
+from pdtui.dissection.propose import propose
+from pdtui.dissection.report import render
+from pdtui.dissection.summary import summarise
+from pdtui.policies.files import file_hash
+from pdtui.policies.units import Stimulation
+from pdtui.stimulation.maps import Measured, Pid
+
+SMALL = Effort(
+    steps=130,
+    screen_values=(-3.0, 3.0),
+    screen_starts=2,
+    screen_steps=16,
+    refine_keep=1,
+    refine_values=(-3.0, 0.0, 3.0),
+    refine_starts=2,
+    refine_steps=16,
+    search_starts=2,
+    selection_starts=2,
+    held_out_starts=2,
+    walk=20,
+    search=Sizes(
+        atoms=4, elite=3, children=3, promoted=2, generations=1, quick_starts=1, quick_steps=12,
+        full_steps=16, finalists=2, final_steps=18,
+    ),
+    hold=HoldSizes(units=1, finalists=2, steps=12, final_steps=18),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def dissection(policy_file: Path) -> Dissection:
+    return dissect("ant", policy_file, episodes=2, workers=2, effort=SMALL)
+
+
+def test_every_unit_is_screened_and_every_goal_has_a_candidate(dissection: Dissection) -> None:
+    assert dissection.screen.units == tuple(range(16))
+    assert [found.goal.name for found in dissection.behaviors] == [goal.name for goal in GOALS]
+    assert all(1 <= len(found.stimulation.units) <= 3 for found in dissection.behaviors)
+    assert {held.pid.attribute for held in dissection.holds} == {"yaw", "speed"}
+
+
+def test_the_result_does_not_depend_on_the_workers(dissection: Dissection, policy_file: Path) -> None:
+    again = dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL)
+    np.testing.assert_array_equal(again.screen.effects, dissection.screen.effects)
+    assert again.behaviors == dissection.behaviors
+    assert again.holds == dissection.holds
+    assert propose(again) == propose(dissection)
+
+
+def test_summary_is_json_and_names_what_was_asked(dissection: Dissection, policy_file: Path) -> None:
+    summary = json.loads(json.dumps(summarise(dissection), allow_nan=False))
+    assert summary["sha256"] == file_hash(policy_file)
+    vx = summary["attributes"][0]
+    assert vx["name"] == "vx"
+    best = dissection.matching.discrepancy[0].min()
+    assert vx["matches"][0]["discrepancy"] == pytest.approx(best)
+
+
+def test_report_shows_every_attribute_and_behavior(dissection: Dissection) -> None:
+    screen = StringIO()
+    Console(file=screen, width=220).print(render(dissection))
+    for name in (
+        "yaw rate",
+        "front left hip torque",
+        "spin left",
+        "Unwrapped before the transform: yaw, roll",
+    ):
+        assert name in screen.getvalue()
+
+
+def test_a_small_trembling_ant_gets_no_behavior_and_the_map_says_so(dissection: Dissection) -> None:
+    text = propose(dissection)
+    parsed = tomllib.loads(text)
+    reached = [found.goal.name for found in dissection.behaviors if found.reached]
+    held = ["hold heading" for held in dissection.holds if held.holds]
+    assert len(parsed.get("behaviors", [])) == len(reached) + len(held)
+    for found in dissection.behaviors:
+        assert (f"# Not found: {found.goal.name}." in text) == (found.goal.name not in reached)
+
+
+def test_what_was_found_is_in_the_map(dissection: Dissection) -> None:
+    sure = Measured(1.2, 1.0, 1.4)
+    up = Found(GOALS[1], Stimulation((3, 9), (-2.5, 4.0)), 1.5, 1.6, sure, 1.0, 0.0, 1.2, 0.0, 10)
+    held = Held(
+        Stimulation((9,), (-1.0,)), Pid("yaw", 6.0, 0.0, 0.0, 4.0, 0.2), 0.1, 0.6, 0.0, (-0.4, 0.4), True
+    )
+    parsed = tomllib.loads(propose(replace(dissection, behaviors=(up,), holds=(held,))))
+    assert parsed["schema"] == 1
+    assert parsed["policy"]["sha256"] == dissection.policy_hash
+    first, second = parsed["behaviors"]
+    assert (first["name"], first["key"]) == ("up", "w")
+    assert first["aim"] == {"attribute": "vy", "direction": "increase"}
+    units = {entry["name"]: (entry["unit"], entry["rho"]) for entry in parsed.get("primitives", [])}
+    outputs = {}
+    for name, magnitude in first["magnitudes"].items():
+        unit, rho = units.get(name, (name, 1.0))
+        outputs[unit] = magnitude * rho
+    assert outputs == {"0:3": pytest.approx(-2.5), "1:1": pytest.approx(4.0)}
+    assert second["mode"] == "pid"
+    assert second["magnitudes"] == {"1:1": -1.0}
+    assert second["pid"] == {"attribute": "yaw", "kp": 6.0, "ki": 0.0, "kd": 0.0, "limit": 4.0, "step": 0.2}
+
+
+def test_a_primitive_carries_what_was_measured(dissection: Dissection) -> None:
+    for entry in tomllib.loads(propose(dissection)).get("primitives", []):
+        assert entry["measured"]["low"] * entry["measured"]["high"] > 0
+        assert entry["value"] in SMALL.screen_values
+
+
+def test_a_budget_that_is_over_still_screens(policy_file: Path) -> None:
+    quick = dissect("ant", policy_file, episodes=1, workers=1, effort=SMALL, budget_minutes=0.0)
+    assert len(quick.screen.units) == 16
+    assert len(quick.behaviors) == len(GOALS)
+    assert quick.holds == ()
+
+
+def effects(means: list[list[float]], falls: list[list[bool]], unperturbed: list[float]) -> Effects:
+    stimulated, without = np.array(means)[..., None], np.array(unperturbed)[:, None]
+    return Effects(
+        stimulated - without, stimulated, without, np.array(falls), np.full(stimulated.shape, np.nan)
+    )
+
+
+def test_a_stop_gains_the_share_of_the_speed_that_is_gone() -> None:
+    stop = GOALS[0]
+    result = effects([[0.0, 1.0, 3.0]], [[False, False, False]], [4.0, 2.0, 2.0])
+    np.testing.assert_allclose(gains(stop, 0, result), [[1.0, 0.5, -0.5]])
+
+
+def test_scores_want_every_start_and_no_falls() -> None:
+    up, down = GOALS[1], GOALS[2]
+    never = [[False] * 5] * 2
+    result = effects([[0.7] * 5, [2.0, 2.0, 2.0, 0.0, 0.0]], never, [0.0] * 5)
+    np.testing.assert_allclose(score(up, 0, result, [1, 1]), [1.0, 0.0])
+    np.testing.assert_allclose(score(up, 0, result, [3, 3]), [0.98, -0.02])
+    assert score(down, 0, result, [1, 1])[0] == pytest.approx(-1.0)
+    fell = effects([[1.4] * 5], [[True, False, False, False, False]], [0.0] * 5)
+    np.testing.assert_allclose(gains(up, 0, fell), [[0.0, 1.4, 1.4, 1.4, 1.4]])
+
+
+def test_rank_correlation() -> None:
+    a = np.array([1.0, 2.0, 3.0, 4.0])
+    assert rank_correlation(a, np.exp(a)) == pytest.approx(1.0)
+    assert rank_correlation(a, -a) == pytest.approx(-1.0)
+    # By hand, ranks 1 2 3 4 and 1.5 1.5 4 3: covariance 3.5, variances 5 and 4.5.
+    assert rank_correlation(a, np.array([0.0, 0.0, 9.0, 5.0])) == pytest.approx(3.5 / np.sqrt(5 * 4.5))
+    assert np.isnan(rank_correlation(a, np.zeros(4)))
