@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import multiprocessing
+import multiprocessing.connection
+import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -29,7 +32,16 @@ def _start_worker(robot: str, policy: str) -> None:
     global _worker  # noqa: PLW0603  (a process's own robot is its global state)
     # Ctrl-C reaches the whole process group; only the parent answers it, or every worker prints a traceback.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _worker = (make_robot(robot), load_policy(policy, robot))
+
+
+def _end_with_parent() -> None:
+    """A parent that is killed, or whose terminal closes, tells nobody: without this its workers stay."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        multiprocessing.connection.wait([parent.sentinel])
+        os._exit(1)
 
 
 def _run_chunk(jobs: Sequence[Job], starts: dict[int, Start], steps: int, measure_from: int) -> list[Outcome]:
