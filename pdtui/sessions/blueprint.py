@@ -10,6 +10,7 @@ import rerun.blueprint as rrb
 from rerun.blueprint.encodings import ComponentSourceKind, TextLogColumnKind, VisualizerComponentMapping
 
 from pdtui.robots.base import Attribute
+from pdtui.sessions.curves import PALETTE
 from pdtui.sessions.record import DriveInfo
 from pdtui.sessions.schema import (
     BEHAVIORS,
@@ -25,7 +26,6 @@ from pdtui.sessions.schema import (
     TIME,
     UNITS,
 )
-from pdtui.sessions.views import PALETTE
 
 
 def layout(info: DriveInfo) -> rrb.Blueprint:

@@ -43,7 +43,7 @@ class SessionRecorder:
         SessionError: the file cannot be written.
     """
 
-    def __init__(self, path: Path, info: DriveInfo, *, rows_per_write: int = 64) -> None:
+    def __init__(self, path: Path, info: DriveInfo, *, rows_per_write: int = 128) -> None:
         self.path, self.info = Path(path), info
         self._rows_per_write = max(1, rows_per_write)
         self._rows: list[StepRecord] = []
@@ -84,7 +84,7 @@ class SessionRecorder:
         self._send(DRIVE, [record.step for record in records], drive_columns(records))
         self._views.add(records)
         self._views.write_changes()
-        if self._views.pending >= _VIEW_ROWS:
+        if self._views.pending >= max(_VIEW_ROWS, 2 * self._rows_per_write):
             self._views.write()
         self._send_off()
 
