@@ -69,7 +69,8 @@ def bench_loop(
         if progress is not None:
             progress(done + 1, rounds)
     share = float(np.median(np.array(rates["recorded"]) / np.array(rates["bare"])))
-    return LoopBench(*(float(np.median(rates[name])) for name in parts), share, _forward(loop))
+    medians = {name: float(np.median(values)) for name, values in rates.items()}
+    return LoopBench(**medians, recorded_share=share, forward_us=_forward(loop))
 
 
 def _actions(loop: ControlLoop, seed: int, steps: int) -> list[np.ndarray]:

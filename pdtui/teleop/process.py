@@ -40,6 +40,11 @@ class ProcessLink:
         self._asked = False
         self._recording = order.recording
 
+    @property
+    def pid(self) -> int:
+        """Of the simulation's process."""
+        return self._process.pid or 0
+
     def poll(self) -> Briefing | Snapshot | None:
         """The newest message that has arrived, or None; see `DriveLink.poll`."""
         message = self._receive()

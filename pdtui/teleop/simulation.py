@@ -106,7 +106,7 @@ class Simulation:
             case "frame":
                 self._wanted = True
             case "close":
-                self._closing = "stopped"
+                self._closing = self._closing or "stopped"
 
     def _advance(self) -> None:
         record = self._loop.advance(self._events())

@@ -1,0 +1,89 @@
+"""What `pdtui dissect` runs: dissect, then write the map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from pdtui.dissection.dissect import Dissection, dissect
+from pdtui.dissection.propose import propose
+from pdtui.dissection.report import render
+from pdtui.dissection.summary import summarise
+from pdtui.errors import MapError
+from pdtui.stimulation.mapfile import parse_map
+
+
+@dataclass(frozen=True)
+class Dissected:
+    """A dissection and the map that was written from it."""
+
+    dissection: Dissection
+    output: Path
+    behaviors: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The form that ``--json`` prints."""
+        return {**summarise(self.dissection), "map": str(self.output)}
+
+    def table(self) -> RenderableType:
+        """What the command prints."""
+        names = ", ".join(self.behaviors) or "no behavior: none reached what was asked of it"
+        return Group(render(self.dissection), Text(f"wrote {self.output}: {names}"))
+
+
+def dissect_to_map(
+    robot: str,
+    policy: str,
+    output: Path,
+    *,
+    preset: str,
+    episodes: int,
+    seed: int,
+    workers: int,
+    budget_minutes: float | None = None,
+    progress: Callable[..., None] | None = None,
+) -> Dissected:
+    """Dissect a policy and write the map that its measurements propose.
+
+    Raises:
+        MapError: the map cannot be written; seen before the work starts.
+        PdtuiError: as `dissect`.
+    """
+    _check_writable(output)
+
+    def advance(stage: str, done: int, total: int) -> None:
+        if progress is not None:
+            progress(done, total, stage)
+
+    dissection = dissect(
+        robot,
+        policy,
+        preset=preset,
+        episodes=episodes,
+        seed=seed,
+        workers=workers,
+        budget_minutes=budget_minutes,
+        progress=advance,
+    )
+    text = propose(dissection)
+    stimulation_map = parse_map(text, str(output))
+    partial = output.with_name(output.name + ".part")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(output)
+    return Dissected(dissection, output, tuple(stimulation_map.behaviors))
+
+
+def _check_writable(output: Path) -> None:
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        with output.open("a"):
+            pass
+        if output.stat().st_size == 0:
+            output.unlink()
+    except OSError as error:
+        raise MapError(f"{output}: cannot be written: {error.strerror}") from error
