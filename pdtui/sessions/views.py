@@ -108,7 +108,9 @@ class Views:
             self._log_static(HEAT_MAP, rr.Tensor(picture, dim_names=("unit", "time")))
 
     def _write_robot(self, steps: Sequence[int], poses: Floats, states: Sequence[str]) -> None:
-        self._send(ROBOT, steps, self._shapes.columns(poses))
+        shapes = self._shapes.columns(poses)
+        if shapes:
+            self._send(ROBOT, steps, shapes)
         positions = np.zeros((len(steps), 1, 3), np.float32)
         positions[:, 0, :2] = poses[:, 0, :2]
         # A picture's y axis points down, and only in a picture does the viewer fit the path to the frame.
