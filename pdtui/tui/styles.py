@@ -1,0 +1,81 @@
+"""The style sheets: where the parts of the screens are, by size of the terminal."""
+
+from __future__ import annotations
+
+# From this many columns, or lines, on, the screen has the class.
+WIDTHS = [(0, "-narrow"), (120, "-wide")]
+HEIGHTS = [(0, "-low"), (36, "-tall")]
+
+DRIVE = """
+Screen { background: $background; overflow: hidden; }
+
+Panel { width: 1fr; height: 1fr; color: $foreground; }
+#status, #notice, #keys { height: 1; }
+#status, #keys { background: $surface; }
+
+#body { layout: horizontal; height: 1fr; }
+#left, #right { layout: vertical; height: 1fr; width: 1fr; }
+#right { width: 46; }
+#below { layout: horizontal; height: 7; }
+
+#robot, #path, #units, #behaviors, #attributes, #heat {
+    border: round $foreground 22%;
+    border-title-color: $primary;
+    border-title-style: bold;
+    border-subtitle-color: $foreground 45%;
+    padding: 0;
+}
+#behaviors, #attributes, #units { padding: 0 1; }
+#attributes { height: 8; }
+#units { display: none; }
+#heat { height: 3; border-bottom: none; border-left: none; border-right: none; padding: 0; }
+
+#too-small { display: none; width: 1fr; height: 1fr; }
+.-too-small #too-small { display: block; }
+.-too-small #status, .-too-small #body, .-too-small #heat { display: none; }
+.-too-small #notice, .-too-small #keys { display: none; }
+
+.-wide #right { width: 74; }
+.-wide #units { display: block; width: 42; }
+.-tall #below { height: 2fr; }
+.-tall #robot { height: 3fr; }
+.-tall #attributes { height: 18; }
+.-tall #heat { height: 6; }
+
+HelpScreen { align: center middle; background: $background 60%; }
+#help {
+    width: 76;
+    max-width: 100%;
+    height: auto;
+    max-height: 100%;
+    border: round $primary;
+    border-title-color: $primary;
+    border-title-style: bold;
+    border-subtitle-color: $foreground 60%;
+    background: $surface;
+    padding: 0 2;
+    scrollbar-size-vertical: 1;
+}
+"""
+
+PICKER = """
+Screen { align: center middle; background: $background; }
+#picker {
+    width: 92;
+    max-width: 100%;
+    height: auto;
+    max-height: 100%;
+    border: round $primary;
+    border-title-color: $primary;
+    border-title-style: bold;
+    border-subtitle-color: $foreground 60%;
+    background: $surface;
+    padding: 0 1;
+}
+#filter { border: none; border-bottom: solid $foreground 22%; height: 2; padding: 0 1; background: $surface; }
+#rows { border: none; height: auto; max-height: 1fr; background: $surface; padding: 0; }
+#rows > .option-list--option { padding: 0 1; }
+#rows > .option-list--option-highlighted { background: $primary 28%; text-style: none; }
+#rows > .option-list--option-disabled { text-opacity: 100%; }
+#none { height: auto; color: $foreground 60%; padding: 0 1; }
+"""

@@ -1,0 +1,117 @@
+"""Text on the screen: foreign text made harmless, numbers and keys made short."""
+
+from __future__ import annotations
+
+import unicodedata
+
+from rich.cells import cell_len, set_cell_size
+from rich.segment import Segment
+from rich.style import Style
+from textual.strip import Strip
+
+_KEYS = {
+    "up": "↑",
+    "down": "↓",
+    "left": "←",
+    "right": "→",
+    "plus": "+",
+    "minus": "-",
+    "comma": ",",
+    "full_stop": ".",
+    "question_mark": "?",
+    "backspace": "⌫",
+    "space": "space",
+    "enter": "↵",
+}
+
+
+def plain(text: str) -> str:
+    """Text from a file without anything that a terminal would obey: control and formatting characters."""
+    return "".join(
+        " " if character in "\t\n" else "\N{REPLACEMENT CHARACTER}" if _obeyed(character) else character
+        for character in text
+    )
+
+
+def _obeyed(character: str) -> bool:
+    return unicodedata.category(character) in ("Cc", "Cf", "Cs", "Co", "Zl", "Zp")
+
+
+def fit(text: str, width: int) -> str:
+    """Exactly `width` cells: padded on the right, or cut with an ellipsis."""
+    if width <= 0:
+        return ""
+    if cell_len(text) <= width:
+        return text + " " * (width - cell_len(text))
+    return set_cell_size(set_cell_size(text, width - 1).rstrip() + "…", width)
+
+
+def wrap_text(text: str, width: int, lines: int) -> list[str]:
+    """Break a sentence at its spaces into at most `lines` lines; the last is cut with an ellipsis."""
+    rows = [""]
+    for word in text.split():
+        longer = f"{rows[-1]} {word}" if rows[-1] else word
+        if cell_len(longer) <= width or not rows[-1] or len(rows) == lines:
+            rows[-1] = longer
+        else:
+            rows.append(word)
+    return [fit(row, width).rstrip() for row in rows]
+
+
+def number(value: float) -> str:
+    """A number in at most 7 characters with a true minus sign."""
+    size = abs(value)
+    digits = 2 if size < 100 else 1 if size < 1000 else 0
+    shown = f"{value:.{digits}f}" if size < 99999.5 else f"{value:.0e}".replace("e+0", "e")
+    if float(shown) == 0.0:
+        shown = shown.lstrip("-")
+    return shown.replace("-", "−")
+
+
+def signed(value: float) -> str:
+    """`number` with its sign always shown."""
+    shown = number(value)
+    return shown if shown.startswith("−") else f"+{shown}"
+
+
+def size_of(count: int) -> str:
+    """A file's size in words."""
+    if count < 1000:
+        return f"{count} B"
+    for unit in ("kB", "MB", "GB"):
+        if count < 999_950 or unit == "GB":
+            return f"{count / 1000:.1f} {unit}"
+        count //= 1000
+    raise AssertionError("the largest unit takes any size")
+
+
+def key_name(key: str) -> str:
+    """How a key is written on the screen."""
+    return plain(_KEYS.get(key, key))
+
+
+class Row:
+    """One line of the screen, put together from the left."""
+
+    def __init__(self, width: int) -> None:
+        self.width, self.left = width, width
+        self._segments: list[Segment] = []
+
+    def add(self, text: str, style: Style, width: int | None = None, *, right: bool = False) -> Row:
+        """Append text, fitted to `width` cells if given; what does not fit on the line is cut."""
+        if width is not None:
+            text = " " * (width - cell_len(text)) + text if right else text
+            text = fit(text, width)
+        if cell_len(text) > self.left:
+            text = fit(text, self.left)
+        if text:
+            self._segments.append(Segment(text, style))
+            self.left -= cell_len(text)
+        return self
+
+    def strip(self) -> Strip:
+        """The line, blank to its end."""
+        if self.left:
+            self._segments.append(Segment(" " * self.left))
+            self.left = 0
+        return Strip(self._segments, self.width)

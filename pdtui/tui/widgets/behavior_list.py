@@ -1,0 +1,145 @@
+"""Behaviors: their keys, what they do, which are latched and for how long."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.cells import cell_len
+from rich.style import Style
+from textual.strip import Strip
+
+from pdtui.tui.panel import Panel
+from pdtui.tui.text import Row, key_name, number, plain, signed, wrap_text
+
+if TYPE_CHECKING:
+    from pdtui.stimulation.latch import ActiveBehavior
+    from pdtui.stimulation.maps import Behavior
+
+_BAR = 10
+_BLOCKS = " ▏▎▍▌▋▊▉"
+
+
+class BehaviorList(Panel):
+    """Two lines a behavior where there is room, else one; latched ones are always in sight."""
+
+    def on_mount(self) -> None:
+        """Name the panel."""
+        self.border_title = "behaviors"
+
+    def paint(self, width: int, height: int) -> list[Strip]:
+        active = {view.name: view for view in self.snapshot.active} if self.snapshot is not None else {}
+        names = [plain(behavior.name) for behavior in self.map.behaviors.values()]
+        keys = [key_name(behavior.key) for behavior in self.map.behaviors.values()]
+        key_width = max((cell_len(key) for key in keys), default=0) + 2
+        name_width = min(max((cell_len(name) for name in names), default=0), max(8, width // 3))
+        self._columns = (key_width, name_width)
+        entries = [
+            self._entry(row, behavior, active.get(behavior.name), width, roomy=True)
+            for row, behavior in enumerate(self.map.behaviors.values())
+        ]
+        if sum(map(len, entries)) + 2 > height:
+            entries = [
+                self._entry(row, behavior, active.get(behavior.name), width, roomy=False)
+                for row, behavior in enumerate(self.map.behaviors.values())
+            ]
+            gap: list[Strip] = []
+        else:
+            gap = [Strip.blank(width)]
+        latched = [behavior.name in active for behavior in self.map.behaviors.values()]
+        shown = self._crop(entries, latched, width, height - 1 - len(gap))
+        default = Row(width)
+        self._add_cap(default, self.map.default_key, self.palette.key)
+        default.add("  clears all stimulation", self.palette.good if active else self.palette.muted)
+        return [*shown, *gap, default.strip()]
+
+    def _entry(
+        self, row: int, behavior: Behavior, active: ActiveBehavior | None, width: int, *, roomy: bool
+    ) -> list[Strip]:
+        palette = self.palette
+        name_width = self._columns[1]
+        color = palette.behavior(row)
+        says = plain(behavior.says)
+        line = Row(width)
+        if active is None:
+            self._add_cap(line, behavior.key, palette.key)
+            line.add("  " + plain(behavior.name), color, name_width + 2).add("  ", palette.text)
+            line.add(self._kind(behavior) if roomy else says, palette.muted)
+            lines = [line.strip()]
+        else:
+            self._add_cap(line, behavior.key, palette.caps[row % len(palette.caps)])
+            line.add(" ▌", color)
+            line.add(plain(behavior.name), color + Style(bold=True), name_width).add("  ", palette.text)
+            self._add_state(line, behavior, active, color)
+            lines = [line.strip()]
+            if active.target is not None:
+                lines.append(self._control(behavior, active, width))
+        if roomy:
+            indent = " " * (self._columns[0] + 2)
+            sentence = wrap_text(says, width - len(indent), 1)[0]
+            style = palette.muted if active is None else palette.text
+            lines.insert(1, Row(width).add(indent + sentence, style).strip())
+        return lines
+
+    def _add_cap(self, line: Row, key: str, style: Style) -> None:
+        """The key as a cap, padded to the widest of all."""
+        cap = f" {key_name(key)} "
+        line.add(cap, style).add(" " * (self._columns[0] - cell_len(cap)), self.palette.text)
+
+    def _kind(self, behavior: Behavior) -> str:
+        if behavior.pid is not None:
+            return f"holds {plain(behavior.pid.attribute)}"
+        return "" if behavior.period is None else f"for {number(behavior.period)} s"
+
+    def _add_state(self, line: Row, behavior: Behavior, active: ActiveBehavior, color: Style) -> None:
+        """How long it still lasts: a draining bar, or the word latched."""
+        dt = None if self.briefing is None else self.briefing.dt
+        if active.remaining is None or dt is None or behavior.period is None:
+            line.add("latched", color)
+        else:
+            steps = max(1, round(behavior.period / dt))
+            line.add(_bar(active.remaining / steps, _BAR), color + Style(bgcolor=self.palette.key.bgcolor))
+            line.add(f" {active.remaining * dt:.1f} s", color)
+        if abs(active.factor - 1.0) > 1e-9:
+            line.add(f"  × {number(active.factor)}", self.palette.accent)
+
+    def _control(self, behavior: Behavior, active: ActiveBehavior, width: int) -> Strip:
+        """Target, value, error and c of a controller."""
+        palette = self.palette
+        unit = self._unit_of(behavior)
+        row = Row(width).add(" " * (self._columns[0] + 2), palette.text)
+        parts = (
+            ("", f"{number(active.value or 0.0)} → {number(active.target or 0.0)} {unit}"),
+            (" e ", signed(active.error or 0.0)),
+            (" c ", signed(active.magnitude or 0.0)),
+        )
+        for label, value in parts:
+            row.add(label, palette.muted).add(value, palette.text)
+        return row.strip()
+
+    def _unit_of(self, behavior: Behavior) -> str:
+        if self.briefing is None or behavior.pid is None:
+            return ""
+        named = {attribute.name: attribute.unit for attribute in self.briefing.attributes}
+        return plain(named.get(behavior.pid.attribute, ""))
+
+    def _crop(self, entries: list[list[Strip]], latched: list[bool], width: int, height: int) -> list[Strip]:
+        """As many entries as fit: latched ones first, in the order of the map."""
+        if sum(map(len, entries)) <= height:
+            return [strip for entry in entries for strip in entry]
+        room = height - 1
+        chosen = []
+        for index in sorted(range(len(entries)), key=lambda index: (not latched[index], index)):
+            if len(entries[index]) <= room:
+                room -= len(entries[index])
+                chosen.append(index)
+        strips = [strip for index in sorted(chosen) for strip in entries[index]]
+        hidden = len(entries) - len(chosen)
+        more = Row(width).add(f"+{hidden} more: ? lists all", self.palette.muted)
+        return [*strips, more.strip()]
+
+
+def _bar(share: float, cells: int) -> str:
+    """A bar in eighths of a cell."""
+    eighths = round(min(max(share, 0.0), 1.0) * cells * 8)
+    full, rest = divmod(eighths, 8)
+    return ("█" * full + (_BLOCKS[rest] if rest else "")).ljust(cells)

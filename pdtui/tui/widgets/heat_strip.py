@@ -1,0 +1,171 @@
+"""All hidden units at once: a strip of colours a layer, with marks under the stimulated ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.segment import Segment
+from rich.style import Style
+from textual.color import Color
+from textual.strip import Strip
+
+from pdtui.policies.units import format_unit
+from pdtui.teleop.snapshot import Snapshot, UnitView
+from pdtui.tui.ownership import owners
+from pdtui.tui.palette import HEAT_LEVELS
+from pdtui.tui.panel import Panel
+from pdtui.tui.text import Row, number
+
+_LABEL = 4
+
+
+class HeatStrip(Panel):
+    """Half-blocks, two rows of pixels a line. Cold is negative, warm positive, dark is zero.
+
+    The lines are shared out between the layers. Within its rows a layer runs down, then right; where a layer
+    has more units than pixels, a pixel shows the strongest of its units.
+    """
+
+    _scale = 1e-6
+
+    def on_mount(self) -> None:
+        """Name the panel."""
+        self.border_title = "hidden units"
+
+    def watch_briefing(self) -> None:
+        if self.briefing is not None:
+            layers = "  ".join(f"{layer}:0–{width - 1}" for layer, width in enumerate(self.briefing.layers))
+            self.border_subtitle = f"layer:unit {layers}"
+        super().watch_briefing()
+
+    def remember(self, snapshot: Snapshot) -> None:
+        finite = np.abs(snapshot.activations[np.isfinite(snapshot.activations)])
+        # Not every function is bounded as tanh is. A few overwritten units must not darken all others, so the
+        # scale is what all but a fiftieth stay below; the largest seen counts, slowly forgotten.
+        if finite.size:
+            self._scale = max(self._scale * 0.998, float(np.quantile(finite, 0.98)), 1e-6)
+
+    def paint(self, width: int, height: int) -> list[Strip]:
+        if self.briefing is None or self.snapshot is None:
+            return []
+        columns = width - _LABEL
+        lines = max(1, height - 1)
+        places = shares(len(self.briefing.layers), lines * 2)
+        pixels = np.zeros((lines * 2, columns), np.int64)
+        first = 0
+        for layer, units in enumerate(self.briefing.layers):
+            values = self.snapshot.activations[first : first + units]
+            top, rows = places[layer]
+            if rows:
+                pixels[top : top + rows] = self._levels(values, rows, columns)
+            first += units
+        return [
+            *(self._line(pixels[2 * line : 2 * line + 2], line, places) for line in range(lines)),
+            self._marks(width, columns, places),
+        ]
+
+    def _levels(self, values: NDArray[np.float32], rows: int, columns: int) -> NDArray[np.int64]:
+        """Colour numbers of a layer's pixels, −1 for none, shape (rows, columns)."""
+        strongest = Grid(len(values), rows, columns).spread(np.nan_to_num(values))
+        share = np.clip(strongest / self._scale, -1.0, 1.0)
+        level = np.round(share * HEAT_LEVELS).astype(np.int64) + HEAT_LEVELS
+        return np.where(np.isnan(strongest), -1, level)
+
+    def _line(self, pixels: NDArray[np.int64], line: int, places: list[tuple[int, int]]) -> Strip:
+        heat = self.palette.heat
+        starting = [str(layer) for layer, (top, rows) in enumerate(places) if rows and top // 2 == line]
+        label = "/".join(starting).rjust(_LABEL - 1)[: _LABEL - 1] + " "
+        segments = [Segment(label, self.palette.muted)]
+        pairs = pixels[0] * 1000 + pixels[1]
+        cuts = [0, *(np.flatnonzero(pairs[1:] != pairs[:-1]) + 1).tolist(), len(pairs)]
+        for a, b in pairwise(cuts):
+            upper, lower = int(pixels[0, a]), int(pixels[1, a])
+            text = "▀" if lower >= 0 else "▀" if upper >= 0 else " "
+            style = _style(heat[upper] if upper >= 0 else None, heat[lower] if lower >= 0 else None)
+            segments.append(Segment(text * (b - a), style))
+        return Strip(segments, _LABEL + pixels.shape[1])
+
+    def _marks(self, width: int, columns: int, places: list[tuple[int, int]]) -> Strip:
+        """Stimulated units under their columns, with natural and overwritten value while there is room."""
+        assert self.briefing is not None
+        assert self.snapshot is not None
+        owner = owners(self.map, self.snapshot.active, self.briefing.layers)
+        marks = sorted((self._column(view, columns, places), view) for view in self.snapshot.units)
+        row, hidden = Row(width), 0
+        for index, (column, view) in enumerate(marks):
+            style = self.palette.behavior(self.row_of(owner.get(view.unit, "")))
+            address = format_unit(view.unit, self.briefing.layers)
+            text = f"▲{address} {number(view.natural)}→{number(view.overwritten)} "
+            at = width - row.left
+            rest = sum(
+                len(format_unit(other.unit, self.briefing.layers)) + 16 for _, other in marks[index + 1 :]
+            )
+            target = max(at, min(column + _LABEL, width - len(text) - rest))
+            if target + len(text) > width:
+                hidden += 1
+                continue
+            row.add(" " * (target - at), style).add(text, style)
+        if hidden and row.left >= 4:
+            row.add(f"+{hidden}".rjust(row.left), self.palette.muted)
+        return row.strip()
+
+    def _column(self, view: UnitView, columns: int, places: list[tuple[int, int]]) -> int:
+        assert self.briefing is not None
+        layer, _, index = format_unit(view.unit, self.briefing.layers).partition(":")
+        rows = max(1, places[int(layer)][1])
+        return Grid(self.briefing.layers[int(layer)], rows, columns).column_of(int(index))
+
+
+@lru_cache(maxsize=1024)
+def _style(upper: Color | None, lower: Color | None) -> Style:
+    return Style(
+        color=None if upper is None else upper.rich_color, bgcolor=None if lower is None else lower.rich_color
+    )
+
+
+def shares(layers: int, rows: int) -> list[tuple[int, int]]:
+    """First pixel row and number of pixel rows of each layer; layers that find no room get none."""
+    each = max(1, rows // layers)
+    return [(layer * each, each if (layer + 1) * each <= rows else 0) for layer in range(layers)]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Where a layer's units are: down, then right, on `rows` × `columns` pixels.
+
+    Fewer units than pixels are drawn wider, so that a layer always fills its strip; of more units than
+    pixels, neighbours share one.
+    """
+
+    units: int
+    rows: int
+    columns: int
+
+    @property
+    def steps(self) -> int:
+        """Number of different columns."""
+        return min(self.columns, -(-self.units // self.rows))
+
+    def column_of(self, index: int) -> int:
+        """The leftmost column that shows a unit."""
+        groups = self.rows * self.steps
+        group = index * groups // self.units if self.units > groups else index
+        return -(-(group // self.rows) * self.columns // self.steps)
+
+    def spread(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Values of the units as pixels, shape (rows, columns); the strongest of several, NaN for none."""
+        groups = self.rows * self.steps
+        if self.units > groups:
+            group = np.arange(self.units) * groups // self.units
+            starts = np.searchsorted(group, np.arange(groups))
+            high, low = np.maximum.reduceat(values, starts), np.minimum.reduceat(values, starts)
+            shown = np.where(high >= -low, high, low)
+        else:
+            shown = np.full(groups, np.nan, np.float32)
+            shown[: self.units] = values
+        pixels: NDArray[np.float32] = shown.reshape(self.steps, self.rows).T
+        return pixels[:, np.arange(self.columns) * self.steps // self.columns]

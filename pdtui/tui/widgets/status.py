@@ -1,0 +1,137 @@
+"""The lines at the edges of the screen: how the drive stands, what happened, and which keys help."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+from rich.cells import cell_len
+from rich.style import Style
+from textual.reactive import reactive
+from textual.strip import Strip
+
+from pdtui.tui.panel import Panel
+from pdtui.tui.text import Row, number, plain, size_of
+
+_NAME = 40
+Part = tuple[str, Style]
+
+
+class StatusLine(Panel):
+    """Robot on the left, state of the drive on the right; what matters less is left out first."""
+
+    watching: reactive[bool] = reactive(False, init=False, repaint=False)
+
+    def paint(self, width: int, height: int) -> list[Strip]:
+        del height
+        palette = self.palette
+        title = self.map.robot if self.briefing is None else self.briefing.title
+        row = Row(width).add(" pdtui ", palette.caps[1]).add(f" {plain(title)}", palette.title)
+        shown: list[tuple[int, Part]] = []
+        left = row.left - 1
+        for position, part in sorted(self._parts(), key=lambda item: item[0]):
+            length = cell_len(part[0]) + 2
+            if length <= left:
+                left -= length
+                shown.append((position, part))
+        row.add(" " * max(0, left), palette.text)
+        order = (4, 8, 7, 6, 5, 1, 2, 3, 0)
+        for _, (text, style) in sorted(shown, key=lambda item: order.index(item[0])):
+            row.add("  " + text, style)
+        return [row.strip()]
+
+    def _parts(self) -> list[tuple[int, Part]]:
+        """Parts of the line with their importance, 0 the highest."""
+        palette = self.palette
+        if self.briefing is None:
+            return [(0, ("loading the policy…", palette.warn)), (4, (plain(self.map.policy), palette.muted))]
+        parts: list[tuple[int, Part]] = [
+            (4, (plain(PurePath(self.briefing.policy).name), palette.muted)),
+            (6, (f"seed {self.briefing.seed}", palette.muted)),
+        ]
+        snapshot = self.snapshot
+        if snapshot is None:
+            return parts
+        parts += [
+            (0, self._pace()),
+            (1, (f"step {snapshot.step}", palette.text)),
+            (2, (f"{snapshot.time:.1f} s", palette.text)),
+            (5, (f"keys {snapshot.involvement}", palette.muted)),
+            (7, (f"episode {snapshot.episode}", palette.muted)),
+        ]
+        if self.briefing.recording:
+            name = _shorten(plain(PurePath(self.briefing.recording).name), _NAME)
+            parts.append((3, (f"● {size_of(snapshot.recorded_bytes)}", palette.bad)))
+            parts.append((8, (name, palette.muted)))
+        return parts
+
+    def _pace(self) -> Part:
+        snapshot, palette = self.snapshot, self.palette
+        assert snapshot is not None
+        if snapshot.finished:
+            return "■ over", palette.bad
+        kind = "watching " if self.watching else ""
+        asked = f"{snapshot.speed:g}×"
+        if snapshot.paused:
+            return f"{kind}⏸ paused at {asked}", palette.warn
+        slow = snapshot.achieved < 0.93 * snapshot.speed
+        return f"{kind}▶ {asked} ({number(snapshot.achieved)})", palette.warn if slow else palette.good
+
+
+class NoticeLine(Panel):
+    """What the user should read now; the end of the drive stays."""
+
+    notice: reactive[str] = reactive("", init=False, repaint=False)
+    hints: reactive[str] = reactive("", init=False, repaint=False)
+
+    def watch_notice(self) -> None:
+        """Something is to be read."""
+        self.redraw()
+
+    def paint(self, width: int, height: int) -> list[Strip]:
+        del height
+        row = Row(width)
+        finished = self.snapshot.finished if self.snapshot is not None else ""
+        if finished:
+            row.add(f" ■ the drive is over: {plain(finished)}   {self.hints} ", self.palette.alert)
+        elif self.notice:
+            row.add(" ▌ ", self.palette.warn).add(plain(self.notice), self.palette.title)
+        else:
+            row.add(" ▌ ", self.palette.faint).add(self._summary(), self.palette.muted)
+        return [row.strip()]
+
+    def _summary(self) -> str:
+        """What is there to say when nothing happened."""
+        if self.snapshot is None or self.briefing is None:
+            return "pdtui is ready when the policy is"
+        briefing = self.briefing
+        place = plain(briefing.recording) or "not recorded"
+        share = 100.0 * self.snapshot.involvement / max(1, self.snapshot.step)
+        keyed = f"{self.snapshot.involvement} steps with a key ({share:.1f} %)"
+        return f"seed {briefing.seed} · episode {self.snapshot.episode} · {keyed} · {place}"
+
+
+class KeyLine(Panel):
+    """The application's own keys, as far as there is room."""
+
+    keys: reactive[tuple[tuple[str, str], ...]] = reactive((), init=False, repaint=False)
+
+    def watch_keys(self) -> None:
+        """The keys were remapped."""
+        self.redraw()
+
+    def paint(self, width: int, height: int) -> list[Strip]:
+        del height
+        row = Row(width).add(" ", self.palette.text)
+        for key, says in self.keys:
+            if cell_len(key) + cell_len(says) + 3 > row.left:
+                break
+            row.add(key, self.palette.accent).add(f" {says}  ", self.palette.muted)
+        return [row.strip()]
+
+
+def _shorten(name: str, width: int) -> str:
+    """Cut in the middle: of a file's name, beginning and end say most."""
+    if len(name) <= width:
+        return name
+    end = width // 2
+    return f"{name[: width - end - 1]}…{name[-end:]}"

@@ -1,0 +1,52 @@
+"""Stimulated units: what each would have put out, and what overwrote it."""
+
+from __future__ import annotations
+
+from rich.cells import cell_len
+from textual.strip import Strip
+
+from pdtui.policies.units import format_unit
+from pdtui.tui.ownership import owners
+from pdtui.tui.panel import Panel
+from pdtui.tui.text import Row, number, plain
+
+_NUMBER = 8
+_ADDRESS = 8
+
+
+class UnitTable(Panel):
+    """One unit a line, in the colour of the behavior that overwrites it."""
+
+    def on_mount(self) -> None:
+        """Name the panel."""
+        self.border_title = "stimulated units"
+
+    def paint(self, width: int, height: int) -> list[Strip]:
+        palette = self.palette
+        if self.briefing is None or self.snapshot is None or not self.snapshot.units:
+            text = "none: the policy is on its own" if self.snapshot is not None else ""
+            return [Row(width).add(text, palette.faint).strip()]
+        head = (
+            Row(width).add("unit", palette.muted, _ADDRESS).add("natural", palette.muted, _NUMBER, right=True)
+        )
+        head.add("    overwritten", palette.muted)
+        owner = owners(self.map, self.snapshot.active, self.briefing.layers)
+        strips = [head.strip()]
+        units = self.snapshot.units
+        room = height - 1 if len(units) < height else height - 2
+        for view in units[:room]:
+            name = owner.get(view.unit, "")
+            style = palette.behavior(self.row_of(name))
+            row = (
+                Row(width)
+                .add(format_unit(view.unit, self.briefing.layers), style, _ADDRESS)
+                .add(number(view.natural), palette.muted, _NUMBER, right=True)
+                .add("  → ", palette.faint)
+                .add(number(view.overwritten), palette.title, _NUMBER)
+            )
+            if row.left > cell_len(plain(name)):
+                row.add(" " + plain(name), style)
+            strips.append(row.strip())
+        if len(units) > room:
+            strips.append(Row(width).add(f"+{len(units) - room} more", palette.faint).strip())
+        return strips
