@@ -24,15 +24,18 @@ from pdtui.sessions.versions import environment_versions
 from pdtui.sessions.views import Views
 
 _VIEW_ROWS = 32
+_SAFE_ROWS = 16
+"""Batches up to this length are waited for; a wait costs 0.5 ms, on a busy machine more."""
 _ARROW_TYPES = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.utf8()}
 
 
 class SessionRecorder:
     """Writes control steps to a Rerun recording, in batches.
 
-    Steps with events, and those that end an episode, are written at once with all before them. What was
-    written has reached the operating system: SIGKILL loses at most the last `rows_per_write` − 1 steps, and
-    the file can be read without its end.
+    Steps with events, and those that end an episode, are written at once with all before them. With small
+    batches, `write` returns when the operating system has what is due: SIGKILL loses at most the last
+    `rows_per_write` − 1 steps, and the file can be read without its end. With large batches, which are for
+    drives faster than time, it does not wait for the thread that writes.
 
     Args:
         path: the file; its folder is made, an existing file is overwritten.
@@ -68,24 +71,19 @@ class SessionRecorder:
         if self._closed:
             raise SessionError(f"{self.path}: the session is closed")
         self._rows.append(record)
-        if len(self._rows) >= self._rows_per_write or record.events or record.ended:
+        if record.events or record.ended:
             self.flush()
+        elif len(self._rows) >= self._rows_per_write:
+            self._write_rows()
+            self._send_off(wait=self._rows_per_write <= _SAFE_ROWS)
 
     def flush(self) -> None:
-        """Write all steps so far and hand them to the operating system.
+        """Write all steps so far and wait until the operating system has them.
 
         Raises:
             SessionError: the file cannot be written.
         """
-        records, self._rows = self._rows, []
-        if not records:
-            return
-        self._write_events(records)
-        self._send(DRIVE, [record.step for record in records], drive_columns(records))
-        self._views.add(records)
-        self._views.write_changes()
-        if self._views.pending >= max(_VIEW_ROWS, 2 * self._rows_per_write):
-            self._views.write()
+        self._write_rows()
         self._send_off()
 
     @property
@@ -130,6 +128,17 @@ class SessionRecorder:
         self._property(INFO, info_to_properties(info, created))
         self._property(VERSIONS, environment_versions())
 
+    def _write_rows(self) -> None:
+        records, self._rows = self._rows, []
+        if not records:
+            return
+        self._write_events(records)
+        self._send(DRIVE, [record.step for record in records], drive_columns(records))
+        self._views.add(records)
+        self._views.write_changes()
+        if self._views.pending >= max(_VIEW_ROWS, 2 * self._rows_per_write):
+            self._views.write()
+
     def _write_events(self, records: Sequence[StepRecord]) -> None:
         events = [event for record in records for event in record.events]
         if events:
@@ -158,10 +167,13 @@ class SessionRecorder:
         with self._errors_named():
             self._recording.send_property(name, rr.AnyValues(**arrays))
 
-    def _send_off(self) -> None:
+    def _send_off(self, *, wait: bool = True) -> None:
         """Hand everything to the operating system, where it outlives this process."""
         with self._errors_named():
-            self._recording.flush()
+            if wait:
+                self._recording.flush()
+            else:
+                self._recording.flush(timeout_sec=0.0)
 
     @contextmanager
     def _errors_named(self) -> Iterator[None]:
