@@ -38,13 +38,13 @@ def propose(dissection: Dissection) -> str:
     they came.
     """
     document = tomlkit.document()
-    for line in _header(dissection):
+    primitives = _primitives(dissection)
+    for line in _header(dissection, {str(entry["attribute"]) for entry in primitives}):
         document.add(tomlkit.comment(line))
     document.add("schema", tomlkit.item(SCHEMA))
     document.add("robot", tomlkit.item(dissection.robot))
     document.add("policy", _table({"name": dissection.policy, "sha256": dissection.policy_hash}))
     document.add("keys", _table({"default": "space"}))
-    primitives = _primitives(dissection)
     names = {
         str(entry["unit"]): (str(entry["name"]), float(entry["rho"]))
         for entry in primitives
@@ -59,14 +59,14 @@ def propose(dissection: Dissection) -> str:
     return tomlkit.dumps(document)
 
 
-def _header(dissection: Dissection) -> list[str]:
+def _header(dissection: Dissection, steered: set[str]) -> list[str]:
     lines = [
         f"Proposed by dissecting {dissection.policy_hash[:12]}… with preset '{dissection.preset.name}' and "
         f"seed {dissection.seed}: {dissection.rollouts} roll-outs.",
         "Effects are changes against the unperturbed roll-out, with 95 % intervals over starting states.",
     ]
     named = {attribute.name for attribute in dissection.attributes} & set(_PRIMITIVES)
-    missing = sorted(named - {str(entry["attribute"]) for entry in _primitives(dissection)})
+    missing = sorted(named - steered)
     if missing:
         lines.append(f"No unit was confirmed for: {', '.join(missing)}.")
     for found in dissection.behaviors:
@@ -96,20 +96,22 @@ def _primitives(dissection: Dissection) -> list[dict[str, Any]]:
             continue
         column = dissection.column(attribute)
         best = best_probed(column, dissection.screen, dissection.refined, dissection.seed)
-        if best and best[0].confirmed:
-            entries.append(_primitive(name, attribute, column, best[0], dissection))
+        # Without a phase there is no ρ, and without ρ no magnitude c: such a unit is no primitive.
+        rho = dissection.phase.circular[column]
+        known = [one for one in best if one.confirmed and np.isfinite(rho[one.unit])]
+        if known:
+            entries.append(_primitive(name, attribute, column, known[0], dissection))
     return entries
 
 
 def _primitive(
     name: str, attribute: str, column: int, best: Confirmation, dissection: Dissection
 ) -> dict[str, Any]:
-    rho = float(dissection.phase.circular[column, best.unit])
     entry: dict[str, Any] = {
         "name": name,
         "attribute": attribute,
         "unit": format_unit(best.unit, dissection.layers),
-        "rho": round(rho, 4) if np.isfinite(rho) else 0.0,
+        "rho": round(float(dissection.phase.circular[column, best.unit]), 4),
     }
     discrepancy = float(dissection.matching.discrepancy[column, best.unit])
     if np.isfinite(discrepancy):

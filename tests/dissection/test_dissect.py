@@ -21,6 +21,7 @@ from pdtui.dissection.report import render
 from pdtui.dissection.summary import summarise
 from pdtui.policies.files import file_hash
 from pdtui.policies.units import Stimulation
+from pdtui.stimulation.mapfile import parse_map
 from pdtui.stimulation.maps import Measured, Pid
 
 SMALL = Effort(
@@ -101,7 +102,9 @@ def test_what_was_found_is_in_the_map(dissection: Dissection) -> None:
     held = Held(
         Stimulation((9,), (-1.0,)), Pid("yaw", 6.0, 0.0, 0.0, 4.0, 0.2), 0.1, 0.6, 0.0, (-0.4, 0.4), True
     )
-    parsed = tomllib.loads(propose(replace(dissection, behaviors=(up,), holds=(held,))))
+    text = propose(replace(dissection, behaviors=(up,), holds=(held,)))
+    parsed = tomllib.loads(text)
+    parse_map(text, "proposed").check("ant", dissection.layers, dissection.policy_hash)
     assert parsed["schema"] == 1
     assert parsed["policy"]["sha256"] == dissection.policy_hash
     first, second = parsed["behaviors"]
