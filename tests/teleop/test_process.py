@@ -95,11 +95,13 @@ def test_pause_single_step_and_speed_are_no_part_of_the_run(link: ProcessLink) -
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_leaves_a_whole_recording(link: ProcessLink, recording: Path, number: signal.Signals) -> None:
+def test_a_signal_leaves_a_whole_recording(
+    link: ProcessLink, recording: Path, number: signal.Signals
+) -> None:
     _until(link, lambda snapshot: snapshot.step >= 5)
     os.kill(link.pid, number)
     with pytest.raises(PdtuiError, match=f"ended by {number.name}: "):
-        _until(link, lambda snapshot: False)
+        _until(link, lambda _: False)
     session = read_session(recording)
     assert session.outcome == f"ended by {number.name}"
     assert replay_session(recording).first_difference is None
@@ -109,7 +111,7 @@ def test_a_killed_simulation_says_where_the_recording_is(link: ProcessLink, reco
     steps = _until(link, lambda snapshot: snapshot.step >= 10)[-1].step
     os.kill(link.pid, signal.SIGKILL)
     with pytest.raises(PdtuiError, match=r"ended with code -9; the recording up to then is in .*drive\.rrd"):
-        _until(link, lambda snapshot: False)
+        _until(link, lambda _: False)
     session = read_session(recording)
     assert session.steps >= steps - 3
     assert replay_session(recording).first_difference is None
@@ -118,7 +120,7 @@ def test_a_killed_simulation_says_where_the_recording_is(link: ProcessLink, reco
 def test_what_cannot_be_loaded_comes_up_the_pipe(small_map: StimulationMap, tmp_path: Path) -> None:
     link = ProcessLink(DriveOrder("ant", small_map, 3, policy=str(tmp_path / "gone.safetensors")))
     with pytest.raises(PdtuiError, match=r"no policy '.*gone\.safetensors'"):
-        _until(link, lambda snapshot: False)
+        _until(link, lambda _: False)
     link.close()
 
 

@@ -1,0 +1,175 @@
+"""The commands: what they print, and one clear line for every mistake."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from pdtui.cli import main
+from pdtui.stimulation.maps import StimulationMap
+
+
+def run(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def keys(tmp_path: Path) -> Path:
+    path = tmp_path / "keys.txt"
+    path.write_text("10 w\n20 t\n30 space\n35 h\n40 left  # turn\n50 r\n")
+    return path
+
+
+def test_a_headless_drive_is_recorded_and_replays_in_a_fresh_process(
+    map_path: Path, keys: Path, tmp_path: Path
+) -> None:
+    session = tmp_path / "out.rrd"
+    drive = run(
+        "drive", "ant", "--map", map_path, "--headless", "--keys", keys, "--steps", 80, "--record", session
+    )
+    assert drive.exit_code == 0, drive.output
+    assert "80 steps, 4 s simulated" in drive.output
+    assert "steps with a key 6" in drive.output
+    replay = subprocess.run(
+        [sys.executable, "-m", "pdtui", "replay", str(session)], capture_output=True, text=True, check=False
+    )
+    assert replay.returncode == 0, replay.stderr
+    assert replay.stdout == "identical: 80 steps\n"
+
+
+def test_a_replay_names_the_first_step_that_differs(map_path: Path, tmp_path: Path) -> None:
+    """The same drive with another disturbance: a session whose robot was pushed behind the loop's back."""
+    from pdtui.sessions.recorder import SessionRecorder
+    from pdtui.stimulation.mapfile import load_map
+    from pdtui.teleop.drive import build_loop
+    from pdtui.teleop.order import DriveOrder
+
+    loop = build_loop(DriveOrder("ant", load_map(map_path), 3))
+    session = tmp_path / "pushed.rrd"
+    with SessionRecorder(session, loop.info) as recorder:
+        for step in range(40):
+            if step == 25:
+                loop.robot.data.qvel[0] += 0.5  # type: ignore[attr-defined]
+            recorder.write(loop.advance())
+        recorder.close("finished")
+    result = run("replay", session)
+    assert result.exit_code == 1
+    assert f"differs: step 25 of {session}: " in result.output
+    assert "is off by" in result.output
+
+
+def test_evaluate_prints_the_agreed_json(map_path: Path) -> None:
+    result = run("evaluate", "ant", "--map", map_path, "--seeds", "100-101", "--json")
+    assert result.exit_code == 0, result.output
+    data = json.loads(result.output)
+    assert (data["robot"], data["policy"], data["seeds"]) == ("ant", "small", [100, 101])
+    (push,) = data["behaviors"]
+    assert push["behavior"] == "push"
+    assert {"measure", "effect", "low", "high", "default", "right_sign", "falls"} <= push.keys()
+    assert push["low"] <= push["effect"] <= push["high"]
+
+
+def test_evaluate_measures_a_target_and_the_policy_alone(map_path: Path) -> None:
+    tracked = run("evaluate", "ant", "--map", map_path, "--seeds", "100", "--target", "yaw", "--json")
+    data = json.loads(tracked.output)
+    assert [row["target"] for row in data["targets"]][:4] == [0.0, 0.4, 0.9, 1.2]
+    walked = run("evaluate", "ant", "--map", map_path, "--seeds", "100", "--policy-only", "--json")
+    assert json.loads(walked.output)["steps"] == 1000
+    missing = run("evaluate", "ant", "--map", map_path, "--seeds", "100", "--target", "height")
+    assert "no behavior of mode pid holds 'height'; held are: yaw" in missing.output
+
+
+def test_bench_prints_all_parts(map_path: Path) -> None:
+    result = run("bench", "loop", "ant", "--map", map_path, "--steps", 100, "--json")
+    assert result.exit_code == 0, result.output
+    data = json.loads(result.output)
+    assert {"bare", "policy", "stimulated", "recorded", "recorded_share", "forward_us"} == data.keys()
+    assert all(value > 0 for value in data.values())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["drive", "walrus"], "pdtui: unknown robot 'walrus'; there are ant"),
+        (["drive", "ant", "--map", "nowhere.toml"], "pdtui: nowhere.toml: no such map"),
+        (
+            ["drive", "ant", "--map", "MAP"],
+            "pdtui: no terminal: the screen needs one; --headless drives without",
+        ),
+        (["drive", "ant", "--map", "MAP", "--keys", "KEYS"], "pdtui: --keys needs --headless"),
+        (
+            ["drive", "ant", "--map", "MAP", "--headless", "--policy", "no.safetensors"],
+            "pdtui: no policy 'no.safe",
+        ),
+        (["drive", "ant", "--map", "MAP", "--headless", "--keys", "no.txt"], "pdtui: no.txt: cannot be read"),
+        (["drive", "ant", "--map", "MAP", "--headless", "--keys", "BAD"], "bad.txt:2: expected 'STEP KEY'"),
+        (["drive", "ant", "--map", "MAP", "--headless", "--record", "FOLDER"], "pdtui: "),
+        (["replay", "no.rrd"], "pdtui: no.rrd"),
+        (["replay", "KEYS"], "keys.txt"),
+        (["dissect", "ant", "--policy", "no.safetensors", "-o", "OUT"], "pdtui: no policy 'no.safetensors'"),
+        (["evaluate", "ant", "--map", "MAP", "--seeds", "9-3"], "'9-3': expected seeds such as 7 or 100-119"),
+    ],
+)
+def test_a_mistake_is_one_line_and_a_code(
+    arguments: list[str], message: str, map_path: Path, keys: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "bad.txt").write_text("1 w\noops\n")
+    places = {"MAP": map_path, "KEYS": keys, "BAD": tmp_path / "bad.txt", "FOLDER": tmp_path}
+    places["OUT"] = tmp_path / "out.toml"
+    result = run(*(places.get(argument, argument) for argument in arguments))
+    assert result.exit_code != 0
+    assert message in result.output
+    assert "Traceback" not in result.output
+    assert not isinstance(result.exception, AttributeError | TypeError | KeyError)
+
+
+def test_an_unwritable_recording_is_named(map_path: Path, tmp_path: Path) -> None:
+    blocked = tmp_path / "file" / "out.rrd"
+    blocked.parent.write_text("a file where a folder should be")
+    result = run("drive", "ant", "--map", map_path, "--headless", "--record", blocked, "--steps", 5)
+    assert result.exit_code == 1
+    assert f"pdtui: {blocked}" in result.output
+
+
+def test_a_map_of_another_policy_needs_force(
+    map_path: Path, small_map: StimulationMap, tmp_path: Path
+) -> None:
+    text = small_map.text.replace(small_map.policy_hash, "0" * 64)
+    other = tmp_path / "other.toml"
+    other.write_text(text)
+    refused = run("drive", "ant", "--map", other, "--headless", "--steps", 5)
+    assert refused.exit_code == 1
+    assert "made for a policy with SHA-256 000000000000…" in refused.output
+    assert run("drive", "ant", "--map", other, "--headless", "--steps", 5, "--force").exit_code == 0
+
+
+def test_a_divergence_is_one_line_and_leaves_the_session(
+    map_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pdtui.robots.ant import Ant
+    from pdtui.sessions.reader import read_session
+
+    whole = Ant.step
+
+    def kicked(self: Ant, action: object) -> object:
+        self.data.qvel[:] += 1e8 * (self.data.time > 0.5)
+        return whole(self, action)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Ant, "step", kicked)
+    session = tmp_path / "diverged.rrd"
+    result = run("drive", "ant", "--map", map_path, "--headless", "--record", session, "--steps", 50)
+    assert result.exit_code == 1
+    assert "the simulation diverged at" in result.output
+    assert "the simulation diverged at" in read_session(session).outcome
+
+
+def test_importing_the_commands_pulls_in_nothing_heavy() -> None:
+    heavy = "torch", "mujoco", "gymnasium", "rerun", "scipy", "textual", "jax", "pyarrow"
+    code = f"import sys, pdtui.cli; print([m for m in {heavy!r} if m in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
