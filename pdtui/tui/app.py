@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Mapping
 from time import monotonic
 from typing import cast
@@ -37,9 +36,8 @@ NOTICE_SECONDS = 4.0
 class DriveApp(App[str]):
     """Polls a drive and draws the newest snapshot; keys go down the link.
 
-    The result of `run` is the line with which the link says how the drive ended. Where the drive's process
-    fails, the application ends with return code 1, and `failure` is what the link raised; `run_drive` raises
-    it again.
+    Whoever made the link closes it afterwards. `run` returns None when the user quits; where the drive's
+    process fails, it returns the failure's message and `return_code` is 1.
 
     Args:
         link: the drive.
@@ -55,20 +53,17 @@ class DriveApp(App[str]):
     HORIZONTAL_BREAKPOINTS = WIDTHS
     VERTICAL_BREAKPOINTS = HEIGHTS
 
-    briefing: reactive[Briefing | None] = reactive(None, init=False, always_update=True)
-    snapshot: reactive[Snapshot | None] = reactive(None, init=False, always_update=True)
-    notice: reactive[str] = reactive("", init=False)
+    briefing: reactive[Briefing | None] = reactive(None, init=False, repaint=False, always_update=True)
+    snapshot: reactive[Snapshot | None] = reactive(None, init=False, repaint=False, always_update=True)
+    notice: reactive[str] = reactive("", init=False, repaint=False)
 
     def __init__(
         self, link: DriveLink, stimulation_map: StimulationMap, *, fps: int = 12, watching: bool = False
     ) -> None:
         super().__init__()
         self.link, self.map, self.fps, self.watching = link, stimulation_map, fps, watching
-        self.failure: PdtuiError | None = None
-        self.closed = False
         self._drive_keys = drive_keys(stimulation_map)
         self._notice_until = 0.0
-        self._leaving = False
         self.register_theme(THEME)
         self.theme = THEME.name
 
@@ -127,13 +122,10 @@ class DriveApp(App[str]):
     def _poll(self) -> None:
         if self._notice_until and monotonic() > self._notice_until:
             self._notice_until, self.notice = 0.0, ""
-        if self._leaving:
-            return
         try:
             message = self.link.poll()
         except PdtuiError as error:
-            self.failure = error
-            self.exit(return_code=1)
+            self.exit(str(error), return_code=1)
             return
         if isinstance(message, Briefing):
             self.briefing = message
@@ -179,18 +171,6 @@ class DriveApp(App[str]):
         """List all keys."""
         self.push_screen(HelpScreen(self.map, list(self.keys_now.values())))
 
-    async def action_leave(self) -> None:
-        """End the drive, wait until its recording is whole, and quit."""
-        if self._leaving:
-            return
-        self._leaving = True
-        self.say("ending the drive…")
-        try:
-            line = await asyncio.to_thread(self.link.close)
-        except PdtuiError as error:
-            self.failure = error
-            self.exit(return_code=1)
-            return
-        finally:
-            self.closed = True
-        self.exit(line)
+    def action_leave(self) -> None:
+        """Quit; whoever made the link then ends the drive."""
+        self.exit()

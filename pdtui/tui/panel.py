@@ -5,6 +5,9 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
+from rich.style import Style
+from textual.color import Color
+from textual.filter import ANSIToTruecolor
 from textual.geometry import Region
 from textual.reactive import reactive
 from textual.strip import Strip
@@ -35,6 +38,9 @@ class Panel(Widget, can_focus=False, inherit_bindings=False):
         super().__init__(id=id)
         self.map = stimulation_map
         self._strips: list[Strip] = []
+        self._framed: list[Strip | None] = []
+        self._sides: tuple[Strip, Strip, Color] | None = None
+        self._palette: Palette | None = None
 
     @abstractmethod
     def paint(self, width: int, height: int) -> list[Strip]:
@@ -47,7 +53,9 @@ class Panel(Widget, can_focus=False, inherit_bindings=False):
     @property
     def palette(self) -> Palette:
         """Styles of the present theme."""
-        return palette_of(self.app.theme_variables)
+        if self._palette is None:
+            self._palette = palette_of(self.app.theme_variables)
+        return self._palette
 
     def watch_briefing(self) -> None:
         """Robot and policy are loaded."""
@@ -68,21 +76,68 @@ class Panel(Widget, can_focus=False, inherit_bindings=False):
         width, height = self.content_size
         if not self.is_attached or width <= 0 or height <= 0:
             return
+        blank = Strip.blank(width)
         strips = self.paint(width, height)[:height]
+        strips += [blank] * (height - len(strips))
         old, self._strips = self._strips, strips
-        if len(old) != len(strips) or (old and old[0].cell_length != strips[0].cell_length):
+        if len(old) != height or old[0].cell_length != width:
+            self._framed = [None] * height
             self.refresh()
             return
         changed = [row for row, strip in enumerate(strips) if strip != old[row]]
+        for row in changed:
+            self._framed[row] = None
         if changed:
             self.refresh(*(Region(0, row, width, 1) for row in changed))
 
+    def notify_style_update(self) -> None:
+        """Forget what was made with the old styles."""
+        super().notify_style_update()
+        self._palette = self._sides = None
+        self._framed = [None] * len(self._framed)
+
     def render_line(self, y: int) -> Strip:
-        """One painted line."""
-        base = self.palette.base
-        if y < len(self._strips):
-            return self._strips[y].apply_style(base)
-        return Strip.blank(self.content_size.width, base)
+        """An empty line: Textual draws only the frame; see `render_lines`."""
+        del y
+        return Strip.blank(self.content_size.width)
+
+    def render_lines(self, crop: Region) -> list[Strip]:
+        """Lines of the panel with its frame.
+
+        Textual's own way resolves border, padding and background anew for every line that changed, which
+        costs as much as painting it. Here one empty line gives the sides for all.
+        """
+        width = self.outer_size.width
+        top, bottom = self.gutter.top, self.gutter.top + len(self._framed)
+        lines: list[Strip] = []
+        for y in crop.line_range:
+            if top <= y < bottom:
+                lines.append(self._frame_line(y - top))
+            else:
+                lines += super().render_lines(Region(0, y, width, 1))
+        if crop.column_span != (0, width):
+            lines = [line.crop(*crop.column_span) for line in lines]
+        return lines
+
+    def _frame_line(self, row: int) -> Strip:
+        """A painted line between the sides of the frame, on the panel's background."""
+        framed = self._framed[row]
+        if framed is None:
+            left, right, background = self._sides or self._make_sides()
+            content = self._strips[row].apply_style(Style(bgcolor=background.rich_color))
+            for line_filter in self.get_line_filters():
+                # Our colours are true ones already; other filters, such as NO_COLOR's, have work to do.
+                if not isinstance(line_filter, ANSIToTruecolor):
+                    content = content.apply_filter(line_filter, background)
+            framed = self._framed[row] = Strip([*left, *content, *right], self.outer_size.width)
+        return framed
+
+    def _make_sides(self) -> tuple[Strip, Strip, Color]:
+        width, gutter = self.outer_size.width, self.gutter
+        (line,) = super().render_lines(Region(0, gutter.top, width, 1))
+        left, right = line.crop(0, gutter.left), line.crop(width - gutter.right, width)
+        self._sides = left, right, self.background_colors[1]
+        return self._sides
 
     def row_of(self, name: str) -> int:
         """Row of a behavior in the map, −1 for one that the map does not have."""

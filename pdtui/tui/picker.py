@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rich.style import Style
 from rich.text import Text
@@ -17,6 +17,9 @@ from textual.widgets.option_list import Option
 from pdtui.tui.palette import THEME, Palette, palette_of
 from pdtui.tui.styles import PICKER
 from pdtui.tui.text import fit, plain
+
+if TYPE_CHECKING:
+    from pdtui.stimulation.library import ListedMap
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,24 @@ class PickerRow:
     policy: str = ""
     behaviors: int = 0
     problem: str = ""
+
+    def __str__(self) -> str:
+        """The map's file, which is how a command line names a row."""
+        return self.map_path
+
+
+def rows_of(maps: Sequence[ListedMap]) -> list[PickerRow]:
+    """Rows for maps as they were found; of a broken map only its file's name is known."""
+    rows = []
+    for listed in maps:
+        found = listed.stimulation_map
+        if found is None:
+            rows.append(PickerRow("", listed.path.stem, str(listed.path), problem=listed.problem))
+        else:
+            rows.append(
+                PickerRow(found.robot, found.robot, str(listed.path), found.policy, len(found.behaviors))
+            )
+    return rows
 
 
 class PickerApp(App[PickerRow]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
+from functools import lru_cache
 
 from rich.cells import cell_len, set_cell_size
 from rich.segment import Segment
@@ -25,6 +26,7 @@ _KEYS = {
 }
 
 
+@lru_cache(maxsize=512)
 def plain(text: str) -> str:
     """Text from a file without anything that a terminal would obey: control and formatting characters."""
     return "".join(

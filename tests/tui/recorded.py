@@ -54,7 +54,7 @@ def save(path: Path, briefing: Briefing, snapshots: list[Snapshot]) -> None:
     ]
     text = json.dumps({"briefing": asdict(briefing), "snapshots": plain})
     arrays: dict[str, Any] = {
-        f"{name}_{index}": getattr(snapshot, name).astype(np.float32)
+        f"{name}_{index}": getattr(snapshot, name).astype(np.float16 if name == "activations" else np.float32)
         for index, snapshot in enumerate(snapshots)
         for name in ARRAYS
     }
@@ -67,12 +67,7 @@ def load(path: Path) -> tuple[Briefing, list[Snapshot]]:
         stored = json.loads(file["text"].tobytes().decode())
         briefing = stored["briefing"]
         briefing["attributes"] = tuple(Attribute(**fields) for fields in briefing["attributes"])
-        briefing["links"] = tuple(
-            Link(
-                **{name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}
-            )
-            for fields in briefing["links"]
-        )
+        briefing["links"] = tuple(_link(fields) for fields in briefing["links"])
         briefing["layers"] = tuple(briefing["layers"])
         snapshots = []
         for index, fields in enumerate(stored["snapshots"]):
@@ -82,3 +77,10 @@ def load(path: Path) -> tuple[Briefing, list[Snapshot]]:
             arrays["activations"] = arrays["activations"].astype(np.float32)
             snapshots.append(Snapshot(**fields, **arrays))
     return Briefing(**briefing), snapshots
+
+
+def _link(fields: dict[str, Any]) -> Link:
+    tuples: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()
+    }
+    return Link(**tuples)

@@ -94,7 +94,9 @@ class HeatStrip(Panel):
         assert self.briefing is not None
         assert self.snapshot is not None
         owner = owners(self.map, self.snapshot.active, self.briefing.layers)
-        marks = sorted((self._column(view, columns, places), view) for view in self.snapshot.units)
+        units = sorted(self.snapshot.units, key=lambda view: view.unit)
+        marks = [(self._column(view, columns, places), view) for view in units]
+        marks.sort(key=lambda mark: mark[0])
         row, hidden = Row(width), 0
         for index, (column, view) in enumerate(marks):
             style = self.palette.behavior(self.row_of(owner.get(view.unit, "")))
