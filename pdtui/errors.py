@@ -13,7 +13,7 @@ class RobotError(PdtuiError):
     """A robot is unknown, not installed, or was used in a way that it does not offer."""
 
 
-class SimulationDiverged(RobotError):
+class SimulationDiverged(RobotError):  # noqa: N818 - it names what happened
     """The simulator's state is no longer finite; the episode cannot go on."""
 
 

@@ -14,7 +14,7 @@ from pdtui.cli import main
 from pdtui.stimulation.maps import StimulationMap
 
 
-def run(*arguments: str | Path) -> Result:
+def run(*arguments: str | Path | int) -> Result:
     return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 

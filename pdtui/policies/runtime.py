@@ -105,7 +105,7 @@ class Policy:
     ) -> None:
         self.module, self.observations, self.name, self.sha256 = module.eval(), observations, name, sha256
         self._decode = decode
-        self._stimulation = NO_STIMULATION
+        self._pending: tuple[tuple[int, float], ...] = ()
         self._outputs: list[NDArray[np.float32]] = []
         self._natural: dict[int, float] = {}
         self._offset = 0
@@ -113,8 +113,7 @@ class Policy:
         if self._chain is None:
             for child in self._unit_modules(hidden):
                 child.register_forward_hook(lambda _module, _inputs, output: self._visit(output))
-        with torch.inference_mode():
-            self._forward(torch.zeros(observations))
+        self._forward(np.zeros(observations))
         self.layers: tuple[int, ...] = tuple(output.size for output in self._outputs)
         if not self.layers:
             raise PolicyError(f"{name}: the network has no hidden layer to stimulate")
@@ -130,9 +129,11 @@ class Policy:
             raise PolicyError(f"{self.name}: no submodule '{missing[0]}'; there are {known}")
         return [modules[name] for name in hidden]
 
-    def _forward(self, x: torch.Tensor) -> torch.Tensor:
+    def _forward(self, observation: NDArray[Any]) -> torch.Tensor:
+        x = torch.from_numpy(observation.astype(np.float32))
         if self._chain is None:
-            output: torch.Tensor = self.module(x)
+            with torch.inference_mode():
+                output: torch.Tensor = self.module(x)
             return output
         for function, has_units in self._chain:
             x = function(x)
@@ -142,14 +143,13 @@ class Policy:
 
     def _visit(self, output: torch.Tensor) -> None:
         # The array shares the tensor's memory, so writing to it is what the next layer reads.
-        values = output.numpy().reshape(-1)
+        values = output.numpy()
         low, high = self._offset, self._offset + values.size
-        if self._stimulation.units:
-            for unit, value in zip(self._stimulation.units, self._stimulation.values, strict=True):
-                if low <= unit < high:
-                    self._natural[unit] = float(values[unit - low])
-                    values[unit - low] = value
-        self._outputs.append(values)
+        for unit, value in self._pending:
+            if low <= unit < high:
+                self._natural[unit] = float(values.flat[unit - low])
+                values.flat[unit - low] = value
+        self._outputs.append(values.reshape(-1))
         self._offset = high
 
     def act(
@@ -173,11 +173,14 @@ class Policy:
                 f"{self.name}: expected an observation of shape ({self.observations},), "
                 f"got {observation.shape}"
             )
-        self._stimulation, self._outputs, self._offset, self._natural = stimulation, [], 0, {}
-        with torch.inference_mode():
-            output = self._forward(torch.from_numpy(observation.astype(np.float32)))
-            activations = np.concatenate(self._outputs)
-            action = self._decode(output, rng)
+        self._outputs, self._offset = [], 0
+        if stimulation.units:
+            self._pending = tuple(zip(stimulation.units, stimulation.values, strict=True))
+            self._natural = {}
+        elif self._pending:
+            self._pending = ()
+        action = self._decode(self._forward(observation), rng)
+        activations = np.concatenate(self._outputs)
         try:
             natural = tuple([self._natural[unit] for unit in stimulation.units])
         except KeyError as error:
