@@ -17,6 +17,10 @@ from pdtui.stimulation.maps import StimulationMap
 from pdtui.tui.palette import Palette, palette_of
 from pdtui.tui.text import key_name, plain
 
+_LATCHING = (
+    "A key latches its behavior: it lasts until its period ends, or until the key of another behavior or the "
+    "clearing key is pressed. Terminals do not tell when a key is released."
+)
 KeyLines = Sequence[tuple[str, str]]
 
 
@@ -63,10 +67,7 @@ class HelpScreen(ModalScreen[None]):
                 behavior.key, f"{behavior.name}: {behavior.says}{_detail(behavior.period)}", cap, palette.text
             )
         line(self._map.default_key, "clears all stimulation", palette.key, palette.text)
-        text.append(
-            "\nA key latches its behavior: it lasts until its period ends, another behavior's key is\n"
-        )
-        text.append("pressed, or the clearing key. Terminals do not tell when a key is released.\n")
+        text.append(f"\n{_LATCHING}\n", palette.muted)
         text.append("\neverything else\n", palette.accent)
         for key, says in self._keys:
             line(key, says, palette.key, palette.text)

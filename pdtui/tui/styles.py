@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 # From this many columns, or lines, on, the screen has the class.
-WIDTHS = [(0, "-narrow"), (120, "-wide")]
+WIDTHS = [(0, "-narrow"), (110, "-wide"), (150, "-full")]
 HEIGHTS = [(0, "-low"), (36, "-tall")]
 
 DRIVE = """
@@ -35,8 +35,9 @@ Panel { width: 1fr; height: 1fr; color: $foreground; }
 .-too-small #status, .-too-small #body, .-too-small #heat { display: none; }
 .-too-small #notice, .-too-small #keys { display: none; }
 
-.-wide #right { width: 74; }
-.-wide #units { display: block; width: 42; }
+.-wide #right { width: 60; }
+.-full #right { width: 74; }
+.-full #units { display: block; width: 46; }
 .-tall #below { height: 2fr; }
 .-tall #robot { height: 3fr; }
 .-tall #attributes { height: 18; }
@@ -55,6 +56,8 @@ HelpScreen { align: center middle; background: $background 60%; }
     background: $surface;
     padding: 0 2;
     scrollbar-size-vertical: 1;
+    scrollbar-color: $primary 40%;
+    scrollbar-background: $surface;
 }
 """
 

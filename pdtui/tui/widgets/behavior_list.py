@@ -28,24 +28,21 @@ class BehaviorList(Panel):
 
     def paint(self, width: int, height: int) -> list[Strip]:
         active = {view.name: view for view in self.snapshot.active} if self.snapshot is not None else {}
-        names = [plain(behavior.name) for behavior in self.map.behaviors.values()]
-        keys = [key_name(behavior.key) for behavior in self.map.behaviors.values()]
+        behaviors = list(self.map.behaviors.values())
+        names = [plain(behavior.name) for behavior in behaviors]
+        keys = [key_name(behavior.key) for behavior in behaviors]
         key_width = max((cell_len(key) for key in keys), default=0) + 2
         name_width = min(max((cell_len(name) for name in names), default=0), max(8, width // 3))
         self._columns = (key_width, name_width)
+        # Room for the controllers' lines counts even while none is latched: a key must not change the layout.
+        controllers = sum(behavior.pid is not None for behavior in behaviors)
+        roomy = 2 * len(behaviors) + controllers + 2 <= height
         entries = [
-            self._entry(row, behavior, active.get(behavior.name), width, roomy=True)
-            for row, behavior in enumerate(self.map.behaviors.values())
+            self._entry(row, behavior, active.get(behavior.name), width, roomy=roomy)
+            for row, behavior in enumerate(behaviors)
         ]
-        if sum(map(len, entries)) + 2 > height:
-            entries = [
-                self._entry(row, behavior, active.get(behavior.name), width, roomy=False)
-                for row, behavior in enumerate(self.map.behaviors.values())
-            ]
-            gap: list[Strip] = []
-        else:
-            gap = [Strip.blank(width)]
-        latched = [behavior.name in active for behavior in self.map.behaviors.values()]
+        gap = [Strip.blank(width)] if roomy else []
+        latched = [behavior.name in active for behavior in behaviors]
         shown = self._crop(entries, latched, width, height - 1 - len(gap))
         default = Row(width)
         self._add_cap(default, self.map.default_key, self.palette.key)

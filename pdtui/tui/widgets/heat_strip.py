@@ -38,8 +38,9 @@ class HeatStrip(Panel):
 
     def watch_briefing(self) -> None:
         if self.briefing is not None:
-            layers = "  ".join(f"{layer}:0–{width - 1}" for layer, width in enumerate(self.briefing.layers))
-            self.border_subtitle = f"layer:unit {layers}"
+            widths = enumerate(self.briefing.layers)
+            layers = " · ".join(f"layer {layer}: {width}" for layer, width in widths)
+            self.border_title = f"hidden units · {layers}"
         super().watch_briefing()
 
     def remember(self, snapshot: Snapshot) -> None:

@@ -98,7 +98,7 @@ class RobotView(Panel):
             return Camera(middle, 90.0, extent, zoom, (canvas.width / 2, canvas.height / 2))
         zoom = min(canvas.width / (2.15 * extent), canvas.height / (1.5 * extent))
         middle = (float(root[0]), float(root[1]), 0.45 * extent)
-        return Camera(middle, _ELEVATION["side"], extent, zoom, (canvas.width / 2, canvas.height * 0.52))
+        return Camera(middle, _ELEVATION["side"], extent, zoom, (canvas.width / 2, canvas.height * 0.47))
 
     def _draw_ground(self, canvas: Canvas, camera: Camera, root: Floats) -> None:
         """A grid fixed to the world, so that its lines pass when the robot moves."""
