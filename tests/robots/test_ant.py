@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import gymnasium
 import numpy as np
 import pytest
@@ -33,7 +35,7 @@ def ant() -> Ant:
 
 
 def test_physics_is_that_of_stock_ant(ant: Ant) -> None:
-    stock = gymnasium.make("Ant-v5", include_cfrc_ext_in_observation=False).unwrapped
+    stock: Any = gymnasium.make("Ant-v5", include_cfrc_ext_in_observation=False).unwrapped
     stock.reset(seed=0)
     stock.set_state(ant.data.qpos.copy(), ant.data.qvel.copy())
     for action in _actions(50):

@@ -1,0 +1,71 @@
+"""What is shipped: the Ant's policy, its map and its sample sessions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from pdtui.cli import main
+from pdtui.policies.files import file_hash, find_weights, load_network
+from pdtui.sessions.reader import read_session
+from pdtui.stimulation.library import find_map, shipped_folder
+from pdtui.stimulation.mapfile import load_map
+from pdtui.teleop.replay import replay_session
+
+SAMPLES = sorted((shipped_folder("sessions") / "samples").glob("*.rrd"))
+
+
+def _figures(*arguments: str) -> dict[str, object]:
+    result = CliRunner().invoke(main, [*arguments, "--json"])
+    assert result.exit_code == 0, result.output
+    data: dict[str, object] = json.loads(result.output)
+    return data
+
+
+def test_there_is_a_sample() -> None:
+    assert SAMPLES
+
+
+@pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
+def test_a_sample_driven_on_the_screen_replays_bit_for_bit(path: Path) -> None:
+    session = read_session(path)
+    assert any(event.key for event in session.events)
+    result = replay_session(path)
+    assert result.first_difference is None, (result.detail, result.environment)
+    assert result.steps == session.steps
+
+
+def test_the_weights_say_how_they_were_trained_and_the_map_fits_them() -> None:
+    spec = load_network(find_weights("ant")).spec
+    assert (spec.layers, spec.activation, spec.head) == ((256, 256), "tanh", "squashed_gaussian")
+    assert spec.command.startswith("pdtui train ant --seed ")
+    assert spec.score["episodes"] >= 32
+    shipped = load_map(find_map("ant"))
+    assert {"stop", "up", "down", "spin left", "spin right"} <= shipped.behaviors.keys()
+    shipped.check("ant", spec.layers, file_hash(find_weights("ant")))
+
+
+@pytest.mark.slow
+def test_the_policy_walks() -> None:
+    figures = _figures("evaluate", "ant", "--policy-only", "--seeds", "100-119")
+    assert figures["finished"] == 20
+    assert float(str(figures["mean_speed"])) >= 3.0
+
+
+@pytest.mark.slow
+def test_every_behavior_does_what_the_readme_says() -> None:
+    figures = _figures("evaluate", "ant", "--seeds", "100-119")
+    rows = {row["behavior"]: row for row in figures["behaviors"]}  # type: ignore[attr-defined]
+    assert rows["stop"]["value"] < 0.2 * rows["stop"]["default"]
+    for name, sign, least in (
+        ("up", 1, 0.7),
+        ("down", -1, 0.7),
+        ("spin left", 1, 0.5),
+        ("spin right", -1, 0.5),
+    ):
+        assert sign * rows[name]["value"] >= least
+        assert rows[name]["right_sign"] >= 18
+    assert all(row["falls"] <= 3 for row in rows.values())

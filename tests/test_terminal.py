@@ -1,0 +1,108 @@
+"""The real program in a real pseudo-terminal."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pexpect
+import pytest
+
+from pdtui.sessions.reader import read_session
+from pdtui.teleop.replay import replay_session
+
+PATIENCE = 60
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Path:
+    return tmp_path / "drive.rrd"
+
+
+@pytest.fixture
+def screen(map_path: Path, session: Path) -> Iterator[pexpect.spawn[str]]:
+    arguments = [
+        "-m",
+        "pdtui",
+        "drive",
+        "ant",
+        "--map",
+        str(map_path),
+        "--seed",
+        "5",
+        "--record",
+        str(session),
+    ]
+    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "", "LINES": ""}
+    for name in ("COLUMNS", "LINES"):
+        environment.pop(name)
+    child = pexpect.spawn(
+        sys.executable, arguments, dimensions=(24, 80), encoding="utf-8", timeout=PATIENCE, env=environment
+    )
+    yield child
+    child.close(force=True)
+
+
+def _drive_a_little(screen: pexpect.spawn[str], session: Path) -> None:
+    """Press a behavior's key once the simulation runs, and wait until it is recorded."""
+    deadline = time.monotonic() + PATIENCE
+    while not session.exists() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    screen.expect("vx")
+    screen.send("w")
+    screen.expect("latched")
+
+
+def test_a_drive_in_a_terminal_replays_bit_for_bit(screen: pexpect.spawn[str], session: Path) -> None:
+    _drive_a_little(screen, session)
+    screen.send(" ")
+    time.sleep(0.5)
+    screen.send("q")
+    screen.expect("stopped: ")
+    screen.expect(pexpect.EOF)
+    screen.wait()
+    assert screen.exitstatus == 0
+    recorded = read_session(session)
+    assert [event.key for event in recorded.events] == ["w", "space"]
+    result = replay_session(session)
+    assert (result.first_difference, result.steps) == (None, recorded.steps)
+
+
+def test_a_terminal_that_is_too_small_says_so_and_recovers(screen: pexpect.spawn[str], session: Path) -> None:
+    _drive_a_little(screen, session)
+    screen.setwinsize(20, 60)
+    screen.expect("80")
+    screen.setwinsize(24, 80)
+    screen.expect("behaviors")
+    screen.send("q")
+    screen.expect("stopped: ")
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
+def test_a_closed_terminal_leaves_a_whole_session(
+    screen: pexpect.spawn[str], session: Path, number: signal.Signals
+) -> None:
+    _drive_a_little(screen, session)
+    os.killpg(os.getpgid(screen.pid), number)
+    deadline = time.monotonic() + PATIENCE
+    while screen.isalive() and time.monotonic() < deadline:
+        screen.expect([pexpect.TIMEOUT, pexpect.EOF], timeout=0.5)
+    recorded = read_session(session)
+    assert recorded.outcome
+    assert replay_session(session).first_difference is None
+
+
+def test_a_killed_screen_leaves_a_whole_session(screen: pexpect.spawn[str], session: Path) -> None:
+    _drive_a_little(screen, session)
+    os.kill(screen.pid, signal.SIGKILL)
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        recorded = read_session(session)
+        if recorded.outcome:
+            break
+        time.sleep(0.2)
+    assert recorded.outcome == "the screen went away"
