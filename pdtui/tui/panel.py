@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
+from rich.segment import Segment
 from rich.style import Style
 from textual.color import Color
 from textual.filter import ANSIToTruecolor
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
     from pdtui.stimulation.maps import StimulationMap
     from pdtui.teleop.snapshot import Briefing, Snapshot
+
+
+Sides = tuple[Strip, Strip, Color, Style]
 
 
 class Panel(Widget, can_focus=False, inherit_bindings=False):
@@ -39,7 +43,7 @@ class Panel(Widget, can_focus=False, inherit_bindings=False):
         self.map = stimulation_map
         self._strips: list[Strip] = []
         self._framed: list[Strip | None] = []
-        self._sides: tuple[Strip, Strip, Color] | None = None
+        self._sides: Sides | None = None
         self._palette: Palette | None = None
 
     @abstractmethod
@@ -123,8 +127,15 @@ class Panel(Widget, can_focus=False, inherit_bindings=False):
         """A painted line between the sides of the frame, on the panel's background."""
         framed = self._framed[row]
         if framed is None:
-            left, right, background = self._sides or self._make_sides()
-            content = self._strips[row].apply_style(Style(bgcolor=background.rich_color))
+            left, right, background, base = self._sides or self._make_sides()
+            content = Strip(
+                [
+                    segment
+                    if segment.style is not None and segment.style.bgcolor is not None
+                    else Segment(segment.text, base + segment.style)
+                    for segment in self._strips[row]
+                ]
+            )
             for line_filter in self.get_line_filters():
                 # Our colours are true ones already; other filters, such as NO_COLOR's, have work to do.
                 if not isinstance(line_filter, ANSIToTruecolor):
@@ -132,11 +143,12 @@ class Panel(Widget, can_focus=False, inherit_bindings=False):
             framed = self._framed[row] = Strip([*left, *content, *right], self.outer_size.width)
         return framed
 
-    def _make_sides(self) -> tuple[Strip, Strip, Color]:
+    def _make_sides(self) -> Sides:
         width, gutter = self.outer_size.width, self.gutter
         (line,) = super().render_lines(Region(0, gutter.top, width, 1))
         left, right = line.crop(0, gutter.left), line.crop(width - gutter.right, width)
-        self._sides = left, right, self.background_colors[1]
+        background = self.background_colors[1]
+        self._sides = left, right, background, Style(bgcolor=background.rich_color)
         return self._sides
 
     def row_of(self, name: str) -> int:

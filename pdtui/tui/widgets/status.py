@@ -55,7 +55,7 @@ class StatusLine(Panel):
             (0, self._pace()),
             (1, (f"step {snapshot.step}", palette.text)),
             (2, (f"{snapshot.time:.1f} s", palette.text)),
-            (5, (f"keys {snapshot.involvement}", palette.muted)),
+            (5, (f"involvement {snapshot.involvement}", palette.muted)),
             (7, (f"episode {snapshot.episode}", palette.muted)),
         ]
         if self.briefing.recording:
