@@ -103,7 +103,8 @@ class Panel(Widget, can_focus=False, inherit_bindings=False):
     def render_line(self, y: int) -> Strip:
         """An empty line: Textual draws only the frame; see `render_lines`."""
         del y
-        return Strip.blank(self.content_size.width)
+        # Styled, because Textual's filter for NO_COLOR fails on segments without a style.
+        return Strip.blank(self.content_size.width, Style(bgcolor=self.background_colors[1].rich_color))
 
     def render_lines(self, crop: Region) -> list[Strip]:
         """Lines of the panel with its frame.

@@ -19,6 +19,7 @@ from pdtui.teleop.observer import Observer
 from pdtui.teleop.snapshot import Briefing, Snapshot
 from pdtui.tui.help import HelpScreen
 from pdtui.tui.keys import BINDINGS
+from pdtui.tui.panel import Panel
 from pdtui.tui.widgets.robot_view import RobotView
 from tests.tui.conftest import MakeApp
 from tests.tui.recorded import drive_map
@@ -245,6 +246,23 @@ async def test_poses_that_are_not_finite_are_said(make_app: MakeApp, drive: Driv
     async with app.run_test(size=(160, 48)) as pilot:
         await played(pilot, link)
         assert "not finite" in shown(app.query_one("#robot"))
+
+
+@pytest.mark.parametrize("size", [(80, 24), (160, 48), (70, 20)])
+async def test_without_colors(
+    monkeypatch: pytest.MonkeyPatch, make_app: MakeApp, size: tuple[int, int]
+) -> None:
+    monkeypatch.setenv("NO_COLOR", "1")
+    app, link = make_app(64)
+    async with app.run_test(size=size) as pilot:
+        await played(pilot, link)
+        for panel in app.query("Panel").results():
+            assert isinstance(panel, Panel)
+            for segment in (part for strip in panel.render_lines(panel.outer_size.region) for part in strip):
+                assert segment.style is not None
+                color = segment.style.color
+                assert color is None or color.triplet is None or len(set(color.triplet)) == 1
+        await pilot.press("question_mark")
 
 
 async def test_a_live_loop_is_drawn(policy: Policy, small_map: StimulationMap, make_app: MakeApp) -> None:
