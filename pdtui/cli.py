@@ -225,11 +225,13 @@ def dissect(
 @click.argument("robot")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True)
 @click.option("--steps", type=click.IntRange(1), default=None, help="Control steps over all worlds.")
+@click.option("--algorithm", type=click.Choice(["ppo", "sac"]), default="ppo", show_default=True)
 @click.option("--learning-rate", type=click.FloatRange(0, min_open=True), default=None, help="At the start.")
-@click.option("--forward", type=click.Choice(["either", "x"]), default="either", show_default=True)
+@click.option("--forward", type=click.Choice(["either", "x"]), default="x", show_default=True)
 @click.option("--folder", type=click.Path(path_type=Path), help="Checkpoints; default: runs/ROBOT-seed.")
 def train(
     robot: str,
+    algorithm: str,
     seed: int,
     steps: int | None,
     learning_rate: float | None,
@@ -242,11 +244,12 @@ def train(
     with _progress("training") as advance:
         path = train_policy(
             robot,
+            algorithm,
             seed,
             steps,
             learning_rate,
             forward,
-            folder or Path("runs") / f"{robot}-{forward}-{seed}",
+            folder or Path("runs") / f"{robot}-{algorithm}-{forward}-{seed}",
             advance,
         )
     click.echo(f"best weights: {path}")

@@ -11,7 +11,7 @@ from pdtui.dissection.goals import Goal, gains, score
 from pdtui.dissection.monitor import Progress, Start
 from pdtui.dissection.probe import Effects, Prober, Sweep, bootstrap_interval
 from pdtui.policies.units import Stimulation
-from pdtui.robots.base import Floats
+from pdtui.robots.types import Floats
 from pdtui.stimulation.maps import Measured
 
 MAX_UNITS = 3

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pdtui.dissection.matching import Match
 from pdtui.dissection.probe import Sweep, bootstrap_interval
-from pdtui.robots.base import Floats
+from pdtui.robots.types import Floats
 from pdtui.stimulation.maps import Measured
 
 RARE = 0.9

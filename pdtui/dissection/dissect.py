@@ -20,7 +20,8 @@ from pdtui.dissection.probe import Prober, Sweep
 from pdtui.dissection.spectrum import Preset, find_preset
 from pdtui.dissection.workers import Crew
 from pdtui.errors import RobotError
-from pdtui.robots.base import Attribute, Robot
+from pdtui.robots.base import Robot
+from pdtui.robots.types import Attribute
 
 StageProgress = Callable[[str, int, int], None]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.dissection.probe import Effects
-from pdtui.robots.base import Attribute, Floats
+from pdtui.robots.types import Attribute, Floats
 from pdtui.stimulation.maps import Aim
 
 

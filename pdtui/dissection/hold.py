@@ -11,7 +11,7 @@ from pdtui.dissection.monitor import Start
 from pdtui.dissection.probe import Prober, Sweep
 from pdtui.dissection.rollout import Hold
 from pdtui.policies.units import NO_STIMULATION, Stimulation
-from pdtui.robots.base import Floats
+from pdtui.robots.types import Floats
 from pdtui.stimulation.maps import Pid
 
 _FALL = 1.0

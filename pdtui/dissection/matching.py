@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pdtui.dissection.monitor import Episode
 from pdtui.dissection.spectrum import Preset, spectrogram, transform
 from pdtui.errors import PolicyError
-from pdtui.robots.base import Attribute, Floats
+from pdtui.robots.types import Attribute, Floats
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from pdtui.errors import RobotError, SimulationDiverged
 from pdtui.policies.runtime import Policy
-from pdtui.robots.base import Attribute, Floats, Robot, RobotSnapshot
+from pdtui.robots.base import Robot
+from pdtui.robots.types import Attribute, Floats, RobotSnapshot
 
 Progress = Callable[[int, int], None]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pdtui.dissection.matching import usable
 from pdtui.dissection.monitor import Episode
 from pdtui.dissection.spectrum import Preset, spectrogram, transform
-from pdtui.robots.base import Attribute, Floats
+from pdtui.robots.types import Attribute, Floats
 
 DISAGREE = 0.1
 """Difference of the plain and the circular ρ from which both are reported."""

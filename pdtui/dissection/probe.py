@@ -14,7 +14,7 @@ from pdtui.dissection.monitor import Progress, Start
 from pdtui.dissection.rollout import Outcome, Plan
 from pdtui.dissection.workers import Crew, Job
 from pdtui.policies.units import NO_STIMULATION, Stimulation
-from pdtui.robots.base import Floats
+from pdtui.robots.types import Floats
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ from pdtui.dissection.monitor import Start
 from pdtui.errors import SimulationDiverged
 from pdtui.policies.runtime import Policy
 from pdtui.policies.units import NO_STIMULATION, Stimulation
-from pdtui.robots.base import Floats, Robot
+from pdtui.robots.base import Robot
+from pdtui.robots.types import Floats
 from pdtui.stimulation.magnitude import PidMagnitude, wrap
 from pdtui.stimulation.maps import Pid
 

@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from pdtui.errors import PdtuiError
-from pdtui.robots.base import Floats
+from pdtui.robots.types import Floats
 
 Complexes = NDArray[np.complex128]
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from pdtui.robots.base import Floats
+from pdtui.robots.types import Floats
 from pdtui.sessions.events import Event
 from pdtui.stimulation.maps import Behavior
 from pdtui.teleop.drive import build_loop

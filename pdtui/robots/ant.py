@@ -8,9 +8,9 @@ import numpy as np
 from gymnasium.envs.mujoco.ant_v5 import AntEnv
 from numpy.typing import NDArray
 
-from pdtui.robots.base import Attribute, Floats
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.mujoco import MujocoRobot, links_of
+from pdtui.robots.types import Attribute, Floats
 
 _LEGS = {"1": "front left", "2": "back left", "3": "back right", "4": "front right"}
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from pdtui.robots.base import Floats, Link
+    from pdtui.robots.types import Floats, Link
 
 
 def wrap_angle(angle: float) -> float:

@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 
 from pdtui.errors import RobotError, SimulationDiverged
-from pdtui.robots.base import Floats, Link, Robot, RobotSnapshot
+from pdtui.robots.base import Robot
+from pdtui.robots.types import Floats, Link, RobotSnapshot
 
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _SHAPES = {

@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import ComponentSourceKind, TextLogColumnKind, VisualizerComponentMapping
 
-from pdtui.robots.base import Attribute
+from pdtui.robots.types import Attribute
 from pdtui.sessions.curves import PALETTE
 from pdtui.sessions.record import DriveInfo
 from pdtui.sessions.schema import (

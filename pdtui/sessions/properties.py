@@ -9,7 +9,7 @@ from dataclasses import asdict
 from typing import Any, TypeVar
 
 from pdtui.errors import SessionError
-from pdtui.robots.base import Attribute, Link
+from pdtui.robots.types import Attribute, Link
 from pdtui.sessions.record import DriveInfo
 from pdtui.sessions.schema import SCHEMA
 

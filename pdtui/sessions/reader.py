@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pdtui.errors import SessionError
 from pdtui.policies.units import Stimulation
-from pdtui.robots.base import Floats
+from pdtui.robots.types import Floats
 from pdtui.sessions.chunks import Rows, SessionFile
 from pdtui.sessions.events import Event, EventKind
 from pdtui.sessions.properties import info_from_properties

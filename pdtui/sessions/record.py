@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.policies.units import Stimulation
-from pdtui.robots.base import Attribute, Floats, Link
+from pdtui.robots.types import Attribute, Floats, Link
 from pdtui.sessions.events import Event
 from pdtui.stimulation.latch import ActiveBehavior
 

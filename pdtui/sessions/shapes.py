@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from pdtui.robots.base import Floats, Link
 from pdtui.robots.geometry import capsule_ends, place_links
+from pdtui.robots.types import Floats, Link
 from pdtui.sessions.columns import Column, vectors
 
 _COLOR = (214, 137, 76)

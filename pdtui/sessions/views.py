@@ -12,7 +12,7 @@ import numpy as np
 import rerun as rr
 
 from pdtui.policies.units import format_unit
-from pdtui.robots.base import Floats
+from pdtui.robots.types import Floats
 from pdtui.sessions.columns import rows, texts, vectors
 from pdtui.sessions.curves import PALETTE, Curves, HeatMap, LogStatic, Send
 from pdtui.sessions.record import DriveInfo, StepRecord

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pdtui.errors import EventError
 from pdtui.policies.units import Stimulation, parse_unit
-from pdtui.robots.base import Attribute, Floats
+from pdtui.robots.types import Attribute, Floats
 from pdtui.stimulation.magnitude import PidMagnitude
 from pdtui.stimulation.maps import Behavior, StimulationMap
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from pdtui.errors import EventError, SimulationDiverged
 from pdtui.policies.runtime import Policy
-from pdtui.robots.base import Floats, Robot, RobotSnapshot
+from pdtui.robots.base import Robot
+from pdtui.robots.types import Floats, RobotSnapshot
 from pdtui.sessions.events import Event
 from pdtui.sessions.record import DriveInfo, StepRecord
 from pdtui.stimulation.latch import Latch

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from pdtui.robots.base import Attribute, Floats, Link
+    from pdtui.robots.types import Attribute, Floats, Link
     from pdtui.stimulation.latch import ActiveBehavior
 
 

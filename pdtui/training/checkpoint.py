@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,51 +14,62 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from pdtui.errors import TrainingError
-from pdtui.robots.base import RobotSnapshot
-from pdtui.training.replay import ReplayBuffer
-from pdtui.training.sac import LearnerState
+from pdtui.robots.types import RobotSnapshot
 from pdtui.training.worlds import Worlds, WorldsState
 
 _KEY = "pdtui-training"
+Arrays = dict[str, NDArray[Any]]
 
 
 def save_checkpoint(
     path: Path,
-    learner: LearnerState,
-    replay: ReplayBuffer,
-    worlds: Worlds,
+    learner: Any,
+    worlds: Sequence[Worlds],
     rng: np.random.Generator,
     progress: dict[str, Any],
+    memory: Arrays,
 ) -> None:
-    """Write all that a later `load_checkpoint` needs to go on bit for bit."""
-    state = worlds.state()
-    arrays: dict[str, NDArray[Any]] = {
+    """Write all that a later `load_checkpoint` needs to go on bit for bit.
+
+    Args:
+        path: of the file.
+        learner: a tree of arrays.
+        worlds: groups of robots.
+        rng: of the run.
+        progress: what else the run remembers, JSON-able.
+        memory: further arrays by name, such as a replay buffer.
+    """
+    arrays: Arrays = {
         f"learner.{index}": np.asarray(leaf) for index, leaf in enumerate(jax.tree.leaves(learner))
     }
-    arrays |= replay.export()
-    arrays["worlds.state"] = np.array([snapshot.state for snapshot in state.snapshots])
-    for index, snapshot in enumerate(state.snapshots):
-        arrays |= {f"worlds.{index}.extra.{k}": extra for k, extra in enumerate(snapshot.extras)}
-    record = {
-        "progress": progress,
-        "count": replay.count,
-        "rng": rng.bit_generator.state,
-        "ages": state.ages,
-        "robot": state.snapshots[0].robot,
-        "world_rng": [snapshot.rng for snapshot in state.snapshots],
-    }
+    arrays |= {f"memory.{name}": array for name, array in memory.items()}
+    groups = []
+    for number, group in enumerate(worlds):
+        state = group.state()
+        arrays[f"worlds.{number}"] = np.array([snapshot.state for snapshot in state.snapshots])
+        for index, snapshot in enumerate(state.snapshots):
+            extras = {f"worlds.{number}.{index}.{k}": extra for k, extra in enumerate(snapshot.extras)}
+            arrays |= extras
+        groups.append(
+            {
+                "robot": state.snapshots[0].robot,
+                "ages": state.ages,
+                "rng": [dict(snapshot.rng) for snapshot in state.snapshots],
+            }
+        )
+    record = {"progress": progress, "rng": rng.bit_generator.state, "worlds": groups}
     partial = path.with_name(path.name + ".part")
     save_file(arrays, partial, metadata={_KEY: json.dumps(record)})
     partial.replace(path)
 
 
 def load_checkpoint(
-    path: Path, learner: LearnerState, replay: ReplayBuffer, worlds: Worlds, rng: np.random.Generator
-) -> tuple[LearnerState, dict[str, Any]]:
-    """Fill replay, worlds and rng, and return the learner's state and the progress.
+    path: Path, learner: Any, worlds: Sequence[Worlds], rng: np.random.Generator
+) -> tuple[Any, dict[str, Any], Arrays]:
+    """Fill worlds and rng; return the learner's state, the progress and the further arrays.
 
     Raises:
-        TrainingError: the file is not a checkpoint of this robot and these settings.
+        TrainingError: the file is not a checkpoint of this run's settings.
     """
     try:
         with safe_open(str(path), framework="numpy") as handle:
@@ -73,12 +85,16 @@ def load_checkpoint(
                 f"{path}: array {index} of the learner: expected shape {leaf.shape}, "
                 f"found {None if new is None else new.shape}; was it made with other settings?"
             )
-    replay.load(arrays, int(record["count"]))
+    for number, (group, kept) in enumerate(zip(worlds, record["worlds"], strict=True)):
+        snapshots = []
+        for index, world_rng in enumerate(kept["rng"]):
+            prefix = f"worlds.{number}.{index}."
+            extras = tuple(arrays[name] for name in sorted(arrays) if name.startswith(prefix))
+            state = arrays[f"worlds.{number}"][index]
+            snapshots.append(RobotSnapshot(kept["robot"], state, extras, world_rng))
+        group.restore(WorldsState(snapshots, kept["ages"]))
     rng.bit_generator.state = record["rng"]
-    snapshots = []
-    for index, world_rng in enumerate(record["world_rng"]):
-        prefix = f"worlds.{index}.extra."
-        extras = tuple(arrays[name] for name in sorted(arrays) if name.startswith(prefix))
-        snapshots.append(RobotSnapshot(record["robot"], arrays["worlds.state"][index], extras, world_rng))
-    worlds.restore(WorldsState(snapshots, record["ages"]))
-    return jax.tree.unflatten(tree, [jax.numpy.asarray(new) for new in saved]), record["progress"]
+    memory = {
+        name.removeprefix("memory."): array for name, array in arrays.items() if name.startswith("memory.")
+    }
+    return jax.tree.unflatten(tree, [jax.numpy.asarray(new) for new in saved]), record["progress"], memory

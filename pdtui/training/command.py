@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from pdtui.errors import TrainingError
 from pdtui.robots import check_robot
@@ -12,6 +13,7 @@ from pdtui.robots import check_robot
 
 def train_policy(
     robot: str,
+    algorithm: str,
     seed: int,
     steps: int | None,
     learning_rate: float | None,
@@ -27,17 +29,21 @@ def train_policy(
     """
     check_robot(robot)
     try:
-        from pdtui.training.run import Trainer, TrainingReport
+        from pdtui.training.ppo import PpoConfig
+        from pdtui.training.ppo_run import PpoRun
+        from pdtui.training.run import Run, TrainingReport
         from pdtui.training.sac import SacConfig
+        from pdtui.training.sac_run import SacRun
     except ImportError as error:
         raise TrainingError(f"training needs the extra: pip install 'pdtui[train]' ({error})") from error
-    config = SacConfig()
+    changes: dict[str, Any] = {}
     if steps is not None:
-        config = replace(config, total_steps=steps)
+        changes["total_steps"] = steps
     if learning_rate is not None:
-        config = replace(config, learning_rate=learning_rate)
+        changes["learning_rate"] = learning_rate
+    config = replace(PpoConfig() if algorithm == "ppo" else SacConfig(), **changes)
     command = (
-        f"pdtui train {robot} --seed {seed} --steps {config.total_steps} "
+        f"pdtui train {robot} --algorithm {algorithm} --seed {seed} --steps {config.total_steps} "
         f"--learning-rate {config.learning_rate:g} --forward {forward}"
     )
 
@@ -47,4 +53,9 @@ def train_policy(
             note = f"best return {best.mean_return:.0f}, {best.mean_speed:.2f} m/s" if best else ""
             progress(state.steps, state.total_steps, note)
 
-    return Trainer(robot, seed, folder, config, command, forward=forward).run(report)
+    run: Run
+    if isinstance(config, PpoConfig):
+        run = PpoRun(robot, seed, folder, config, command, forward=forward)
+    else:
+        run = SacRun(robot, seed, folder, config, command, forward=forward)
+    return run.run(report)

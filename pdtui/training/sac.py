@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 import optax
 
-Params = list[dict[str, jax.Array]]
+from pdtui.training.mlp import Params, init_mlp, tanh_mlp
 
 
 @dataclass(frozen=True)
@@ -33,6 +31,7 @@ class SacConfig:
     final_rate: float = 0.1
     discount: float = 0.99
     tau: float = 0.005
+    average_rate: float = 0.0005
     random_steps: int = 10_000
     capacity: int = 1_000_000
     evaluate_every: int = 100_000
@@ -51,6 +50,8 @@ class LearnerState(NamedTuple):
     critic_opt: Any
     alpha_opt: Any
     key: jax.Array
+    average: Params
+    """Moving average of the actor: it walks more steadily than any single actor, so it is what is kept."""
 
 
 class Batch(NamedTuple):
@@ -63,27 +64,9 @@ class Batch(NamedTuple):
     following: Any
 
 
-def _init_mlp(key: jax.Array, widths: tuple[int, ...], layer_norm: bool) -> Params:
-    layers = []
-    for fan_in, fan_out in pairwise(widths):
-        key, sub_key = jax.random.split(key)
-        bound = 1.0 / np.sqrt(fan_in)
-        layer = {
-            "w": jax.random.uniform(sub_key, (fan_in, fan_out), minval=-bound, maxval=bound),
-            "b": jnp.zeros(fan_out),
-        }
-        if layer_norm:
-            layer |= {"scale": jnp.ones(fan_out), "shift": jnp.zeros(fan_out)}
-        layers.append(layer)
-    return layers
-
-
 def actor_forward(params: Params, observation: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Mean and log standard deviation before squashing, each (..., actions)."""
-    x = observation
-    for layer in params[:-1]:
-        x = jnp.tanh(x @ layer["w"] + layer["b"])
-    mean, log_std = jnp.split(x @ params[-1]["w"] + params[-1]["b"], 2, axis=-1)
+    mean, log_std = jnp.split(tanh_mlp(params, observation), 2, axis=-1)
     return mean, jnp.clip(log_std, -5.0, 2.0)
 
 
@@ -131,9 +114,9 @@ class SacLearner:
         """The untrained state."""
         config = self.config
         key, actor_key, *critic_keys = jax.random.split(jax.random.PRNGKey(seed), 4)
-        actor = _init_mlp(actor_key, (self.observations, *config.layers, 2 * self.actions), False)
+        actor = init_mlp(actor_key, (self.observations, *config.layers, 2 * self.actions), False)
         widths = (self.observations + self.actions, *config.layers, 1)
-        critics = jax.vmap(partial(_init_mlp, widths=widths, layer_norm=True))(jnp.stack(critic_keys))
+        critics = jax.vmap(partial(init_mlp, widths=widths, layer_norm=True))(jnp.stack(critic_keys))
         log_alpha = jnp.zeros(())
         return LearnerState(
             actor,
@@ -144,6 +127,7 @@ class SacLearner:
             self._critic_tx.init(critics),
             self._alpha_tx.init(log_alpha),
             key,
+            jax.tree.map(jnp.copy, actor),
         )
 
     def _critic_step(self, state: LearnerState, batch: Batch) -> LearnerState:
@@ -177,8 +161,11 @@ class SacLearner:
         changes, actor_opt = self._actor_tx.update(gradient, state.actor_opt)
         excess = -(log_prob - self.actions)
         alpha_changes, alpha_opt = self._alpha_tx.update(excess, state.alpha_opt)
+        actor = optax.apply_updates(state.actor, changes)
+        rate = self.config.average_rate
         return state._replace(
-            actor=optax.apply_updates(state.actor, changes),
+            actor=actor,
+            average=jax.tree.map(lambda old, new: old + rate * (new - old), state.average, actor),
             actor_opt=actor_opt,
             log_alpha=optax.apply_updates(state.log_alpha, alpha_changes),
             alpha_opt=alpha_opt,

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.errors import SimulationDiverged
-from pdtui.robots.base import Robot, RobotSnapshot
+from pdtui.robots.base import Robot
+from pdtui.robots.types import RobotSnapshot
 from pdtui.training.sac import Batch
 
 TIME_LIMIT = 1000
@@ -30,6 +31,7 @@ class Worlds:
     def __init__(self, make: Callable[[], Robot], count: int, seed: int) -> None:
         self.robots = [make() for _ in range(count)]
         self.ages = [0] * count
+        self.restarted = np.zeros(count, bool)
         start = [robot.reset(seed=seed * 1_000_003 + index)[0] for index, robot in enumerate(self.robots)]
         self.observations = np.array(start, np.float32)
 
@@ -44,7 +46,8 @@ class Worlds:
                 observation, gained, terminated = before[index].astype(np.float64), 0.0, True
             self.ages[index] += 1
             after[index], reward[index], discount[index] = observation, float(gained), float(not terminated)
-            if terminated or self.ages[index] >= TIME_LIMIT:
+            self.restarted[index] = terminated or self.ages[index] >= TIME_LIMIT
+            if self.restarted[index]:
                 observation, self.ages[index] = robot.reset()[0], 0
             self.observations[index] = observation
         return Batch(before, actions, reward.astype(np.float32), discount.astype(np.float32), after)

@@ -7,7 +7,7 @@ from pdtui.dissection.matching import match
 from pdtui.dissection.monitor import Episode
 from pdtui.dissection.spectrum import PRESETS, Preset, spectrogram, transform
 from pdtui.errors import PolicyError
-from pdtui.robots.base import Attribute
+from pdtui.robots.types import Attribute
 
 ATTRIBUTES = (Attribute("speed", "m/s"), Attribute("torque", "N m", scale=0.1))
 

@@ -6,7 +6,7 @@ import pytest
 from pdtui.dissection.monitor import Episode
 from pdtui.dissection.phase import correlate, correlation
 from pdtui.dissection.spectrum import PRESETS, Preset
-from pdtui.robots.base import Attribute
+from pdtui.robots.types import Attribute
 
 SPEED = (Attribute("speed", "m/s"),)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pdtui.robots.base import Link
+from pdtui.robots.types import Link
 from pdtui.sessions.shapes import Shapes
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pdtui.errors import EventError
-from pdtui.robots.base import Attribute
+from pdtui.robots.types import Attribute
 from pdtui.stimulation.latch import Latch
 from pdtui.stimulation.magnitude import PidMagnitude
 from pdtui.stimulation.maps import Pid, StimulationMap

@@ -15,10 +15,23 @@ from pdtui.policies.files import load_network
 pytest.importorskip("jax", reason="the extra 'train' is not installed")
 
 from pdtui.policies.load import load_policy
+from pdtui.training.ppo import PpoConfig
+from pdtui.training.ppo_run import PpoRun
 from pdtui.training.replay import ReplayBuffer
-from pdtui.training.run import Trainer, TrainingReport
+from pdtui.training.run import Run, TrainingReport
 from pdtui.training.sac import Batch, SacConfig, SacLearner, actor_forward
+from pdtui.training.sac_run import SacRun
 
+SMALL_PPO = PpoConfig(
+    total_steps=640,
+    worlds=4,
+    chunk=16,
+    minibatch=32,
+    layers=(8, 8),
+    evaluate_every=320,
+    evaluate_episodes=2,
+    evaluate_steps=20,
+)
 SMALL = SacConfig(
     total_steps=640,
     worlds=4,
@@ -33,12 +46,18 @@ SMALL = SacConfig(
 )
 
 
-def _train(folder: Path, config: SacConfig = SMALL, stop_at: int | None = None) -> Path:
+def _make(folder: Path, config: SacConfig | PpoConfig) -> Run:
+    if isinstance(config, PpoConfig):
+        return PpoRun("ant", 3, folder, config, "pdtui train ant --seed 3")
+    return SacRun("ant", 3, folder, config, "pdtui train ant --seed 3")
+
+
+def _train(folder: Path, config: SacConfig | PpoConfig = SMALL, stop_at: int | None = None) -> Path:
     def report(state: TrainingReport) -> None:
         if stop_at is not None and state.score is not None and state.steps >= stop_at:
             raise KeyboardInterrupt
 
-    trainer = Trainer("ant", 3, folder, config, "pdtui train ant --seed 3")
+    trainer = _make(folder, config)
     if stop_at is None:
         return trainer.run(report)
     with pytest.raises(KeyboardInterrupt):
@@ -46,10 +65,13 @@ def _train(folder: Path, config: SacConfig = SMALL, stop_at: int | None = None) 
     return trainer.best_weights
 
 
-def test_a_run_that_was_cut_off_ends_as_one_that_was_not(tmp_path: Path) -> None:
-    whole = load_network(_train(tmp_path / "whole"))
-    _train(tmp_path / "cut", stop_at=320)
-    resumed = load_network(_train(tmp_path / "cut"))
+@pytest.mark.parametrize("config", [SMALL, SMALL_PPO], ids=["sac", "ppo"])
+def test_a_run_that_was_cut_off_ends_as_one_that_was_not(
+    tmp_path: Path, config: SacConfig | PpoConfig
+) -> None:
+    whole = load_network(_train(tmp_path / "whole", config))
+    _train(tmp_path / "cut", config, stop_at=320)
+    resumed = load_network(_train(tmp_path / "cut", config))
     assert whole.spec == resumed.spec
     for name, tensor in whole.state_dict().items():
         assert torch.equal(tensor, resumed.state_dict()[name])
@@ -69,10 +91,10 @@ def test_the_weights_drive_and_say_how_they_came_about(tmp_path: Path) -> None:
 def test_a_checkpoint_of_other_settings_is_refused(tmp_path: Path) -> None:
     _train(tmp_path, stop_at=320)
     with pytest.raises(TrainingError, match="expected shape .* was it made with other settings"):
-        Trainer("ant", 3, tmp_path, replace(SMALL, layers=(4, 4)), "")
+        _make(tmp_path, replace(SMALL, layers=(4, 4)))
     (tmp_path / "checkpoint.safetensors").write_bytes(b"torn")
     with pytest.raises(TrainingError, match="expected a checkpoint of `pdtui train`"):
-        Trainer("ant", 3, tmp_path, SMALL, "")
+        _make(tmp_path, SMALL)
 
 
 def test_sac_solves_a_bandit() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pdtui.robots.base import Attribute, Link
+from pdtui.robots.types import Attribute, Link
 from pdtui.stimulation.latch import ActiveBehavior
 from pdtui.stimulation.maps import Aim, Behavior, Pid, Primitive, StimulationMap
 from pdtui.teleop.snapshot import Briefing, Snapshot, UnitView

@@ -1,0 +1,65 @@
+"""Collecting for PPO: many worlds, stepped by two threads, since MuJoCo lets go of Python while it steps."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, ClassVar
+
+import jax
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.training.mlp import Params
+from pdtui.training.ppo import PpoConfig, PpoLearner, PpoState, Rollout, act
+from pdtui.training.run import Run
+from pdtui.training.worlds import Worlds
+
+THREADS = 2
+
+
+class PpoRun(Run):
+    """A run of PPO; see `Run`."""
+
+    algorithm: ClassVar[str] = "ppo"
+
+    def __init__(
+        self, robot: str, seed: int, folder: Path, config: PpoConfig, command: str, **robot_options: Any
+    ) -> None:
+        self.config = config
+        super().__init__(robot, seed, folder, config, command, **robot_options)
+
+    def build(self) -> None:
+        share = self.config.worlds // THREADS
+        self.worlds = [Worlds(self.make, share, self.seed * 10 + 1 + n) for n in range(THREADS)]
+        self.learner = PpoLearner(self.config, self.observations, self.actions)
+        self.state = self.learner.init(self.seed)
+        self._threads = ThreadPoolExecutor(THREADS)
+
+    def advance(self) -> int:
+        on_host: PpoState = jax.tree.map(np.asarray, self.state)
+        rows = [self._collect(on_host) for _ in range(self.config.chunk)]
+        rollout = Rollout(*(np.stack(column) for column in zip(*rows, strict=True)))
+        self.state, _ = self.learner.update(self.state, rollout)
+        return self.config.worlds * self.config.chunk
+
+    def kept_actor(self) -> Params:
+        return self.learner.folded_actor(self.state)
+
+    def _collect(self, state: PpoState) -> Rollout:
+        observation = np.concatenate([group.observations for group in self.worlds])
+        action = act(state, observation, self.rng)
+        shares = np.split(self.to_robot(np.tanh(action)), THREADS)
+        rows = list(self._threads.map(_step, self.worlds, shares))
+
+        def joined(column: str) -> NDArray[np.float32]:
+            return np.concatenate([getattr(row, column) for row in rows])
+
+        restarted = np.concatenate([group.restarted for group in self.worlds]).astype(np.float32)
+        return Rollout(
+            observation, action, joined("reward"), joined("discount"), joined("following"), restarted
+        )
+
+
+def _step(group: Worlds, actions: NDArray[np.float32]) -> Any:
+    return group.step(actions)
