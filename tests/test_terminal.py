@@ -47,6 +47,11 @@ def screen(map_path: Path, session: Path) -> Iterator[pexpect.spawn[str]]:
     child.close(force=True)
 
 
+def _pid(screen: pexpect.spawn[str]) -> int:
+    assert screen.pid is not None
+    return screen.pid
+
+
 def _drive_a_little(screen: pexpect.spawn[str], session: Path) -> None:
     """Press a behavior's key once the simulation runs, and wait until it is recorded."""
     deadline = time.monotonic() + PATIENCE
@@ -87,7 +92,7 @@ def test_a_closed_terminal_leaves_a_whole_session(
     screen: pexpect.spawn[str], session: Path, number: signal.Signals
 ) -> None:
     _drive_a_little(screen, session)
-    os.killpg(os.getpgid(screen.pid), number)
+    os.killpg(os.getpgid(_pid(screen)), number)
     deadline = time.monotonic() + PATIENCE
     while screen.isalive() and time.monotonic() < deadline:
         screen.expect([pexpect.TIMEOUT, pexpect.EOF], timeout=0.5)
@@ -98,7 +103,7 @@ def test_a_closed_terminal_leaves_a_whole_session(
 
 def test_a_killed_screen_leaves_a_whole_session(screen: pexpect.spawn[str], session: Path) -> None:
     _drive_a_little(screen, session)
-    os.kill(screen.pid, signal.SIGKILL)
+    os.kill(_pid(screen), signal.SIGKILL)
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         recorded = read_session(session)

@@ -21,12 +21,14 @@ class ReplayResult:
     Attributes:
         steps: control steps that were compared.
         first_difference: the first control step whose digest differs; None if none does.
-        detail: what differs in that step.
+        change: by how much the attribute that differs most does so in that step, in its unit.
+        detail: that attribute and its change, in words.
         environment: how machine and versions differ from the session's.
     """
 
     steps: int
     first_difference: int | None
+    change: float
     detail: str
     environment: tuple[str, ...]
 
@@ -77,7 +79,7 @@ def replay_session(
             worst = int(change.argmax())
             attribute = session.info.attributes[worst]
             detail = f"{attribute.name} is off by {change[worst]:.3g} {attribute.unit}"
-            return ReplayResult(step + 1, step, detail, environment)
+            return ReplayResult(step + 1, step, float(change[worst]), detail, environment)
         if progress is not None:
             progress(step + 1, session.steps)
-    return ReplayResult(session.steps, None, "", environment)
+    return ReplayResult(session.steps, None, 0.0, "", environment)

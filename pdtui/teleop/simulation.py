@@ -21,7 +21,7 @@ from pdtui.teleop.pacing import Pacer
 from pdtui.teleop.snapshot import Briefing
 
 _IDLE = 0.05
-PACED_ROWS_PER_WRITE = 3
+PACED_ROWS_PER_WRITE = 4
 
 
 class Simulation:

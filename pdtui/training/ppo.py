@@ -21,9 +21,12 @@ from pdtui.training.mlp import Params, init_mlp, tanh_mlp
 
 @dataclass(frozen=True)
 class PpoConfig:
-    """Hyper-parameters; `total_steps` counts control steps over all worlds."""
+    """Hyper-parameters; `total_steps` counts control steps over all worlds.
 
-    total_steps: int = 6_000_000
+    The divergence aimed at falls linearly to `final_divergence` of itself.
+    """
+
+    total_steps: int = 1_600_000
     worlds: int = 64
     chunk: int = 32
     epochs: int = 4
@@ -31,13 +34,15 @@ class PpoConfig:
     layers: tuple[int, ...] = (256, 256)
     learning_rate: float = 3e-4
     divergence: float = 0.012
+    final_divergence: float = 0.2
+    average_rate: float = 0.002
     clip: float = 0.2
     discount: float = 0.99
     gae: float = 0.95
     entropy: float = 0.001
     log_std: float = -0.5
     reward_scale: float = 0.02
-    evaluate_every: int = 250_000
+    evaluate_every: int = 200_000
     evaluate_episodes: int = 32
     evaluate_steps: int = 1000
 
@@ -53,7 +58,10 @@ class PpoState(NamedTuple):
     key: jax.Array
     mean: jax.Array
     variance: jax.Array
-    count: jax.Array
+    rows_seen: jax.Array
+    iterations: jax.Array
+    average: Params
+    """Moving average of the actor: it walks more steadily than any single actor, so it is what is kept."""
 
 
 class Rollout(NamedTuple):
@@ -111,17 +119,19 @@ class PpoLearner:
             jnp.zeros(self.observations),
             jnp.ones(self.observations),
             jnp.asarray(1e-4),
+            jnp.zeros(()),
+            jax.tree.map(jnp.copy, actor),
         )
 
     def folded_actor(self, state: PpoState) -> Params:
         """The actor on raw observations, with log standard deviations as constant outputs."""
         deviation = jnp.sqrt(state.variance + 1e-8)
-        first = state.actor[0]
+        first = state.average[0]
         weight = first["w"] / deviation[:, None]
-        head = state.actor[-1]
+        head = state.average[-1]
         return [
             {"w": weight, "b": first["b"] - state.mean @ weight},
-            *state.actor[1:-1],
+            *state.average[1:-1],
             {
                 "w": jnp.concatenate([head["w"], jnp.zeros_like(head["w"])], axis=1),
                 "b": jnp.concatenate([head["b"], state.log_std]),
@@ -144,20 +154,20 @@ class PpoLearner:
             return jax.lax.scan(self._step, state._replace(key=key), shuffled)
 
         state, divergences = jax.lax.scan(epoch, state, None, length=self.config.epochs)
-        return state, divergences.mean()
+        return state._replace(iterations=state.iterations + 1), divergences.mean()
 
     def _observe(self, state: PpoState, rows: jax.Array) -> PpoState:
         """Merge a batch into the running mean and variance (Chan et al. 1979)."""
         mean, variance, count = rows.mean(0), rows.var(0), rows.shape[0]
-        total = state.count + count
+        total = state.rows_seen + count
         delta = mean - state.mean
         merged = (
-            state.variance * state.count + variance * count + delta**2 * state.count * count / total
+            state.variance * state.rows_seen + variance * count + delta**2 * state.rows_seen * count / total
         ) / total
         return state._replace(
             mean=state.mean + delta * count / total,
             variance=merged,
-            count=jnp.minimum(total, 2_000_000.0),
+            rows_seen=jnp.minimum(total, 2_000_000.0),
         )
 
     def _samples(self, state: PpoState, rollout: Rollout) -> _Sample:
@@ -210,15 +220,19 @@ class PpoLearner:
         changes, optimiser = self._tx.update(gradient, state.optimiser)
         changes = jax.tree.map(lambda change: -state.rate * change, changes)
         actor, log_std, critic = optax.apply_updates(parameters, changes)
-        rate = jnp.where(divergence > 2.0 * config.divergence, state.rate / 1.05, state.rate)
-        rate = jnp.where(divergence < 0.5 * config.divergence, rate * 1.05, rate)
+        share = state.iterations * config.worlds * config.chunk / config.total_steps
+        aim = config.divergence * (1.0 - (1.0 - config.final_divergence) * jnp.minimum(share, 1.0))
+        rate = jnp.where(divergence > 1.5 * aim, state.rate / 1.05, state.rate)
+        rate = jnp.where(divergence < aim / 1.5, rate * 1.05, rate)
+        average = jax.tree.map(lambda old, new: old + config.average_rate * (new - old), state.average, actor)
         return (
             state._replace(
                 actor=actor,
                 log_std=jnp.clip(log_std, -3.0, 0.5),
                 critic=critic,
                 optimiser=optimiser,
-                rate=jnp.clip(rate, 1e-5, 2e-3),
+                rate=jnp.clip(rate, 1e-6, 2e-3),
+                average=average,
             ),
             divergence,
         )

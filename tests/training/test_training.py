@@ -46,6 +46,15 @@ SMALL = SacConfig(
 )
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _compile_once(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Runs of the same settings share what XLA compiled."""
+    import jax
+
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path_factory.mktemp("xla")))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+
+
 def _make(folder: Path, config: SacConfig | PpoConfig) -> Run:
     if isinstance(config, PpoConfig):
         return PpoRun("ant", 3, folder, config, "pdtui train ant --seed 3")

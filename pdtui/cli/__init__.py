@@ -1,0 +1,29 @@
+"""The commands; each calls a room and prints what it says.
+
+Heavy libraries load only where a command needs them.
+"""
+
+from __future__ import annotations
+
+import click
+
+from pdtui import __version__
+from pdtui.cli.common import OneLineErrors
+from pdtui.cli.driving import drive, pick_and_drive, replay
+from pdtui.cli.measuring import bench, dissect, evaluate, train
+
+
+@click.group(cls=OneLineErrors, invoke_without_command=True)
+@click.version_option(__version__)
+@click.pass_context
+def main(ctx: click.Context) -> None:
+    """Drive a trained neural controller by stimulating its hidden units.
+
+    Without a command, pick a robot and a map and drive.
+    """
+    if ctx.invoked_subcommand is None:
+        pick_and_drive()
+
+
+for command in (drive, replay, evaluate, dissect, train, bench):
+    main.add_command(command)

@@ -1,0 +1,94 @@
+"""What the commands share: options, the drive that they ask for, progress and output."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pdtui.errors import PdtuiError
+
+if TYPE_CHECKING:
+    from pdtui.teleop.order import DriveOrder
+
+
+class OneLineErrors(click.Group):
+    """Prints a `PdtuiError` as one line and exits with 1; a traceback is for bugs."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except PdtuiError as error:
+            click.echo(f"pdtui: {error}", err=True)
+            ctx.exit(1)
+
+
+class Seeds(click.ParamType[range]):
+    name = "FIRST-LAST"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
+        if isinstance(value, range):
+            return value
+        match = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}))?", str(value))
+        if match is None or int(match[2] or match[1]) < int(match[1]):
+            self.fail(f"'{value}': expected seeds such as 7 or 100-119", param, ctx)
+        return range(int(match[1]), int(match[2] or match[1]) + 1)
+
+
+map_option = click.option(
+    "--map", "map_name", metavar="MAP", help="A map by name or file; default: the robot's."
+)
+policy_option = click.option("--policy", default="", help="Weights to use instead of the map's.")
+force_option = click.option(
+    "--force", is_flag=True, help="Use the map although it was made for another policy."
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+workers_option = click.option(
+    "--workers", type=click.IntRange(1, 256), default=None, help="Processes; default: one a core."
+)
+
+
+def order_of_drive(
+    robot: str, map_name: str | None, policy: str, *, seed: int = 0, **options: Any
+) -> DriveOrder:
+    from pdtui.robots import check_robot
+    from pdtui.stimulation.library import find_map
+    from pdtui.stimulation.mapfile import load_map
+    from pdtui.teleop.order import DriveOrder
+
+    if map_name is None and robot.endswith(".toml"):
+        stimulation_map = load_map(find_map(robot))
+        robot = stimulation_map.robot
+    else:
+        check_robot(robot)
+        stimulation_map = load_map(find_map(map_name or robot))
+    return DriveOrder(check_robot(robot), stimulation_map, seed, policy, **options)
+
+
+def cores(workers: int | None) -> int:
+    return workers or os.cpu_count() or 1
+
+
+def show_result(data: dict[str, Any], as_json: bool, table: Callable[[], Any]) -> None:
+    if as_json:
+        click.echo(json.dumps(data, indent=2))
+        return
+    from rich.console import Console
+
+    Console().print(table())
+
+
+def progress_bar_or_none(
+    label: str, quiet: bool = False
+) -> AbstractContextManager[Callable[..., None] | None]:
+    """A progress bar with time left, on standard error; its value is called with done, total, note."""
+    if quiet:
+        return nullcontext(None)
+    from pdtui.progress import progress_bar
+
+    return progress_bar(label)

@@ -1,0 +1,147 @@
+"""Commands that drive: on the screen, without one, and again from a session."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pdtui.cli.common import force_option, map_option, order_of_drive, policy_option, progress_bar_or_none
+from pdtui.errors import EventError, ScreenError
+
+if TYPE_CHECKING:
+    from pdtui.teleop.order import DriveOrder
+
+
+@click.command()
+@click.argument("robot")
+@map_option
+@policy_option
+@force_option
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True)
+@click.option(
+    "--stochastic", is_flag=True, help="Draw actions from the policy's distribution instead of its mean."
+)
+@click.option(
+    "--record", type=click.Path(path_type=Path), help="Session file; default: a new one in ./sessions."
+)
+@click.option("--no-record", is_flag=True, help="Do not record.")
+@click.option("--fps", type=click.IntRange(1, 60), default=12, show_default=True, help="Frames a second.")
+@click.option("--headless", is_flag=True, help="No screen: drive from --keys, as fast as it goes.")
+@click.option("--keys", type=click.Path(path_type=Path), help="Keystrokes to drive from: lines 'STEP KEY'.")
+@click.option(
+    "--steps", type=click.IntRange(1), default=1000, show_default=True, help="Control steps, with --headless."
+)
+def drive(
+    robot: str,
+    map_name: str | None,
+    policy: str,
+    force: bool,
+    seed: int,
+    stochastic: bool,
+    record: Path | None,
+    no_record: bool,
+    fps: int,
+    headless: bool,
+    keys: Path | None,
+    steps: int,
+) -> None:
+    """Drive ROBOT with its map's keys; ROBOT may be a map's file, too."""
+    order = order_of_drive(robot, map_name, policy, force=force, seed=seed, stochastic=stochastic)
+    if keys is not None and not headless:
+        raise EventError("--keys needs --headless; on the screen, you press them")
+    if headless:
+        _drive_headless(order, keys, steps, record)
+    else:
+        path = None if no_record else record or _new_session(order)
+        _drive_on_screen(order, path, fps)
+
+
+@click.command()
+@click.argument("session", type=click.Path(path_type=Path))
+@click.option("--watch", is_flag=True, help="Show it on the screen.")
+@click.option("--policy", default="", help="The session's weights, where they are elsewhere now.")
+def replay(session: Path, watch: bool, policy: str) -> None:
+    """Run SESSION again and compare every step; exit with 1 at the first that differs."""
+    from pdtui.teleop.replay import order_of, replay_session
+
+    if watch:
+        from pdtui.sessions.reader import read_session
+
+        _show(order_of(read_session(session), str(session), policy), fps=12, watching=True)
+        return
+    with progress_bar_or_none("replaying") as advance:
+        result = replay_session(session, policy=policy, progress=advance)
+    if result.first_difference is None:
+        click.echo(f"identical: {result.steps} steps")
+        return
+    click.echo(f"differs: step {result.first_difference} of {session}: {result.detail}", err=True)
+    for line in result.environment:
+        click.echo(f"  {line}", err=True)
+    sys.exit(1)
+
+
+def _new_session(order: DriveOrder) -> Path:
+    return Path("sessions") / f"{order.robot}-{datetime.now():%Y%m%d-%H%M%S}-seed{order.seed}.rrd"
+
+
+def _drive_headless(order: DriveOrder, keys: Path | None, steps: int, record: Path | None) -> None:
+    from pdtui.sessions.recorder import SessionRecorder
+    from pdtui.teleop.drive import build_loop, drive_headless
+    from pdtui.teleop.keys import read_keystrokes
+
+    presses = read_keystrokes(keys, order.stimulation_map) if keys is not None else {}
+    loop = build_loop(order)
+    recorder = SessionRecorder(record, loop.info) if record is not None else None
+    summary = drive_headless(loop, presses, steps, recorder)
+    click.echo(
+        f"{summary.steps} steps, {summary.seconds:g} s simulated; falls {summary.falls}, "
+        f"steps with a key {summary.involvement}"
+    )
+    click.echo("mean " + ", ".join(f"{name} {value:.3g}" for name, value in list(summary.mean.items())[:8]))
+    if record is not None:
+        click.echo(f"recorded in {record}")
+
+
+def _drive_on_screen(order: DriveOrder, recording: Path | None, fps: int) -> None:
+    if recording is not None:
+        order = replace(order, recording=str(recording))
+    _show(order, fps=fps)
+
+
+def _show(order: DriveOrder, *, fps: int, watching: bool = False) -> None:
+    """Run the screen over a simulation in its own process, which starts first."""
+    _check_terminal()
+    from pdtui.teleop.process import ProcessLink
+
+    link = ProcessLink(order)
+    try:
+        from pdtui.tui.app import DriveApp
+
+        app = DriveApp(link, order.stimulation_map, fps=fps, watching=watching)
+        message = app.run()
+    finally:
+        last_words = link.close()
+    if app.return_code:
+        raise ScreenError(message or last_words)
+    click.echo(last_words)
+
+
+def pick_and_drive() -> None:
+    _check_terminal()
+    from pdtui.stimulation.library import list_maps
+    from pdtui.tui.picker import PickerApp, rows_of
+
+    chosen = PickerApp(rows_of(list_maps())).run()
+    if chosen is not None:
+        order = order_of_drive(str(chosen), None, "")
+        _drive_on_screen(order, _new_session(order), 12)
+
+
+def _check_terminal() -> None:
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise ScreenError("no terminal: the screen needs one; --headless drives without")

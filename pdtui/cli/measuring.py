@@ -1,0 +1,160 @@
+"""Commands that measure: what behaviors do, what units do, how fast the loop is."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from pdtui.cli.common import (
+    Seeds,
+    cores,
+    force_option,
+    json_option,
+    map_option,
+    order_of_drive,
+    policy_option,
+    progress_bar_or_none,
+    show_result,
+    workers_option,
+)
+
+
+@click.command()
+@click.argument("robot")
+@map_option
+@policy_option
+@force_option
+@click.option("--seeds", type=Seeds(), default="100-119", show_default=True)
+@click.option(
+    "--target", metavar="ATTRIBUTE", help="Measure how precisely a target of this attribute is held."
+)
+@click.option(
+    "--policy-only", is_flag=True, help="Measure the policy without any behavior: 1000 steps a seed."
+)
+@workers_option
+@json_option
+def evaluate(
+    robot: str,
+    map_name: str | None,
+    policy: str,
+    force: bool,
+    seeds: range,
+    target: str | None,
+    policy_only: bool,
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """Measure what every behavior of ROBOT's map does, against the default."""
+    from pdtui.experiments import evaluate as behaviors
+    from pdtui.experiments import tables, tracking, walking
+
+    order = order_of_drive(robot, map_name, policy, force=force)
+    if target is not None:
+        with progress_bar_or_none("holding targets", quiet=as_json) as advance:
+            tracked = tracking.evaluate_tracking(order, target, seeds, progress=advance)
+        show_result(asdict(tracked), as_json, lambda: tables.tracking_table(tracked))
+    elif policy_only:
+        with progress_bar_or_none("walking", quiet=as_json) as advance:
+            walked = walking.evaluate_walking(order, seeds, progress=advance)
+        show_result(asdict(walked), as_json, lambda: tables.walking_table(walked))
+    else:
+        with progress_bar_or_none("evaluating", quiet=as_json) as advance:
+            result = behaviors.evaluate_map(order, seeds, workers=cores(workers), progress=advance)
+        show_result(result.as_dict(), as_json, lambda: tables.behavior_table(result))
+
+
+@click.command()
+@click.argument("robot")
+@click.option("--policy", default="", help="Weights to dissect; default: the robot's shipped policy.")
+@click.option("--preset", type=click.Choice(["paper", "authors"]), default="paper", show_default=True)
+@click.option("--episodes", type=click.IntRange(1, 1000), default=5, show_default=True)
+@click.option("--seed", type=click.IntRange(1000, 2**31 - 1), default=1000, show_default=True)
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="The map; default: maps/ROBOT-dissected.toml."
+)
+@workers_option
+@json_option
+def dissect(
+    robot: str,
+    policy: str,
+    preset: str,
+    episodes: int,
+    seed: int,
+    output: Path | None,
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """Find the units that steer ROBOT: match, then probe, then write a map."""
+    from pdtui.dissection.command import dissect_to_map
+
+    with progress_bar_or_none("dissecting", quiet=as_json) as advance:
+        result = dissect_to_map(
+            robot,
+            policy or robot,
+            output or Path("maps") / f"{robot}-dissected.toml",
+            preset=preset,
+            episodes=episodes,
+            seed=seed,
+            workers=cores(workers),
+            progress=advance,
+        )
+    show_result(result.as_dict(), as_json, result.table)
+
+
+@click.command()
+@click.argument("robot")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True)
+@click.option("--steps", type=click.IntRange(1), default=None, help="Control steps over all worlds.")
+@click.option("--algorithm", type=click.Choice(["ppo", "sac"]), default="ppo", show_default=True)
+@click.option("--learning-rate", type=click.FloatRange(0, min_open=True), default=None, help="At the start.")
+@click.option("--forward", type=click.Choice(["either", "x"]), default="x", show_default=True)
+@click.option("--folder", type=click.Path(path_type=Path), help="Checkpoints; default: runs/ROBOT-seed.")
+def train(
+    robot: str,
+    algorithm: str,
+    seed: int,
+    steps: int | None,
+    learning_rate: float | None,
+    forward: str,
+    folder: Path | None,
+) -> None:
+    """Train a policy for ROBOT; the same line again goes on where a killed run stopped."""
+    from pdtui.training.command import train_policy
+
+    with progress_bar_or_none("training") as advance:
+        path = train_policy(
+            robot,
+            algorithm,
+            seed,
+            steps,
+            learning_rate,
+            forward,
+            folder or Path("runs") / f"{robot}-{algorithm}-{forward}-{seed}",
+            advance,
+        )
+    click.echo(f"best weights: {path}")
+
+
+@click.group()
+def bench() -> None:
+    """Measure speed: ratios of one run, side by side."""
+
+
+@bench.command("loop")
+@click.argument("robot")
+@map_option
+@click.option(
+    "--steps", type=click.IntRange(100), default=1500, show_default=True, help="Control steps a round."
+)
+@json_option
+def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bool) -> None:
+    """Control steps a second of ROBOT: bare, with policy, stimulated, recorded."""
+    from pdtui.experiments import bench as benchmark
+    from pdtui.experiments import tables
+
+    order = order_of_drive(robot, map_name, "")
+    with progress_bar_or_none("measuring", quiet=as_json) as advance:
+        result = benchmark.bench_loop(order, steps=steps, progress=advance)
+    show_result(asdict(result), as_json, lambda: tables.bench_table(result))
