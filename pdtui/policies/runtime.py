@@ -68,9 +68,9 @@ def chain_of(module: nn.Module) -> list[tuple[Callable[[torch.Tensor], torch.Ten
 
 
 def _plain_call(stage: nn.Module) -> Callable[[torch.Tensor], torch.Tensor]:
-    if type(stage) is nn.Linear:
-        weight, bias = stage.weight.detach(), None if stage.bias is None else stage.bias.detach()
-        return lambda x: nn.functional.linear(x, weight, bias)
+    if type(stage) is nn.Linear and stage.bias is not None:
+        weight, bias = stage.weight.detach(), stage.bias.detach()
+        return lambda x: torch.addmv(bias, weight, x)
     call: Callable[[torch.Tensor], torch.Tensor] = stage.forward
     return call
 
@@ -110,14 +110,27 @@ class Policy:
         self._natural: dict[int, float] = {}
         self._offset = 0
         self._chain = chain_of(self.module) if hidden is None else None
+        if self._chain is not None and not self._same_bits():
+            self._chain = None
         if self._chain is None:
             for child in self._unit_modules(hidden):
                 child.register_forward_hook(lambda _module, _inputs, output: self._visit(output))
+        self._outputs = []
         self._forward(np.zeros(observations))
         self.layers: tuple[int, ...] = tuple(output.size for output in self._outputs)
         if not self.layers:
             raise PolicyError(f"{name}: the network has no hidden layer to stimulate")
         self.units = sum(self.layers)
+
+    def _same_bits(self) -> bool:
+        """Whether the chain gives the module's own bits, on a few observations."""
+        rng = np.random.default_rng(0)
+        for observation in rng.normal(size=(8, self.observations)).astype(np.float32):
+            with torch.inference_mode():
+                expected: torch.Tensor = self.module(torch.from_numpy(observation))
+            if not torch.equal(self._forward(observation), expected):
+                return False
+        return True
 
     def _unit_modules(self, hidden: Sequence[str] | None) -> list[nn.Module]:
         modules = dict(self.module.named_modules())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
 import numpy as np
@@ -36,7 +37,7 @@ class Ant(MujocoRobot, AntEnv):
         self.links = links_of(self.model)
         motors = [self.model.actuator(index) for index in range(self.model.nu)]
         joints = [self.model.joint(int(motor.trnid[0])).name for motor in motors]
-        self._gears = np.array([float(motor.gear[0]) for motor in motors])
+        self._gears = [float(motor.gear[0]) for motor in motors]
         self.attributes = (
             Attribute("vx", "m/s"),
             Attribute("vy", "m/s"),
@@ -47,7 +48,7 @@ class Ant(MujocoRobot, AntEnv):
             Attribute("pitch", "rad"),
             Attribute("height", "m"),
             *(
-                Attribute(f"{_LEGS[joint[-1]]} {joint[:-2]} torque", "N m", scale=float(1.0 / gear))
+                Attribute(f"{_LEGS[joint[-1]]} {joint[:-2]} torque", "N m", scale=1.0 / gear)
                 for joint, gear in zip(joints, self._gears, strict=True)
             ),
         )
@@ -93,10 +94,12 @@ class Ant(MujocoRobot, AntEnv):
         # Third row of the rotation matrix: MuJoCo's angular velocity is in the body's frame.
         yaw_rate = 2 * (x * z - w * y) * a + 2 * (y * z + w * x) * b + (1 - 2 * (x * x + y * y)) * c
         vx, vy = qvel[:2].tolist()
-        values = np.empty(len(self.attributes))
-        values[:8] = vx, vy, np.hypot(vx, vy), yaw, yaw_rate, roll, pitch, float(qpos[2])
-        values[8:] = np.clip(self.data.ctrl, -1.0, 1.0) * self._gears
-        return values
+        torques = [
+            gear * min(1.0, max(-1.0, command))
+            for gear, command in zip(self._gears, self.data.ctrl.tolist(), strict=True)
+        ]
+        speed, height = math.hypot(vx, vy), float(qpos[2])
+        return np.array([vx, vy, speed, yaw, yaw_rate, roll, pitch, height, *torques])
 
     def _fallen(self) -> str | None:
         height = float(self.data.qpos[2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -42,11 +43,11 @@ def rotate(quaternion: Floats, vector: Floats) -> Floats:
 
 def roll_pitch_yaw(quaternion: Floats) -> tuple[float, float, float]:
     """Intrinsic z-y'-x'' Euler angles of one quaternion, rad."""
-    w, x, y, z = (float(value) for value in quaternion)
-    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = np.arcsin(min(1.0, max(-1.0, 2 * (w * y - z * x))))
-    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return float(roll), float(pitch), float(yaw)
+    w, x, y, z = quaternion.tolist()
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = math.asin(min(1.0, max(-1.0, 2 * (w * y - z * x))))
+    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return roll, pitch, yaw
 
 
 def place_links(links: Sequence[Link], poses: Floats) -> Floats:

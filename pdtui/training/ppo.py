@@ -23,10 +23,10 @@ from pdtui.training.mlp import Params, init_mlp, tanh_mlp
 class PpoConfig:
     """Hyper-parameters; `total_steps` counts control steps over all worlds.
 
-    The divergence aimed at falls linearly to `final_divergence` of itself.
+    In the second half, the divergence aimed at falls linearly to `final_divergence` of itself.
     """
 
-    total_steps: int = 1_600_000
+    total_steps: int = 2_000_000
     worlds: int = 64
     chunk: int = 32
     epochs: int = 4
@@ -221,9 +221,10 @@ class PpoLearner:
         changes = jax.tree.map(lambda change: -state.rate * change, changes)
         actor, log_std, critic = optax.apply_updates(parameters, changes)
         share = state.iterations * config.worlds * config.chunk / config.total_steps
-        aim = config.divergence * (1.0 - (1.0 - config.final_divergence) * jnp.minimum(share, 1.0))
-        rate = jnp.where(divergence > 1.5 * aim, state.rate / 1.05, state.rate)
-        rate = jnp.where(divergence < aim / 1.5, rate * 1.05, rate)
+        late = jnp.clip(2.0 * share - 1.0, 0.0, 1.0)
+        aim = config.divergence * (1.0 - (1.0 - config.final_divergence) * late)
+        rate = jnp.where(divergence > 2.0 * aim, state.rate / 1.05, state.rate)
+        rate = jnp.where(divergence < 0.5 * aim, rate * 1.05, rate)
         average = jax.tree.map(lambda old, new: old + config.average_rate * (new - old), state.average, actor)
         return (
             state._replace(

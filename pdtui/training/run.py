@@ -81,6 +81,11 @@ def to_network(params: Params, spec: NetworkSpec) -> PolicyNetwork:
     return network
 
 
+def _steadiness(score: dict[str, Any]) -> float:
+    """What the best policy has most of: return less its deviation, so that rare falls count against speed."""
+    return float(score["mean_return"]) - float(score["std_return"])
+
+
 class Run(ABC):
     """One training run in a folder; a run that was cut off goes on from its last checkpoint.
 
@@ -174,7 +179,7 @@ class Run(ABC):
         score = score_actor(self.make, lambda seen: self.to_robot(actor(seen)), seeds, config.evaluate_steps)
         with (self.folder / "log.jsonl").open("a") as log:
             log.write(json.dumps({"steps": self.steps, **asdict(score)}) + "\n")
-        if self.best is None or score.mean_return > self.best["mean_return"]:
+        if self.best is None or _steadiness(asdict(score)) > _steadiness(self.best):
             self.best = {"steps": self.steps, **asdict(score)}
             self._save_best(params, actor)
         return score
