@@ -109,6 +109,8 @@ def test_bench_prints_all_parts(map_path: Path) -> None:
         (["drive", "ant", "--map", "MAP", "--headless", "--keys", "no.txt"], "pdtui: no.txt: cannot be read"),
         (["drive", "ant", "--map", "MAP", "--headless", "--keys", "BAD"], "bad.txt:2: expected 'STEP KEY'"),
         (["drive", "ant", "--map", "MAP", "--headless", "--record", "FOLDER"], "pdtui: "),
+        (["drive", "ant", "--map", "MAP", "--headless", "--record", "KEYS"], "keys.txt: exists already"),
+        (["dissect", "ant", "-o", "KEYS"], "keys.txt: exists already; --overwrite replaces it"),
         (["replay", "no.rrd"], "pdtui: no.rrd"),
         (["replay", "KEYS"], "keys.txt"),
         (["dissect", "ant", "--policy", "no.safetensors", "-o", "OUT"], "pdtui: no policy 'no.safetensors'"),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pdtui.cli.common import force_option, map_option, order_of_drive, policy_option, progress_bar_or_none
-from pdtui.errors import EventError, ScreenError
+from pdtui.errors import EventError, ScreenError, SessionError
 
 if TYPE_CHECKING:
     from pdtui.teleop.order import DriveOrder
@@ -52,6 +52,8 @@ def drive(
 ) -> None:
     """Drive ROBOT with its map's keys; ROBOT may be a map's file, too."""
     order = order_of_drive(robot, map_name, policy, force=force, seed=seed, stochastic=stochastic)
+    if record is not None and record.exists():
+        raise SessionError(f"{record}: exists already; a drive is recorded into a new file")
     if keys is not None and not headless:
         raise EventError("--keys needs --headless; on the screen, you press them")
     if headless:
@@ -126,7 +128,7 @@ def _show(order: DriveOrder, *, fps: int, watching: bool = False) -> None:
         message = app.run()
     finally:
         last_words = link.close()
-    if app.return_code:
+    if app.return_code or link.failed:
         raise ScreenError(message or last_words)
     click.echo(last_words)
 

@@ -74,6 +74,7 @@ def evaluate(
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="The map; default: maps/ROBOT-dissected.toml."
 )
+@click.option("--overwrite", is_flag=True, help="Replace a map that exists already.")
 @workers_option
 @json_option
 def dissect(
@@ -83,6 +84,7 @@ def dissect(
     episodes: int,
     seed: int,
     output: Path | None,
+    overwrite: bool,
     workers: int | None,
     as_json: bool,
 ) -> None:
@@ -94,6 +96,7 @@ def dissect(
             robot,
             policy or robot,
             output or Path("maps") / f"{robot}-dissected.toml",
+            overwrite=overwrite,
             preset=preset,
             episodes=episodes,
             seed=seed,
@@ -158,3 +161,18 @@ def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bo
     with progress_bar_or_none("measuring", quiet=as_json) as advance:
         result = benchmark.bench_loop(order, steps=steps, progress=advance)
     show_result(asdict(result), as_json, lambda: tables.bench_table(result))
+
+
+@bench.command("screen")
+@click.argument("robot")
+@click.option("--map", "map_name", metavar="MAP", help="A map by name or file; default: the robot's.")
+@click.option("--seconds", type=click.FloatRange(1.0), default=15.0, show_default=True)
+@json_option
+def bench_screen_command(robot: str, map_name: str | None, seconds: float, as_json: bool) -> None:
+    """Time to the first frame of a drive of ROBOT, and the CPU time of the screen, at 160×48."""
+    from pdtui.experiments import bench_screen, tables
+
+    order_of_drive(robot, map_name, "")
+    arguments = [robot, "--no-record", *(["--map", map_name] if map_name else [])]
+    result = bench_screen.bench_screen(arguments, seconds)
+    show_result(asdict(result), as_json, lambda: tables.screen_table(result))

@@ -41,6 +41,7 @@ def dissect_to_map(
     policy: str,
     output: Path,
     *,
+    overwrite: bool,
     preset: str,
     episodes: int,
     seed: int,
@@ -51,9 +52,11 @@ def dissect_to_map(
     """Dissect a policy and write the map that its measurements propose.
 
     Raises:
-        MapError: the map cannot be written; seen before the work starts.
+        MapError: the map exists already or cannot be written; seen before the work starts.
         PdtuiError: as `dissect`.
     """
+    if output.exists() and not overwrite:
+        raise MapError(f"{output}: exists already; --overwrite replaces it, -o writes elsewhere")
     _check_writable(output)
 
     def advance(stage: str, done: int, total: int) -> None:

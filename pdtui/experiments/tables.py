@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 
 from pdtui.experiments.bench import LoopBench
+from pdtui.experiments.bench_screen import ScreenBench
 from pdtui.experiments.evaluate import Evaluation
 from pdtui.experiments.tracking import Tracking
 from pdtui.experiments.walking import Walking
@@ -75,5 +76,16 @@ def bench_table(result: LoopBench) -> Table:
     table.caption = (
         f"recorded / bare, median of rounds: {result.recorded_share:.0%}; "
         f"forward pass with 3 stimulated units: {result.forward_us:.0f} µs"
+    )
+    return table
+
+
+def screen_table(result: ScreenBench) -> Table:
+    """What the screen costs."""
+    table = _table("screen, 160×48", "measure", "value")
+    table.add_row("first frame", f"{result.first_frame:.2f} s")
+    table.add_row("first state of the robot", f"{result.first_state:.2f} s")
+    table.add_row(
+        f"CPU of the screen's process, over {result.seconds:g} s", f"{result.cpu_share:.0%} of one core"
     )
     return table

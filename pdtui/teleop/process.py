@@ -37,6 +37,8 @@ class ProcessLink:
         self._process.start()
         theirs.close()
         self._last_words = ""
+        self.failed = False
+        """Whether the drive ended with an error, once it is closed."""
         self._asked = False
         self._recording = order.recording
 
@@ -78,7 +80,7 @@ class ProcessLink:
             except PdtuiError as error:
                 message = error
             if isinstance(message, str | PdtuiError):
-                self._last_words = str(message)
+                self._last_words, self.failed = str(message), isinstance(message, PdtuiError)
             elif message is None and not self._process.is_alive():
                 break
         self._process.join(timeout=max(0.0, deadline - time.monotonic()))

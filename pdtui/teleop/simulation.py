@@ -43,6 +43,7 @@ class Simulation:
         self._wanted = False
         self._closing = ""
         self._finished = ""
+        self.failed = False
         self._script: dict[int, list[Event]] = {}
         for event in order.script or ():
             self._script.setdefault(event.step, []).append(event)
@@ -115,7 +116,7 @@ class Simulation:
         self._observer.see(record)
         self._pacer.stepped(time.monotonic())
         if record.diverged:
-            self._finished = record.ended
+            self._finished, self.failed = record.ended, True
             self._close_recording()
         if self._order.script is not None:
             self._compare(record.step, record.digest)
@@ -135,7 +136,7 @@ class Simulation:
 
     def _compare(self, step: int, digest: int) -> None:
         if digest != self._order.digests[step]:
-            self._finished = f"step {step} differs from the session"
+            self._finished, self.failed = f"step {step} differs from the session", True
         elif step + 1 == len(self._order.digests):
             self._finished = f"identical, {step + 1} steps"
 
@@ -178,7 +179,8 @@ def simulate(connection: Connection, order: DriveOrder) -> None:
             simulation.stop(reason)
         simulation.brief()
         simulation.run()
-        _send_quietly(connection, simulation.outcome())
+        outcome = simulation.outcome()
+        _send_quietly(connection, PdtuiError(outcome) if simulation.failed else outcome)
     except PdtuiError as error:
         _send_quietly(connection, error)
     except OSError:
