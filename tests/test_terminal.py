@@ -47,6 +47,14 @@ def screen(map_path: Path, session: Path) -> Iterator[pexpect.spawn[str]]:
     child.close(force=True)
 
 
+def _outcome(session: Path) -> str:
+    """What the recording ends with, once the simulation's process has written it."""
+    deadline = time.monotonic() + PATIENCE
+    while not (outcome := read_session(session).outcome) and time.monotonic() < deadline:
+        time.sleep(0.2)
+    return outcome
+
+
 def _pid(screen: pexpect.spawn[str]) -> int:
     assert screen.pid is not None
     return screen.pid
@@ -96,18 +104,11 @@ def test_a_closed_terminal_leaves_a_whole_session(
     deadline = time.monotonic() + PATIENCE
     while screen.isalive() and time.monotonic() < deadline:
         screen.expect([pexpect.TIMEOUT, pexpect.EOF], timeout=0.5)
-    recorded = read_session(session)
-    assert recorded.outcome
+    assert _outcome(session) in ("stopped", f"ended by {number.name}")
     assert replay_session(session).first_difference is None
 
 
 def test_a_killed_screen_leaves_a_whole_session(screen: pexpect.spawn[str], session: Path) -> None:
     _drive_a_little(screen, session)
     os.kill(_pid(screen), signal.SIGKILL)
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        recorded = read_session(session)
-        if recorded.outcome:
-            break
-        time.sleep(0.2)
-    assert recorded.outcome in ("the screen went away", "ended by SIGHUP")
+    assert _outcome(session) in ("the screen went away", "ended by SIGHUP")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import signal
 from collections.abc import Mapping
 from time import monotonic
 from typing import cast
@@ -31,6 +33,7 @@ from pdtui.tui.widgets.status import KeyLine, NoticeLine, StatusLine
 from pdtui.tui.widgets.unit_table import UnitTable
 
 NOTICE_SECONDS = 4.0
+_ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
 class DriveApp(App[str]):
@@ -91,6 +94,19 @@ class DriveApp(App[str]):
         self.query_one(StatusLine).watching = self.watching
         self._show_keys()
         self.set_interval(1.0 / self.fps, self._poll)
+        # Left to their default, these would leave the terminal raw and the recording to its own devices.
+        loop = asyncio.get_running_loop()
+        for number in _ENDING_SIGNALS:
+            loop.add_signal_handler(number, self._end, number)
+
+    def on_unmount(self) -> None:
+        """Give the signals back."""
+        loop = asyncio.get_running_loop()
+        for number in _ENDING_SIGNALS:
+            loop.remove_signal_handler(number)
+
+    def _end(self, number: signal.Signals) -> None:
+        self.exit(f"ended by {number.name}", return_code=1)
 
     def on_resize(self, event: events.Resize) -> None:
         """Show the drive, or say that the terminal is too small for it."""
