@@ -12,8 +12,9 @@ from pdtui.errors import SimulationDiverged
 from pdtui.policies.runtime import Policy
 from pdtui.policies.units import NO_STIMULATION, Stimulation
 from pdtui.robots.base import Robot
+from pdtui.robots.geometry import wrap_angle
 from pdtui.robots.types import Floats
-from pdtui.stimulation.magnitude import PidMagnitude, wrap
+from pdtui.stimulation.magnitude import PidMagnitude
 from pdtui.stimulation.maps import Pid
 
 
@@ -114,4 +115,4 @@ class _Controller:
 
     def distance(self, values: Floats) -> float:
         error = self._pid.target - float(values[self._column])
-        return abs(wrap(error) if self._wraps else error)
+        return abs(wrap_angle(error) if self._wraps else error)

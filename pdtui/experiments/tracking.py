@@ -12,8 +12,8 @@ import numpy as np
 
 from pdtui.errors import MapError
 from pdtui.experiments.evaluate import confidence_interval
+from pdtui.robots.geometry import wrap_angle
 from pdtui.sessions.events import Event
-from pdtui.stimulation.magnitude import wrap
 from pdtui.teleop.drive import build_loop
 from pdtui.teleop.loop import ControlLoop
 from pdtui.teleop.order import DriveOrder
@@ -139,7 +139,7 @@ def _follow(
                 events.append(Event(loop.step, "target", name, target))
             record = loop.advance(events)
             error = target - float(record.attributes[column])
-            errors[row, column_step] = abs(wrap(error) if wraps else error)
+            errors[row, column_step] = abs(wrap_angle(error) if wraps else error)
             if record.ended:
                 return errors, True
     return errors, False

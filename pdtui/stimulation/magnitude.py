@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from math import pi
-
 from simple_pid import PID
 
+from pdtui.robots.geometry import wrap_angle
 from pdtui.stimulation.maps import Pid
-
-
-def wrap(angle: float) -> float:
-    """The same angle in [−π, π), rad."""
-    return (angle + pi) % (2.0 * pi) - pi
 
 
 class PidMagnitude:
@@ -46,15 +40,15 @@ class PidMagnitude:
 
     def set_target(self, target: float) -> None:
         """Move the target; an angle is wrapped."""
-        self.target = wrap(target) if self._wraps else target
+        self.target = wrap_angle(target) if self._wraps else target
 
     def update(self, value: float) -> float:
         """One control step: the magnitude c for the present value of the attribute."""
         self.value = value
         continuous = value if self._continuous is None else self._continuous
         if self._wraps:
-            continuous += wrap(value - continuous)
-            self.error = wrap(self.target - value)
+            continuous += wrap_angle(value - continuous)
+            self.error = wrap_angle(self.target - value)
         else:
             continuous = value
             self.error = self.target - value
