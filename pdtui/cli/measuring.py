@@ -165,7 +165,7 @@ def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bo
 
 @bench.command("screen")
 @click.argument("robot")
-@click.option("--map", "map_name", metavar="MAP", help="A map by name or file; default: the robot's.")
+@map_option
 @click.option("--seconds", type=click.FloatRange(1.0), default=15.0, show_default=True)
 @json_option
 def bench_screen_command(robot: str, map_name: str | None, seconds: float, as_json: bool) -> None:

@@ -19,9 +19,8 @@ from pdtui.dissection.phase import Phase, correlate
 from pdtui.dissection.probe import Prober, Sweep
 from pdtui.dissection.spectrum import Preset, find_preset
 from pdtui.dissection.workers import Crew
-from pdtui.errors import RobotError
 from pdtui.robots.base import Robot
-from pdtui.robots.types import Attribute
+from pdtui.robots.types import Attribute, column_of
 
 StageProgress = Callable[[str, int, int], None]
 
@@ -102,11 +101,7 @@ class Dissection:
         Raises:
             RobotError: the robot has no such attribute.
         """
-        for number, one in enumerate(self.attributes):
-            if one.name == attribute:
-                return number
-        known = ", ".join(one.name for one in self.attributes)
-        raise RobotError(f"{self.robot}: no attribute '{attribute}'; there are {known}")
+        return column_of(attribute, self.attributes, self.robot)
 
 
 def dissect(

@@ -9,8 +9,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.errors import RobotError
-from pdtui.robots.types import Attribute, Floats, Link, RobotSnapshot
+from pdtui.robots.types import Attribute, Floats, Link, RobotSnapshot, column_of
 
 
 class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
@@ -63,8 +62,4 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         Raises:
             RobotError: the robot has no such attribute.
         """
-        for index, attribute in enumerate(self.attributes):
-            if attribute.name == name:
-                return index
-        known = ", ".join(attribute.name for attribute in self.attributes)
-        raise RobotError(f"{self.name}: no attribute '{name}'; there are {known}")
+        return column_of(name, self.attributes, self.name)

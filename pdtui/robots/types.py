@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pdtui.errors import RobotError
 
 Floats = NDArray[np.float64]
 
@@ -67,3 +69,16 @@ class RobotSnapshot:
     state: Floats
     extras: tuple[Floats, ...]
     rng: Mapping[str, Any]
+
+
+def column_of(name: str, attributes: Sequence[Attribute], owner: str) -> int:
+    """Column of an attribute; `owner` is named where there is none.
+
+    Raises:
+        RobotError: there is no such attribute.
+    """
+    for column, attribute in enumerate(attributes):
+        if attribute.name == name:
+            return column
+    known = ", ".join(attribute.name for attribute in attributes)
+    raise RobotError(f"{owner}: no attribute '{name}'; there are {known}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,3 +28,11 @@ class Event:
     name: str = ""
     value: float = 0.0
     key: str = ""
+
+
+def events_by_step(events: Iterable[Event]) -> dict[int, list[Event]]:
+    """Events by the control step before which they apply, in their order."""
+    grouped: dict[int, list[Event]] = {}
+    for event in events:
+        grouped.setdefault(event.step, []).append(event)
+    return grouped

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pdtui.errors import EventError
 from pdtui.policies.units import Stimulation, parse_unit
-from pdtui.robots.types import Attribute, Floats
+from pdtui.robots.types import Attribute, Floats, column_of
 from pdtui.stimulation.magnitude import PidMagnitude
 from pdtui.stimulation.maps import Behavior, StimulationMap
 
@@ -50,7 +50,8 @@ class Latch:
         dt: s per control step.
 
     Raises:
-        MapError, PolicyError: a unit of the map does not exist.
+        PolicyError: a unit of the map does not exist.
+        RobotError: the robot has no attribute that a behavior of the map is to hold.
     """
 
     def __init__(
@@ -64,6 +65,13 @@ class Latch:
         self._weights = {
             name: {parse_unit(unit, layers): v for unit, v in stimulation_map.units_of(behavior).items()}
             for name, behavior in stimulation_map.behaviors.items()
+        }
+        self._columns = {
+            name: column_of(
+                behavior.pid.attribute, attributes, f"{stimulation_map.source}: behavior '{name}'"
+            )
+            for name, behavior in stimulation_map.behaviors.items()
+            if behavior.pid is not None
         }
         self._latched: list[_Latched] = []
 
@@ -104,8 +112,7 @@ class Latch:
         steps = None if behavior.period is None else max(1, round(behavior.period / self._dt))
         latched = _Latched(behavior, self._weights[name], steps)
         if behavior.pid is not None:
-            names = [attribute.name for attribute in self._attributes]
-            latched.column = names.index(behavior.pid.attribute)
+            latched.column = self._columns[name]
             wraps = self._attributes[latched.column].wraps
             latched.controller = PidMagnitude(behavior.pid, wraps, self._dt)
             latched.controller.start(float(attributes[latched.column]))

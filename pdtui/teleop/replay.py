@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pdtui.sessions.events import Event
+from pdtui.sessions.events import events_by_step
 from pdtui.sessions.reader import Session, read_session
 from pdtui.sessions.versions import differences, environment_versions
 from pdtui.stimulation.mapfile import parse_map
@@ -68,9 +68,7 @@ def replay_session(
     session = read_session(path)
     order = order_of(session, str(path), policy)
     loop = build_loop(order)
-    events: dict[int, list[Event]] = {}
-    for event in session.events:
-        events.setdefault(event.step, []).append(event)
+    events = events_by_step(session.events)
     environment = tuple(differences(session.versions, environment_versions()))
     for step, digest in enumerate(order.digests):
         record = loop.advance(events.get(step, ()))

@@ -10,7 +10,7 @@ from types import FrameType
 from typing import Any
 
 from pdtui.errors import PdtuiError
-from pdtui.sessions.events import Event
+from pdtui.sessions.events import Event, events_by_step
 from pdtui.sessions.recorder import SessionRecorder
 from pdtui.teleop.drive import build_loop
 from pdtui.teleop.keys import key_event
@@ -44,9 +44,7 @@ class Simulation:
         self._closing = ""
         self._finished = ""
         self.failed = False
-        self._script: dict[int, list[Event]] = {}
-        for event in order.script or ():
-            self._script.setdefault(event.step, []).append(event)
+        self._script = events_by_step(order.script or ())
 
     def brief(self) -> None:
         """Tell the screen what there is to see."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pdtui.errors import EventError
+from pdtui.errors import EventError, RobotError
 from pdtui.robots.types import Attribute
 from pdtui.stimulation.latch import Latch
 from pdtui.stimulation.magnitude import PidMagnitude
@@ -86,6 +86,11 @@ def test_errors_name_what_there_is(latch: Latch) -> None:
     latch.press("push", AT_REST)
     with pytest.raises(EventError, match="'push' holds no target"):
         latch.set_target("push", 1.0)
+
+
+def test_an_attribute_that_the_robot_lacks_is_named_at_once(small_map: StimulationMap) -> None:
+    with pytest.raises(RobotError, match=r"behavior 'hold heading': no attribute 'yaw'; there are vy"):
+        Latch(small_map, (16, 16), ATTRIBUTES[:1], 0.05)
 
 
 def test_a_saved_state_repeats_itself(latch: Latch) -> None:

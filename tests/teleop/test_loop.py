@@ -10,7 +10,7 @@ import pytest
 from pdtui.errors import EventError
 from pdtui.policies.runtime import Policy
 from pdtui.robots import make_robot
-from pdtui.sessions.events import Event
+from pdtui.sessions.events import Event, events_by_step
 from pdtui.sessions.record import StepRecord
 from pdtui.stimulation.maps import StimulationMap
 from pdtui.teleop.loop import ControlLoop
@@ -21,9 +21,7 @@ def _loop(policy: Policy, small_map: StimulationMap, seed: int = 3, **options: b
 
 
 def _drive(loop: ControlLoop, steps: int, events: Iterable[Event] = ()) -> list[StepRecord]:
-    by_step: dict[int, list[Event]] = {}
-    for event in events:
-        by_step.setdefault(event.step, []).append(event)
+    by_step = events_by_step(events)
     return [loop.advance(by_step.get(step, ())) for step in range(loop.step, loop.step + steps)]
 
 
