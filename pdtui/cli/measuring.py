@@ -75,6 +75,12 @@ def evaluate(
     "-o", "--output", type=click.Path(path_type=Path), help="The map; default: maps/ROBOT-dissected.toml."
 )
 @click.option("--overwrite", is_flag=True, help="Replace a map that exists already.")
+@click.option(
+    "--budget",
+    type=click.FloatRange(0, min_open=True),
+    metavar="MINUTES",
+    help="Searches end, with the best so far, when this is over; every unit is screened all the same.",
+)
 @workers_option
 @json_option
 def dissect(
@@ -85,10 +91,14 @@ def dissect(
     seed: int,
     output: Path | None,
     overwrite: bool,
+    budget: float | None,
     workers: int | None,
     as_json: bool,
 ) -> None:
-    """Find the units that steer ROBOT: match, then probe, then write a map."""
+    """Find the units that steer ROBOT: match, then probe, then write a map.
+
+    Interrupted, the same line goes on where it was.
+    """
     from pdtui.dissection.command import dissect_to_map
 
     with progress_bar_or_none("dissecting", quiet=as_json) as advance:
@@ -101,6 +111,7 @@ def dissect(
             episodes=episodes,
             seed=seed,
             workers=cores(workers),
+            budget_minutes=budget,
             progress=advance,
         )
     show_result(result.as_dict(), as_json, result.table)

@@ -1,12 +1,13 @@
-"""Search for the one to three units, and their outputs, that reach a goal."""
+"""Search for the units, as few as it takes, and their outputs, that reach a goal."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from pdtui.dissection.candidates import Bounds, Candidates
 from pdtui.dissection.goals import Goal, gains, score
 from pdtui.dissection.monitor import Progress, Start
 from pdtui.dissection.probe import Effects, Prober, Sweep, bootstrap_interval
@@ -14,42 +15,45 @@ from pdtui.policies.units import Stimulation
 from pdtui.robots.types import Floats
 from pdtui.stimulation.maps import Measured
 
-MAX_UNITS = 3
-_FACTORS = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
-
 
 @dataclass(frozen=True)
 class Sizes:
     """How much a search does.
 
     Attributes:
+        pool: random pairs and triples, probed once and shared by all goals.
         atoms: single units and values from the sweeps that it combines.
         elite: candidates kept from one generation to the next.
         children: candidates of one generation.
-        promoted: of them, those probed from every search start.
-        generations: at most.
-        patience: generations without progress before it ends.
+        promoted: of them, those probed from more starts.
+        most_units: units of a candidate at most, in the first round and in those that follow where the goal
+            was not reached: from the third unit or so on, it is a direction in a layer.
+        generations: of one round, at most.
+        patience: generations without progress before a round ends.
         quick_starts, quick_steps: of the first look at a child.
-        full_steps: of the second, from every search start.
+        full_starts, full_steps: of the second.
         finalists: elite that the selection starts decide between.
         final_steps: stimulated control steps of the selection and of the held-out score.
         satisfied: score at which it ends early.
-        largest: |v| at most.
+        bounds: of the outputs v.
     """
 
+    pool: int = 240
     atoms: int = 40
-    elite: int = 8
-    children: int = 24
-    promoted: int = 6
-    generations: int = 14
-    patience: int = 4
-    quick_starts: int = 4
-    quick_steps: int = 120
-    full_steps: int = 200
+    elite: int = 16
+    children: int = 28
+    promoted: int = 8
+    most_units: tuple[int, ...] = (3, 6, 12)
+    generations: int = 24
+    patience: int = 6
+    quick_starts: int = 3
+    quick_steps: int = 110
+    full_starts: int = 8
+    full_steps: int = 240
     finalists: int = 6
     final_steps: int = 300
     satisfied: float = 1.8
-    largest: float = 20.0
+    bounds: Bounds = field(default_factory=Bounds)
 
 
 @dataclass(frozen=True)
@@ -95,10 +99,47 @@ class Starts:
     held_out: tuple[Start, ...]
 
 
-class Search:
-    """Seeded greedy and local random search: start from single units, then add, swap, scale and cross.
+class Pool:
+    """Random pairs and triples, probed once: where searches begin when no single unit leads the way.
 
-    Each generation is looked at quickly from a few starts; the most promising are probed from all.
+    Args:
+        prober: measures.
+        starts: a few of the search starts.
+        sizes: how much to do.
+        seed: of the draws.
+        progress: called with (roll-outs done, roll-outs).
+    """
+
+    def __init__(
+        self,
+        prober: Prober,
+        starts: Sequence[Start],
+        sizes: Sizes,
+        seed: int,
+        progress: Progress | None = None,
+    ) -> None:
+        units = prober.crew.policy.units
+        source = Candidates(np.ones(units), sizes.bounds, seed)
+        most = min(3, units)
+        self.plans = tuple(
+            source.draw(int(source.rng.integers(min(2, most), most + 1))) for _ in range(sizes.pool)
+        )
+        steps = sizes.quick_steps
+        self.effects = prober.probe(
+            self.plans, starts, steps=steps, measure_from=steps // 3, progress=progress
+        )
+
+    def best(self, goal: Goal, column: int, count: int) -> list[Stimulation]:
+        """Those that went the goal's way furthest."""
+        scored = score(goal, column, self.effects, [len(plan.units) for plan in self.plans])
+        return [self.plans[index] for index in np.argsort(-scored, kind="stable")[:count]]
+
+
+class Search:
+    """Seeded evolutionary search, from single units and random sets to the set that reaches a goal.
+
+    Each generation is looked at quickly from a few starts; the most promising are probed longer and from
+    more of them. A round that ends short of the goal is followed by one that may use more units.
 
     Args:
         prober: measures.
@@ -113,44 +154,50 @@ class Search:
         self, prober: Prober, goal: Goal, column: int, starts: Starts, seed: int, sizes: Sizes
     ) -> None:
         self._prober, self._goal, self._column = prober, goal, column
-        self._starts, self._sizes = starts, sizes
-        self._rng = np.random.default_rng(seed)
+        self._starts, self._sizes, self._seed = starts, sizes, seed
         self._seen: set[Stimulation] = set()
         self._elite: list[tuple[float, Stimulation]] = []
         self._began = prober.crew.rollouts
 
     def run(
-        self, sweeps: Sequence[Sweep], deadline: Callable[[], bool], progress: Progress | None = None
+        self,
+        sweeps: Sequence[Sweep],
+        pool: Pool,
+        deadline: Callable[[], bool],
+        progress: Progress | None = None,
     ) -> Found:
         """Search, select on other starts, and score the winner on held-out ones.
 
         Args:
-            sweeps: single units, probed; where the search starts from.
+            sweeps: single units, probed; the search starts from them,
+            pool: and from these.
             deadline: says when time is up.
             progress: called with (generations done, generations).
         """
-        sizes = self._sizes
-        atoms = self._atoms(sweeps)
-        self._generation(atoms)
-        idle = 0
-        for number in range(sizes.generations):
-            if progress is not None:
-                progress(number, sizes.generations)
-            best = self._elite[0][0]
-            if best >= sizes.satisfied or idle >= sizes.patience or deadline():
+        sizes, source = self._sizes, self._candidates(sweeps)
+        total = sizes.generations * len(sizes.most_units)
+        self._generation([*self._atoms(sweeps), *pool.best(self._goal, self._column, sizes.children)])
+        for round_, most in enumerate(sizes.most_units):
+            idle = 0
+            for number in range(sizes.generations):
+                if progress is not None:
+                    progress(round_ * sizes.generations + number, total)
+                best = self._elite[0][0]
+                if best >= sizes.satisfied or idle >= sizes.patience or deadline():
+                    break
+                self._generation([self._child(source, most) for _ in range(sizes.children)])
+                idle = 0 if self._elite[0][0] > best + 0.01 else idle + 1
+            if self._elite[0][0] >= 1.0:
                 break
-            self._generation([self._child(atoms) for _ in range(sizes.children)])
-            idle = 0 if self._elite[0][0] > best + 0.01 else idle + 1
         if progress is not None:
-            progress(sizes.generations, sizes.generations)
+            progress(total, total)
         return self._finish()
 
     def _atoms(self, sweeps: Sequence[Sweep]) -> list[Stimulation]:
         """Single units and values that went the goal's way from every start, the best first."""
         scored: dict[Stimulation, float] = {}
         for sweep in sweeps:
-            sign = 1.0 if self._goal.aim.direction == "increase" else -1.0
-            robust = sweep.robust(self._column, sign)
+            robust = sweep.robust(self._column, self._sign)
             for (row, dose), gain in _entries(robust):
                 # Where a later sweep probed the same again from more starts, it decides.
                 scored[Stimulation((sweep.units[row],), (sweep.values[dose],))] = gain
@@ -163,32 +210,30 @@ class Search:
         ranked = sorted(best.values(), key=lambda pair: (-pair[0], pair[1].units, pair[1].values))
         return [atom for _, atom in ranked[: self._sizes.atoms]]
 
-    def _child(self, atoms: Sequence[Stimulation]) -> Stimulation:
+    def _candidates(self, sweeps: Sequence[Sweep]) -> Candidates:
+        """Draws units twice as often as others where screening saw them go the goal's way, on average."""
+        weights = np.zeros(self._prober.crew.policy.units)
+        for sweep in sweeps:
+            mean = self._sign * np.nan_to_num(sweep.effects[..., self._column]).mean(axis=-1)
+            np.maximum.at(weights, np.array(sweep.units), np.maximum(mean.max(axis=1), 0.0))
+        weights += weights.mean() or 1.0
+        return Candidates(weights, self._sizes.bounds, self._seed)
+
+    @property
+    def _sign(self) -> float:
+        return 1.0 if self._goal.aim.direction == "increase" else -1.0
+
+    def _child(self, source: Candidates, most: int) -> Stimulation:
         """A changed or crossed elite that was not tried before."""
-        rng = self._rng
-        child = self._elite[0][1]
+        elite = [plan for _, plan in self._elite]
+        most = min(most, self._prober.crew.policy.units)
+        child = elite[0]
         for _ in range(20):
-            # Squaring the uniform number favours the better parents and atoms.
-            parent = self._elite[int(rng.random() ** 2 * len(self._elite))][1]
-            values = dict(zip(parent.units, parent.values, strict=True))
-            kind = rng.random()
-            if kind < 0.35:
-                values |= _as_dict(atoms[int(rng.random() ** 2 * len(atoms))])
-            elif kind < 0.5:
-                values |= _as_dict(self._elite[int(rng.integers(len(self._elite)))][1])
-            elif kind < 0.6:
-                values = {unit: v * float(rng.choice(_FACTORS)) for unit, v in values.items()}
-            elif kind < 0.85:
-                unit = int(rng.choice(list(values)))
-                values[unit] *= float(rng.choice(_FACTORS))
-            elif kind < 0.95:
-                del values[int(rng.choice(list(values)))]
-                values |= _as_dict(atoms[int(rng.random() ** 2 * len(atoms))])
-            elif len(values) > 1:
-                del values[int(rng.choice(list(values)))]
-            while len(values) > MAX_UNITS:
-                del values[int(rng.choice(list(values)))]
-            child = _tidy(values, self._sizes.largest)
+            parent = source.favourite(elite)
+            if source.rng.random() < 0.25:
+                child = source.cross(parent, source.favourite(elite), most)
+            else:
+                child = source.change(parent, most)
             if child not in self._seen:
                 break
         return child
@@ -199,10 +244,9 @@ class Search:
             return
         self._seen.update(fresh)
         sizes = self._sizes
-        quick = self._starts.search[: sizes.quick_starts]
-        first = self._score(fresh, quick, sizes.quick_steps)
+        first = self._score(fresh, self._starts.search[: sizes.quick_starts], sizes.quick_steps)
         promoted = [fresh[index] for index in np.argsort(-first, kind="stable")[: sizes.promoted]]
-        second = self._score(promoted, self._starts.search, sizes.full_steps)
+        second = self._score(promoted, self._starts.search[: sizes.full_starts], sizes.full_steps)
         self._elite += zip(second.tolist(), promoted, strict=True)
         self._elite.sort(key=lambda pair: -pair[0])
         del self._elite[sizes.elite :]
@@ -240,13 +284,3 @@ class Search:
 def _entries(table: Floats) -> list[tuple[tuple[int, int], float]]:
     rows, columns = table.shape
     return [((row, column), float(table[row, column])) for row in range(rows) for column in range(columns)]
-
-
-def _as_dict(stimulation: Stimulation) -> dict[int, float]:
-    return dict(zip(stimulation.units, stimulation.values, strict=True))
-
-
-def _tidy(values: dict[int, float], largest: float) -> Stimulation:
-    """Units in order, values of three digits: what a map's text says is then exactly what was measured."""
-    kept = {unit: float(f"{np.clip(v, -largest, largest):.3g}") for unit, v in sorted(values.items())}
-    return Stimulation.of(kept)

@@ -10,7 +10,8 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from pdtui.dissection.dissect import Dissection, dissect
+from pdtui.dissection.dissect import dissect
+from pdtui.dissection.findings import Dissection
 from pdtui.dissection.propose import propose
 from pdtui.dissection.report import render
 from pdtui.dissection.summary import summarise
@@ -46,10 +47,12 @@ def dissect_to_map(
     episodes: int,
     seed: int,
     workers: int,
-    budget_minutes: float | None = None,
+    budget_minutes: float | None,
     progress: Callable[..., None] | None = None,
 ) -> Dissected:
     """Dissect a policy and write the map that its measurements propose.
+
+    Killed on the way, the same call goes on where it was: its roll-outs are in `journal_of` the map.
 
     Raises:
         MapError: the map exists already or cannot be written; seen before the work starts.
@@ -72,6 +75,7 @@ def dissect_to_map(
         workers=workers,
         budget_minutes=budget_minutes,
         progress=advance,
+        journal=journal_of(output),
     )
     text = propose(dissection)
     stimulation_map = parse_map(text, str(output))
@@ -79,6 +83,11 @@ def dissect_to_map(
     partial.write_text(text, encoding="utf-8")
     partial.replace(output)
     return Dissected(dissection, output, tuple(stimulation_map.behaviors))
+
+
+def journal_of(output: Path) -> Path:
+    """Where the roll-outs of an unfinished dissection are kept: beside the map."""
+    return output.with_name(f".{output.stem}.rollouts")
 
 
 def _check_writable(output: Path) -> None:

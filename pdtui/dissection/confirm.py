@@ -15,7 +15,7 @@ from pdtui.stimulation.maps import Measured
 
 RARE = 0.9
 """A unit exceeds units drawn at random when it moves the attribute more than this share of all units does."""
-BEST = 10
+BEST = (5, 10)
 
 
 @dataclass(frozen=True)
@@ -54,15 +54,22 @@ class HitRate:
 
     Attributes:
         first: whether the first match is one.
-        best: share of the first `BEST` matches that are.
+        best: share of the first 5 and of the first 10 matches that are (`BEST`).
         random: share of all units that are.
-        correlation: rank correlation of small discrepancy with strength; NaN where either does not vary.
+        correlation: rank correlation of small discrepancy with strength over all units.
+        held_out_matching: the same against the strength of units drawn at random, from starts that
+            screening did not see.
+        held_out_probing: rank correlation of screened strength with that strength.
+
+    Correlations are NaN where either side does not vary.
     """
 
     first: bool
-    best: float
+    best: tuple[float, ...]
     random: float
     correlation: float
+    held_out_matching: float
+    held_out_probing: float
 
 
 def select_units(screen: Sweep, match: Match, columns: Sequence[int], keep: int) -> tuple[int, ...]:
@@ -75,6 +82,13 @@ def select_units(screen: Sweep, match: Match, columns: Sequence[int], keep: int)
             order = np.argsort(-reach, kind="stable")[:keep]
             chosen.update(screen.units[row] for row in order if reach[row] > 0)
     return tuple(sorted(chosen))
+
+
+def draw_controls(screen: Sweep, count: int, seed: int) -> tuple[int, ...]:
+    """Units drawn at random, whatever they do: what a ranking has to beat."""
+    rng = np.random.default_rng(seed)
+    chosen = rng.choice(screen.units, size=min(count, len(screen.units)), replace=False)
+    return tuple(sorted(chosen.tolist()))
 
 
 def confirm(unit: int, column: int, screen: Sweep, refined: Sweep, seed: int) -> Confirmation:
@@ -114,19 +128,35 @@ def best_probed(column: int, screen: Sweep, refined: Sweep, seed: int, count: in
     return sorted(judged, key=lambda one: not one.confirmed)[:count]
 
 
-def hit_rate(column: int, screen: Sweep, match: Match) -> HitRate:
-    """Hold the ranking by discrepancy against the screening of every unit."""
+def hit_rate(column: int, screen: Sweep, match: Match, refined: Sweep, controls: Sequence[int]) -> HitRate:
+    """Hold the ranking by discrepancy against what probing measured.
+
+    Args:
+        column: of the attribute.
+        screen: every unit.
+        match: the ranking.
+        refined: some units again, from other starts.
+        controls: those of them that were drawn at random.
+    """
     strength = screen.strength(column)
     hits = (strength > 0) & (strength > np.quantile(strength, RARE))
+    doses = [value for value in screen.values if value in refined.values]
+    rows = [refined.units.index(unit) for unit in controls]
+    seen = screen.reach(column, doses)[np.searchsorted(np.array(screen.units), np.array(controls, np.intp))]
+    held_out = refined.reach(column, doses)[rows]
+    probing = rank_correlation(seen, held_out)
     ranked = match.ranked(column)
     if not ranked.size:
-        return HitRate(False, float("nan"), float(hits.mean()), float("nan"))
+        none = float("nan")
+        return HitRate(False, (none,) * len(BEST), float(hits.mean()), none, none, probing)
     order = np.searchsorted(np.array(screen.units), ranked)
     return HitRate(
         first=bool(hits[order[0]]),
-        best=float(hits[order[:BEST]].mean()),
+        best=tuple(float(hits[order[:count]].mean()) for count in BEST),
         random=float(hits.mean()),
         correlation=rank_correlation(-match.discrepancy[column, ranked], strength[order]),
+        held_out_matching=rank_correlation(-match.discrepancy[column, list(controls)], held_out),
+        held_out_probing=probing,
     )
 
 
@@ -134,7 +164,7 @@ def rank_correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Spearman's rank correlation, ties at their mean rank; NaN where one side does not vary."""
     from scipy.stats import rankdata
 
-    if np.ptp(a) == 0 or np.ptp(b) == 0:
+    if len(a) < 2 or np.ptp(a) == 0 or np.ptp(b) == 0:
         return float("nan")
     return float(np.corrcoef(rankdata(a), rankdata(b))[0, 1])
 

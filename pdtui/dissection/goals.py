@@ -71,8 +71,9 @@ def gains(goal: Goal, column: int, result: Effects) -> Floats:
 def score(goal: Goal, column: int, result: Effects, units: Sequence[int]) -> Floats:
     """Score of each plan, in parts of what is enough; 1 is a behavior that works, shape (S,).
 
-    The lower fifth of the gains over the starts, because a behavior has to work from any state; less twice
-    the share of falls, and a little for every further unit.
+    Halfway between the mean of the gains over the starts and their lower fifth, because a behavior has to
+    work from any state, and a search has to see that it gets nearer; less twice the share of falls, and a
+    little for every further unit.
 
     Args:
         goal: what is aimed at.
@@ -80,7 +81,8 @@ def score(goal: Goal, column: int, result: Effects, units: Sequence[int]) -> Flo
         result: the plans, probed.
         units: how many units each plan overwrites.
     """
-    lower = np.quantile(gains(goal, column, result), _QUANTILE, axis=1) / goal.enough
+    gain = gains(goal, column, result)
+    sure = 0.5 * (gain.mean(axis=1) + np.quantile(gain, _QUANTILE, axis=1)) / goal.enough
     further = np.maximum(np.array(units, np.float64) - 1.0, 0.0)
-    value: Floats = lower - _FALL * result.falls.mean(axis=1) - _UNIT * further
+    value: Floats = sure - _FALL * result.falls.mean(axis=1) - _UNIT * further
     return value

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from hashlib import blake2b
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.dissection.journal import Journal, fingerprint
 from pdtui.dissection.monitor import Progress, Start
-from pdtui.dissection.rollout import Outcome, Plan
-from pdtui.dissection.workers import Crew, Job
+from pdtui.dissection.rollout import Job, Outcome, Plan
+from pdtui.dissection.workers import Crew
 from pdtui.policies.units import NO_STIMULATION, Stimulation
 from pdtui.robots.types import Floats
 
@@ -43,10 +43,11 @@ class Prober:
 
     Args:
         crew: runs the roll-outs.
+        journal: remembers them on disk, and those of a run that was interrupted.
     """
 
-    def __init__(self, crew: Crew) -> None:
-        self.crew = crew
+    def __init__(self, crew: Crew, journal: Journal | None = None) -> None:
+        self.crew, self._journal = crew, journal
         self._unperturbed: dict[tuple[bytes, int, int], Outcome] = {}
 
     def probe(
@@ -71,7 +72,7 @@ class Prober:
             RobotError: a worker process died.
         """
         first = steps // 2 if measure_from is None else measure_from
-        keys = [(_fingerprint(start), steps, first) for start in starts]
+        keys = [(fingerprint(start), steps, first) for start in starts]
         missing = [index for index, key in enumerate(keys) if key not in self._unperturbed]
         jobs: list[Job] = [(NO_STIMULATION, index) for index in missing]
         jobs += [(plan, index) for plan in plans for index in range(len(starts))]
@@ -80,7 +81,7 @@ class Prober:
             if progress is not None:
                 progress(done, len(jobs))
 
-        outcomes = self.crew.run(jobs, starts, steps, first, report)
+        outcomes = self._run(jobs, starts, steps, first, report)
         for index, outcome in zip(missing, outcomes, strict=False):
             self._unperturbed[keys[index]] = outcome
         unperturbed = np.array([self._unperturbed[key].means for key in keys])
@@ -94,6 +95,38 @@ class Prober:
             falls=np.array([outcome.fell for outcome in probed], np.bool_).reshape(shape),
             errors=np.array([outcome.error for outcome in probed], np.float64).reshape(shape),
         )
+
+    def _run(
+        self,
+        jobs: Sequence[Job],
+        starts: Sequence[Start],
+        steps: int,
+        first: int,
+        report: Callable[[int], None],
+    ) -> list[Outcome]:
+        """Run what the journal does not know yet, and let it know."""
+        journal = self._journal
+        if journal is None:
+            return self.crew.run(jobs, starts, steps, first, report)
+        keys = journal.keys(jobs, starts, steps, first)
+        known = journal.read(keys)
+        missing = [number for number, outcome in enumerate(known) if outcome is None]
+
+        def keep(numbers: Sequence[int], outcomes: Sequence[Outcome]) -> None:
+            journal.write([keys[missing[number]] for number in numbers], outcomes)
+
+        fresh = iter(
+            self.crew.run(
+                [jobs[number] for number in missing],
+                starts,
+                steps,
+                first,
+                lambda done: report(len(jobs) - len(missing) + done),
+                keep,
+            )
+        )
+        self.crew.count([outcome for outcome in known if outcome is not None])
+        return [next(fresh) if outcome is None else outcome for outcome in known]
 
     def sweep(
         self,
@@ -150,6 +183,17 @@ class Sweep:
         reach: Floats = np.maximum(both.max(axis=1), 0.0)
         return reach
 
+    def reach(self, column: int, values: Sequence[float]) -> Floats:
+        """How far each unit moves an attribute on average over the starts, at its best of some values.
+
+        Unlike `strength` it does not ask for one sign from every start, so it ranks weak units too. A fall
+        counts as no effect. Shape (N,).
+        """
+        doses = [self.values.index(value) for value in values]
+        alive = np.where(self.falls, 0.0, np.nan_to_num(self.effects[..., column]))[:, doses]
+        furthest: Floats = np.abs(alive.mean(axis=-1)).max(axis=1)
+        return furthest
+
     def survived(self, unit: int) -> float:
         """The largest |v| of a unit up to which the robot never fell, 0 if there is none."""
         row = self.units.index(unit)
@@ -183,10 +227,3 @@ def bootstrap_interval(
     picks = np.random.default_rng(seed).integers(known.size, size=(draws, known.size))
     low, high = np.quantile(known[picks].mean(axis=1), [(1 - level) / 2, (1 + level) / 2])
     return float(low), float(high)
-
-
-def _fingerprint(start: Start) -> bytes:
-    digest = blake2b(start.snapshot.state.tobytes(), digest_size=16)
-    for extra in start.snapshot.extras:
-        digest.update(extra.tobytes())
-    return digest.digest()

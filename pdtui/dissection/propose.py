@@ -9,7 +9,7 @@ import tomlkit
 
 from pdtui.dissection.combine import Found
 from pdtui.dissection.confirm import Confirmation, best_probed
-from pdtui.dissection.dissect import Dissection
+from pdtui.dissection.findings import Dissection
 from pdtui.dissection.hold import Held
 from pdtui.policies.units import Stimulation, format_unit
 from pdtui.stimulation.maps import SCHEMA, Measured

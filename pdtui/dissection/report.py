@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from pdtui.dissection.confirm import BEST
-from pdtui.dissection.dissect import Dissection
+from pdtui.dissection.findings import Dissection
 from pdtui.dissection.summary import summarise
 
 
@@ -64,8 +64,8 @@ def _probing_table(summary: dict[str, Any]) -> Table:
         "both ways",
         "first match",
         "its effect [95 %]",
-        f"hits: first / best {BEST} / random",
-        "rank corr.",
+        "hits: first / " + " / ".join(f"best {count}" for count in BEST) + " / random",
+        "held-out rank corr.: matching / probing",
     )
     for attribute in summary["attributes"]:
         best = attribute["probed"][0] if attribute["probed"] else None
@@ -77,9 +77,14 @@ def _probing_table(summary: dict[str, Any]) -> Table:
             "" if best is None else ("yes" if best["both_ways"] else "no"),
             _probed_name(first),
             _effect(first),
-            f"{'yes' if hits['first'] else 'no'} / {_show(hits[f'best_{BEST}'], '.0%')} / "
-            f"{_show(hits['random'], '.0%')}",
-            _show(hits["rank_correlation"], "+.2f"),
+            " / ".join(
+                [
+                    "yes" if hits["first"] else "no",
+                    *(_show(hits[f"best_{count}"], ".0%") for count in BEST),
+                    _show(hits["random"], ".0%"),
+                ]
+            ),
+            f"{_show(hits['held_out_matching'], '+.2f')} / {_show(hits['held_out_probing'], '+.2f')}",
         )
     return table
 

@@ -36,6 +36,8 @@ class Hold:
 
 
 Plan = Stimulation | Hold
+Job = tuple[Plan, int]
+"""A plan, and the number of the start that it begins from."""
 
 
 class Outcome(NamedTuple):

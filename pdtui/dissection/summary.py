@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from pdtui.dissection.confirm import BEST, Confirmation, best_probed, confirm, hit_rate
-from pdtui.dissection.dissect import Dissection
+from pdtui.dissection.findings import Dissection
 from pdtui.policies.units import Stimulation, format_unit
 
 
@@ -40,7 +40,7 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
     attribute = dissection.attributes[column]
     matching, phase, layers = dissection.matching, dissection.phase, dissection.layers
     ranked = matching.ranked(column)
-    rate = hit_rate(column, dissection.screen, matching)
+    rate = hit_rate(column, dissection.screen, matching, dissection.refined, dissection.controls)
     first = None
     if ranked.size:
         first = confirm(int(ranked[0]), column, dissection.screen, dissection.refined, dissection.seed)
@@ -68,9 +68,11 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
         ],
         "hits": {
             "first": rate.first,
-            f"best_{BEST}": _number(rate.best),
+            **{f"best_{count}": _number(share) for count, share in zip(BEST, rate.best, strict=True)},
             "random": _number(rate.random),
             "rank_correlation": _number(rate.correlation),
+            "held_out_matching": _number(rate.held_out_matching),
+            "held_out_probing": _number(rate.held_out_probing),
         },
     }
 

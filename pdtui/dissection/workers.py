@@ -14,14 +14,13 @@ from pathlib import Path
 from types import TracebackType
 
 from pdtui.dissection.monitor import Start
-from pdtui.dissection.rollout import Outcome, Plan, roll_out
+from pdtui.dissection.rollout import Job, Outcome, roll_out
 from pdtui.errors import RobotError
 from pdtui.policies.load import load_policy
 from pdtui.policies.runtime import Policy
 from pdtui.robots import make_robot
 from pdtui.robots.base import Robot
 
-Job = tuple[Plan, int]
 # Control steps handed over at once: long enough to hide the hand-over, short enough to stop within a second.
 _STEPS_A_CHUNK = 1200
 
@@ -103,6 +102,7 @@ class Crew:
         steps: int,
         measure_from: int,
         done: Callable[[int], None] | None = None,
+        keep: Callable[[Sequence[int], Sequence[Outcome]], None] | None = None,
     ) -> list[Outcome]:
         """Roll out every job; results in the order of the jobs.
 
@@ -112,6 +112,7 @@ class Crew:
             steps: control steps of each roll-out.
             measure_from: first step that counts.
             done: called with the number of jobs finished so far.
+            keep: called with each batch of finished jobs, by number, and their outcomes.
 
         Raises:
             RobotError: a worker process died.
@@ -123,11 +124,17 @@ class Crew:
         for number, outcomes in self._chunks(chunks, starts, steps, measure_from):
             results[number] = outcomes
             finished += len(outcomes)
-            self.rollouts += len(outcomes)
-            self.steps_run += sum(outcome.lived for outcome in outcomes)
+            self.count(outcomes)
+            if keep is not None:
+                keep(range(number * size, number * size + len(outcomes)), outcomes)
             if done is not None:
                 done(finished)
         return [outcome for outcomes in results for outcome in outcomes]
+
+    def count(self, outcomes: Sequence[Outcome]) -> None:
+        """Take roll-outs into `rollouts` and `steps_run`, wherever they were run."""
+        self.rollouts += len(outcomes)
+        self.steps_run += sum(outcome.lived for outcome in outcomes)
 
     def _chunks(
         self, chunks: Sequence[Sequence[Job]], starts: Sequence[Start], steps: int, measure_from: int

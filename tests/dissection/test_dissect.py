@@ -12,7 +12,9 @@ from rich.console import Console
 
 from pdtui.dissection.combine import Found, Sizes
 from pdtui.dissection.confirm import rank_correlation
-from pdtui.dissection.dissect import Dissection, Effort, dissect
+from pdtui.dissection.dissect import dissect
+from pdtui.dissection.effort import Effort
+from pdtui.dissection.findings import Dissection
 from pdtui.dissection.goals import GOALS, gains, score
 from pdtui.dissection.hold import Held, HoldSizes
 from pdtui.dissection.probe import Effects
@@ -38,8 +40,8 @@ SMALL = Effort(
     held_out_starts=2,
     walk=20,
     search=Sizes(
-        atoms=4, elite=3, children=3, promoted=2, generations=1, quick_starts=1, quick_steps=12,
-        full_steps=16, finalists=2, final_steps=18,
+        pool=4, atoms=4, elite=3, children=3, promoted=2, most_units=(3,), generations=1, quick_starts=1,
+        quick_steps=12, full_starts=2, full_steps=16, finalists=2, final_steps=18,
     ),
     hold=HoldSizes(units=1, finalists=2, steps=12, final_steps=18),
 )  # fmt: skip
@@ -151,8 +153,9 @@ def test_scores_want_every_start_and_no_falls() -> None:
     up, down = GOALS[1], GOALS[2]
     never = [[False] * 5] * 2
     result = effects([[0.7] * 5, [2.0, 2.0, 2.0, 0.0, 0.0]], never, [0.0] * 5)
-    np.testing.assert_allclose(score(up, 0, result, [1, 1]), [1.0, 0.0])
-    np.testing.assert_allclose(score(up, 0, result, [3, 3]), [0.98, -0.02])
+    # By hand: halfway between mean (0.7 and 1.2) and lower fifth (0.7 and 0), in parts of 0.7.
+    np.testing.assert_allclose(score(up, 0, result, [1, 1]), [1.0, 0.6 / 0.7])
+    np.testing.assert_allclose(score(up, 0, result, [3, 3]), [0.98, 0.6 / 0.7 - 0.02])
     assert score(down, 0, result, [1, 1])[0] == pytest.approx(-1.0)
     fell = effects([[1.4] * 5], [[True, False, False, False, False]], [0.0] * 5)
     np.testing.assert_allclose(gains(up, 0, fell), [[0.0, 1.4, 1.4, 1.4, 1.4]])

@@ -1,0 +1,40 @@
+"""How much a dissection does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from pdtui.dissection.combine import Sizes
+from pdtui.dissection.hold import HoldSizes
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much a dissection does; the defaults are for ten to fifteen minutes on two idle cores.
+
+    Attributes:
+        steps: control steps of a monitored episode.
+        screen_values, screen_starts, screen_steps: every unit at these outputs, from so many starts.
+        refine_keep: units kept from screening for each attribute and direction.
+        controls: units drawn at random, refined for comparison.
+        refine_values, refine_starts, refine_steps: those units again, from other starts.
+        search_starts, selection_starts, held_out_starts: of the search for behaviors.
+        walk: control steps between a reset and a start.
+        search, hold: sizes of the searches.
+    """
+
+    steps: int = 1000
+    screen_values: tuple[float, ...] = (-4.0, -2.0, 2.0, 4.0)
+    screen_starts: int = 2
+    screen_steps: int = 60
+    refine_keep: int = 2
+    controls: int = 48
+    refine_values: tuple[float, ...] = (-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0)
+    refine_starts: int = 6
+    refine_steps: int = 80
+    search_starts: int = 10
+    selection_starts: int = 12
+    held_out_starts: int = 16
+    walk: int = 100
+    search: Sizes = field(default_factory=Sizes)
+    hold: HoldSizes = field(default_factory=HoldSizes)

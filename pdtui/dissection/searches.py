@@ -1,0 +1,90 @@
+"""The searches of one dissection: a behavior for each goal, a controller for what can be held."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.dissection.combine import Found, Pool, Search, Starts
+from pdtui.dissection.effort import Effort
+from pdtui.dissection.goals import goals_for
+from pdtui.dissection.hold import Aimed, Held, HoldSearch
+from pdtui.dissection.monitor import Progress
+from pdtui.dissection.probe import Prober, Sweep
+from pdtui.robots.base import Robot
+
+
+class Clock:
+    """Shares what is left of a time budget fairly among the searches to come."""
+
+    def __init__(self, began: float, minutes: float | None) -> None:
+        self._end = None if minutes is None else began + 60 * minutes
+
+    def share(self, left: int) -> Callable[[], bool]:
+        """Whether the next search's part of the time is over, when `left` searches are still to run."""
+        if self._end is None:
+            return lambda: False
+        now = time.monotonic()
+        until = now + max(0.0, self._end - now) / max(1, left)
+        return lambda: time.monotonic() >= until
+
+
+@dataclass(frozen=True)
+class Searches:
+    """What all searches of one dissection share.
+
+    Attributes:
+        prober: measures.
+        world: the robot, for its attributes.
+        plan: how much to do.
+        seed: of every random choice.
+        clock: shares the time.
+        stage: gives the progress callback of a stage, by its name.
+    """
+
+    prober: Prober
+    world: Robot
+    plan: Effort
+    seed: int
+    clock: Clock
+    stage: Callable[[str], Progress | None]
+
+    def behaviors(self, sweeps: Sequence[Sweep], starts: Starts) -> tuple[Found, ...]:
+        """The best stimulation for each goal that the robot has the attribute for."""
+        goals = goals_for(self.world.attributes)
+        if not goals:
+            return ()
+        few = starts.search[: self.plan.search.quick_starts]
+        pool = Pool(self.prober, few, self.plan.search, self.seed, self.stage("random pairs and triples"))
+        found = []
+        for number, goal in enumerate(goals):
+            column = self.world.attribute_index(goal.aim.attribute)
+            search = Search(self.prober, goal, column, starts, self.seed + number, self.plan.search)
+            deadline = self.clock.share(len(goals) - number + 2)
+            found.append(search.run(sweeps, pool, deadline, self.stage(f"search: {goal.name}")))
+        return tuple(found)
+
+    def holds(self, sweep: Sweep, starts: Starts) -> tuple[Held, ...]:
+        """The best controllers for heading and speed, where the robot has them and the time is not up."""
+        usual = 0.0
+        names = [attribute.name for attribute in self.world.attributes]
+        if "speed" in names:
+            usual = float(np.mean(sweep.unperturbed[:, names.index("speed")]))
+        asked = (
+            Aimed("yaw", (-0.8, -0.4, 0.4, 0.8), True),
+            Aimed("speed", (0.4 * usual, 0.7 * usual), False),
+        )
+        wanted = [target for target in asked if target.attribute in names]
+        held = []
+        for number, target in enumerate(wanted):
+            column, deadline = names.index(target.attribute), self.clock.share(len(wanted) - number)
+            search, held_out = starts.search[:3], (*starts.selection[:4], *starts.held_out[:4])
+            searcher = HoldSearch(self.prober, target, self.plan.hold)
+            held.append(searcher.run(sweep, column, search, held_out, deadline))
+            progress = self.stage(f"search: hold {target.attribute}")
+            if progress is not None:
+                progress(1, 1)
+        return tuple(one for one in held if one is not None)

@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pdtui.dissection.dissect import dissect
+from pdtui.dissection.journal import Journal
+from pdtui.dissection.monitor import collect_starts
+from pdtui.dissection.probe import Prober
+from pdtui.dissection.rollout import Outcome
+from pdtui.dissection.workers import Crew
+from pdtui.errors import RobotError
+from pdtui.policies.units import Stimulation
+from tests.dissection.test_dissect import SMALL
+
+
+class Interrupted(Exception):
+    pass
+
+
+def test_an_interrupted_dissection_goes_on_without_loss(policy_file: Path, tmp_path: Path) -> None:
+    def interrupt(stage: str, done: int, of: int) -> None:
+        if stage == "refine the best" and done > of // 2:
+            raise Interrupted
+
+    journal = tmp_path / "rollouts"
+    with pytest.raises(Interrupted):
+        dissect(
+            "ant", policy_file, episodes=2, workers=1, effort=SMALL, journal=journal, progress=interrupt
+        )
+    with Journal(journal, "") as left:
+        assert len(left) > 16 * len(SMALL.screen_values) * SMALL.screen_starts
+    resumed = dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL, journal=journal)
+    straight = dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL)
+    assert resumed.behaviors == straight.behaviors
+    assert resumed.holds == straight.holds
+    assert (resumed.rollouts, resumed.control_steps) == (straight.rollouts, straight.control_steps)
+    np.testing.assert_array_equal(resumed.refined.effects, straight.refined.effects)
+    assert not journal.exists()
+
+
+def test_what_is_known_is_not_run_again_and_anything_else_is(policy_file: Path, tmp_path: Path) -> None:
+    with Crew("ant", policy_file, 1) as crew, Journal(tmp_path / "rollouts", "one") as journal:
+        starts = collect_starts(crew.robot, crew.policy, 1000, 2, at=5, survive=20)
+        plan, other = Stimulation((3,), (2.0,)), Stimulation((3,), (2.5,))
+        first = Prober(crew, journal).probe([plan], starts, steps=10)
+        known = len(journal)
+        again = Prober(crew, journal).probe([plan], starts, steps=10)
+        assert len(journal) == known == 4
+        np.testing.assert_array_equal(again.effects, first.effects)
+        Prober(crew, journal).probe([other], starts, steps=10)
+        assert len(journal) == known + 2
+        Prober(crew, journal).probe([plan], starts, steps=11)
+        assert len(journal) == known + 6
+
+
+def test_outcomes_keep_every_bit(tmp_path: Path) -> None:
+    outcome = Outcome(np.array([1 / 3, np.nan, -0.0]), float("nan"), 7, True)
+    with Journal(tmp_path / "rollouts", "one") as journal:
+        journal.write([b"key"], [outcome])
+    with Journal(tmp_path / "rollouts", "one") as journal:
+        known, unknown = journal.read([b"key", b"other"])
+    assert unknown is None
+    assert known is not None
+    assert known.means.tobytes() == outcome.means.tobytes()
+    assert np.isnan(known.error)
+    assert (known.lived, known.fell) == (7, True)
+
+
+def test_a_file_that_is_no_journal_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "rollouts"
+    path.write_bytes(b"not a database, and longer than a header of SQLite is" * 10)
+    with pytest.raises(RobotError, match="expected a journal of roll-outs"):
+        Journal(path, "one")
