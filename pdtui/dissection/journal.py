@@ -105,8 +105,8 @@ class Journal:
 def fingerprint(start: Start) -> bytes:
     """Hash of the state that a roll-out begins with."""
     digest = blake2b(start.snapshot.state.tobytes(), digest_size=16)
-    for extra in start.snapshot.extras:
-        digest.update(extra.tobytes())
+    for array in (*start.snapshot.extras, *start.policy_state):
+        digest.update(array.tobytes())
     return digest.digest()
 
 

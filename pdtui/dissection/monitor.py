@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.errors import RobotError, SimulationDiverged
+from pdtui.policies.memory import PolicyState
 from pdtui.policies.runtime import Policy
 from pdtui.robots.base import Robot
 from pdtui.robots.types import Attribute, Floats, RobotSnapshot
@@ -54,12 +55,14 @@ class Start:
     Attributes:
         seed: of the reset.
         step: control steps since the reset.
-        snapshot: the whole state.
+        snapshot: the whole state of the robot.
+        policy_state: the hidden state of a recurrent policy.
     """
 
     seed: int
     step: int
     snapshot: RobotSnapshot
+    policy_state: PolicyState = ()
 
 
 def monitor(
@@ -84,6 +87,7 @@ def monitor(
 
 def _record(robot: Robot, policy: Policy, seed: int, steps: int) -> Episode:
     observation, _ = robot.reset(seed=seed)
+    policy.reset()
     activations, attributes, ended = [], [], ""
     for _ in range(steps):
         acted = policy.act(observation)
@@ -138,7 +142,8 @@ def collect_starts(
 
 def _walk(robot: Robot, policy: Policy, seed: int, at: int, survive: int) -> Start | None:
     observation, _ = robot.reset(seed=seed)
-    start = Start(seed, 0, robot.snapshot()) if at == 0 else None
+    policy.reset()
+    start = Start(seed, 0, robot.snapshot(), policy.snapshot()) if at == 0 else None
     for step in range(1, at + survive + 1):
         try:
             observation, _, terminated, _, _ = robot.step(policy.act(observation).action)
@@ -147,5 +152,5 @@ def _walk(robot: Robot, policy: Policy, seed: int, at: int, survive: int) -> Sta
         if terminated:
             return None
         if step == at:
-            start = Start(seed, at, robot.snapshot())
+            start = Start(seed, at, robot.snapshot(), policy.snapshot())
     return start

@@ -63,7 +63,7 @@ def roll_out(
     """Stimulate from a snapshot on, and measure the later part.
 
     Args:
-        robot: the world; its state is replaced by the snapshot's, bit-exactly.
+        robot: the world; its state and the policy's are replaced by the start's, bit-exactly.
         policy: acts with its mean action.
         start: where to begin.
         plan: what to overwrite.
@@ -71,6 +71,7 @@ def roll_out(
         measure_from: first step that counts.
     """
     robot.restore(start.snapshot)
+    policy.restore(start.policy_state)
     observation, before = robot.observe(), robot.read_attributes()
     angles = np.array([attribute.wraps for attribute in robot.attributes])
     turned = np.zeros(len(angles))

@@ -75,12 +75,14 @@ def bench_loop(
 
 def _actions(loop: ControlLoop, seed: int, steps: int) -> list[np.ndarray]:
     observation, _ = loop.robot.reset(seed=seed)
+    loop.policy.reset()
     actions = []
     for _ in range(steps):
         actions.append(loop.policy.act(observation).action)
         observation, _, terminated, _, _ = loop.robot.step(actions[-1])
         if terminated:
             observation, _ = loop.robot.reset()
+            loop.policy.reset()
     return actions
 
 

@@ -9,9 +9,10 @@ import torch
 from numpy.typing import NDArray
 
 from pdtui.errors import PolicyError
+from pdtui.policies.decoders import Decoder
 from pdtui.policies.files import file_hash, find_weights, load_network
 from pdtui.policies.network import NetworkSpec
-from pdtui.policies.runtime import Decoder, Policy
+from pdtui.policies.runtime import Policy
 
 
 def decoder_for(spec: NetworkSpec) -> Decoder:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, cast
+import copy
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -11,21 +12,13 @@ from numpy.typing import NDArray
 from torch import nn
 
 from pdtui.errors import PolicyError
-from pdtui.policies.units import NO_STIMULATION, Stimulation, describe_layers
-
-ACTIVATION_TYPES: tuple[type[nn.Module], ...] = (
-    nn.Tanh,
-    nn.ReLU,
-    nn.ELU,
-    nn.GELU,
-    nn.SiLU,
-    nn.LeakyReLU,
-    nn.SELU,
-    nn.Sigmoid,
-    nn.Softplus,
-)
-
-Decoder = Callable[[torch.Tensor, np.random.Generator | None], NDArray[np.float32]]
+from pdtui.policies import memory
+from pdtui.policies.chain import chain_of
+from pdtui.policies.decoders import Decoder, mean_action
+from pdtui.policies.hidden import hidden_modules, name_layers
+from pdtui.policies.memory import PolicyState
+from pdtui.policies.taps import Taps
+from pdtui.policies.units import NO_STIMULATION, Layers, Stimulation, describe_layers
 
 
 class PolicyStep(NamedTuple):
@@ -42,128 +35,150 @@ class PolicyStep(NamedTuple):
     natural: tuple[float, ...]
 
 
-def mean_action(output: torch.Tensor, rng: np.random.Generator | None) -> NDArray[np.float32]:
-    """The network's output is the action."""
-    del rng
-    action: NDArray[np.float32] = output.reshape(-1).numpy().astype(np.float32)
-    return action
-
-
-def chain_of(module: nn.Module) -> list[tuple[Callable[[torch.Tensor], torch.Tensor], bool]] | None:
-    """The module as plain calls, each with whether it puts out hidden units; None if it is no chain.
-
-    Calling the same PyTorch functions without the machinery of `nn.Module` gives the same bits in half the
-    time, which counts at this size. A module is a chain if it is an `nn.Sequential`, or has a method
-    ``stages()`` that lists its submodules in their order.
-    """
-    if isinstance(module, nn.Sequential):
-        stages: list[nn.Module] = list(module)
-    elif hasattr(module, "stages"):
-        stages = cast(Any, module).stages()
-    else:
-        return None
-    if any(len(list(stage.children())) > 0 for stage in stages):
-        return None
-    return [(_plain_call(stage), isinstance(stage, ACTIVATION_TYPES)) for stage in stages]
-
-
-def _plain_call(stage: nn.Module) -> Callable[[torch.Tensor], torch.Tensor]:
-    if type(stage) is nn.Linear and stage.bias is not None:
-        weight, bias = stage.weight.detach(), stage.bias.detach()
-        return lambda x: torch.addmv(bias, weight, x)
-    call: Callable[[torch.Tensor], torch.Tensor] = stage.forward
-    return call
-
-
 class Policy:
     """A network whose hidden units can be read and overwritten.
 
     A unit's output is taken after its activation function and before the next layer (section 3.3 of the
-    paper). Layers count in the order in which the network calls them.
+    paper). Layers count in the order in which the network calls them; the units of a layer of any shape count
+    in C order. The units of a recurrent layer are its output h: overwriting it is what the next layer reads,
+    while the state that the recurrent layer itself is fed in the next step keeps the natural h. (A cell's h
+    is found again in the state that the network returns if it is there as it is, not stacked with others.)
+
+    A network with a hidden state is called ``module(observation, state) -> (output, state)``. The state is
+    part of the run: whoever resets the world calls `reset`, whoever restores it calls `restore`.
 
     Args:
-        module: the network; it maps an observation, shape (observations,), to its output.
-        observations: length of the observation.
-        hidden: names of the submodules whose outputs are the units; by default every activation function.
+        module: the network; it maps an observation, float32, to its output. The policy works on a copy.
+        observations: length or shape of the observation.
+        hidden: names of the submodules whose outputs are the units; by default every activation function and
+            every recurrent layer.
         decode: turns the network's output into an action.
+        batched: whether the network wants a leading axis of length 1 before the observation's own.
+        initial_state: what a recurrent network is fed first: a tensor, or tuples of tensors.
         name: for messages.
         sha256: hash of the file that it came from.
 
     Raises:
-        PolicyError: a name in `hidden` does not exist, or there is no hidden layer.
+        PolicyError: a name in `hidden` does not exist, there is no hidden layer, or the network cannot take
+            such an observation or hands back another state.
     """
 
     def __init__(
         self,
         module: nn.Module,
-        observations: int,
+        observations: int | Sequence[int],
         *,
         hidden: Sequence[str] | None = None,
         decode: Decoder = mean_action,
+        batched: bool = False,
+        initial_state: Any = None,
         name: str = "policy",
         sha256: str = "",
     ) -> None:
-        self.module, self.observations, self.name, self.sha256 = module.eval(), observations, name, sha256
-        self._decode = decode
-        self._pending: tuple[tuple[int, float], ...] = ()
-        self._outputs: list[NDArray[np.float32]] = []
-        self._natural: dict[int, float] = {}
-        self._offset = 0
-        self._chain = chain_of(self.module) if hidden is None else None
+        self.module, self.name, self.sha256 = copy.deepcopy(module).eval(), name, sha256
+        self.shape = (observations,) if isinstance(observations, int) else tuple(observations)
+        self._decode, self._batched = decode, batched
+        self._initial = None if initial_state is None else memory.clone(initial_state)
+        self._state = self._initial
+        self._taps = Taps()
+        plain = hidden is None and initial_state is None and not batched and len(self.shape) == 1
+        self._chain = chain_of(self.module) if plain else None
         if self._chain is not None and not self._same_bits():
             self._chain = None
-        if self._chain is None:
-            for child in self._unit_modules(hidden):
-                child.register_forward_hook(lambda _module, _inputs, output: self._visit(output))
-        self._outputs = []
-        self._forward(np.zeros(observations))
-        self.layers: tuple[int, ...] = tuple(output.size for output in self._outputs)
+        names = self._watch(hidden) if self._chain is None else []
+        self._try()
+        self.layers = Layers((output.size for output in self._taps.outputs), names)
         if not self.layers:
-            raise PolicyError(f"{name}: the network has no hidden layer to stimulate")
+            raise PolicyError(
+                f"{name}: the network has no hidden layer to stimulate: no submodule is an activation "
+                "function or a recurrent layer; name the submodules whose outputs are units as `hidden`"
+            )
         self.units = sum(self.layers)
+        self.reset()
+
+    @property
+    def recurrent(self) -> bool:
+        """Whether the network has a hidden state."""
+        return self._initial is not None
+
+    def reset(self) -> None:
+        """An episode begins: back to the initial hidden state."""
+        if self._initial is not None:
+            self._state = memory.clone(self._initial)
+
+    def snapshot(self) -> PolicyState:
+        """Copy the hidden state; empty for a network without one."""
+        return () if self._initial is None else memory.save(self._state)
+
+    def restore(self, state: PolicyState) -> None:
+        """Return to a hidden state that `snapshot` gave.
+
+        Raises:
+            PolicyError: it is another network's.
+        """
+        if self._initial is None and not state:
+            return
+        expected = [tuple(tensor.shape) for tensor in memory.flatten(self._initial or ())]
+        found = [array.shape for array in state]
+        if expected != found:
+            raise PolicyError(f"{self.name}: expected a hidden state of shapes {expected}, got {found}")
+        self._state = memory.rebuild(self._initial, (torch.from_numpy(array.copy()) for array in state))
 
     def _same_bits(self) -> bool:
         """Whether the chain gives the module's own bits, on a few observations."""
         rng = np.random.default_rng(0)
-        for observation in rng.normal(size=(8, self.observations)).astype(np.float32):
-            with torch.inference_mode():
-                expected: torch.Tensor = self.module(torch.from_numpy(observation))
-            if not torch.equal(self._forward(observation), expected):
+        for observation in rng.normal(size=(8, *self.shape)).astype(np.float32):
+            try:
+                with torch.inference_mode():
+                    expected: torch.Tensor = self.module(torch.from_numpy(observation))
+                if not torch.equal(self._forward(observation), expected):
+                    return False
+            except RuntimeError:  # the module says so itself when it is tried
                 return False
         return True
 
-    def _unit_modules(self, hidden: Sequence[str] | None) -> list[nn.Module]:
-        modules = dict(self.module.named_modules())
-        if hidden is None:
-            return [module for module in modules.values() if isinstance(module, ACTIVATION_TYPES)]
-        missing = [name for name in hidden if name not in modules]
-        if missing:
-            known = ", ".join(name for name in modules if name)
-            raise PolicyError(f"{self.name}: no submodule '{missing[0]}'; there are {known}")
-        return [modules[name] for name in hidden]
+    def _watch(self, hidden: Sequence[str] | None) -> list[list[str]]:
+        chosen = hidden_modules(self.module, hidden, self.name)
+        names = name_layers(self.module, chosen, self._try)
+        for child in chosen:
+            child.register_forward_hook(lambda _module, _inputs, output: self._taps.replace(output))
+        return names
+
+    def _try(self) -> None:
+        self._taps.begin()
+        try:
+            self._forward(np.zeros(self.shape))
+            memory.check(self._initial, self._state)
+        except PolicyError as error:
+            raise PolicyError(f"{self.name}: {error}") from error
+        except (RuntimeError, TypeError, ValueError, IndexError) as error:
+            reason = str(error).strip().split("\n")[0]
+            raise PolicyError(
+                f"{self.name}: the network cannot take an observation of shape {self.shape} "
+                f"({'with' if self._batched else 'without'} a batch axis, "
+                f"{'with' if self.recurrent else 'without'} a hidden state): {reason}"
+            ) from error
 
     def _forward(self, observation: NDArray[Any]) -> torch.Tensor:
         x = torch.from_numpy(observation.astype(np.float32))
         if self._chain is None:
-            with torch.inference_mode():
-                output: torch.Tensor = self.module(x)
-            return output
+            return self._call(x)
         for function, has_units in self._chain:
             x = function(x)
             if has_units:
-                self._visit(x)
+                self._taps.overwrite(x)
         return x
 
-    def _visit(self, output: torch.Tensor) -> None:
-        # The array shares the tensor's memory, so writing to it is what the next layer reads.
-        values = output.numpy()
-        low, high = self._offset, self._offset + values.size
-        for unit, value in self._pending:
-            if low <= unit < high:
-                self._natural[unit] = float(values.flat[unit - low])
-                values.flat[unit - low] = value
-        self._outputs.append(values.reshape(-1))
-        self._offset = high
+    def _call(self, x: torch.Tensor) -> torch.Tensor:
+        if self._batched:
+            x = x.unsqueeze(0)
+        with torch.inference_mode():
+            if self._initial is None:
+                output: torch.Tensor = self.module(x)
+                return output
+            output, state = self.module(x, self._state)
+        self._state = memory.rebuild(state, iter(self._taps.natural_of(memory.flatten(state))))
+        return output
 
     def act(
         self,
@@ -174,28 +189,23 @@ class Policy:
         """One control step.
 
         Args:
-            observation: shape (observations,).
+            observation: of the policy's shape.
             stimulation: the units to overwrite.
             rng: draw the action from the policy's distribution with it; without, take the mean action.
 
         Raises:
-            PolicyError: the observation has another length, or a unit does not exist.
+            PolicyError: the observation has another shape, or a unit does not exist.
         """
-        if observation.shape != (self.observations,):
+        if observation.shape != self.shape:
             raise PolicyError(
-                f"{self.name}: expected an observation of shape ({self.observations},), "
-                f"got {observation.shape}"
+                f"{self.name}: expected an observation of shape {self.shape}, got {observation.shape}"
             )
-        self._outputs, self._offset = [], 0
-        if stimulation.units:
-            self._pending = tuple(zip(stimulation.units, stimulation.values, strict=True))
-            self._natural = {}
-        elif self._pending:
-            self._pending = ()
+        taps = self._taps
+        taps.begin(stimulation)
         action = self._decode(self._forward(observation), rng)
-        activations = np.concatenate(self._outputs)
+        activations = np.concatenate(taps.outputs)
         try:
-            natural = tuple([self._natural[unit] for unit in stimulation.units])
+            natural = tuple([taps.natural[unit] for unit in stimulation.units])
         except KeyError as error:
             raise PolicyError(
                 f"{self.name}: unit number {error} does not exist; "

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from pdtui.errors import MapError
+from pdtui.policies.units import ADDRESS
 from pdtui.stimulation.maps import (
     RESERVED_KEYS,
     SCHEMA,
@@ -22,7 +23,6 @@ from pdtui.stimulation.maps import (
     StimulationMap,
 )
 
-_UNIT = re.compile(r"\d{1,6}:\d{1,9}")
 _MAX_BYTES = 1_000_000
 _NUMBER = (int, float)
 
@@ -145,7 +145,7 @@ def parse_map(text: str, source: str) -> StimulationMap:
 
 def _primitive(table: _Table) -> Primitive:
     unit = table.text("unit")
-    if not _UNIT.fullmatch(unit):
+    if not ADDRESS.fullmatch(unit):
         raise table.error("unit", f"expected layer:index, such as 0:12, found '{unit}'")
     measured = table.table("measured", None)
     effect = None
@@ -172,7 +172,7 @@ def _behavior(table: _Table, primitives: dict[str, Primitive]) -> Behavior:
     name = table.text("name")
     magnitudes = table.numbers("magnitudes")
     for key in magnitudes:
-        if key not in primitives and not _UNIT.fullmatch(key):
+        if key not in primitives and not ADDRESS.fullmatch(key):
             known = ", ".join(primitives) or "none"
             raise table.error("magnitudes", f"'{key}': neither layer:index nor a primitive ({known})")
     if not magnitudes:

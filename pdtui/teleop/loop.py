@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pdtui.errors import EventError, SimulationDiverged
+from pdtui.policies.memory import PolicyState
 from pdtui.policies.runtime import Policy
 from pdtui.robots.base import Robot
 from pdtui.robots.types import Floats, RobotSnapshot
@@ -25,6 +26,7 @@ SNAPSHOTS_KEPT = 240
 @dataclass(frozen=True)
 class _Moment:
     robot: RobotSnapshot
+    policy: PolicyState
     latch: list[Any]
     noise: Mapping[str, Any]
     episode: int
@@ -61,6 +63,7 @@ class ControlLoop:
         self._ended = False
         self._moments: OrderedDict[int, _Moment] = OrderedDict()
         self._observation, _ = robot.reset(seed=seed)
+        policy.reset()
         self.attributes: Floats = robot.read_attributes()
 
     @property
@@ -154,6 +157,7 @@ class ControlLoop:
 
     def _start_episode(self) -> None:
         self._observation, _ = self.robot.reset()
+        self.policy.reset()
         self.attributes = self.robot.read_attributes()
         self.latch.clear()
         self.episode += 1
@@ -161,7 +165,9 @@ class ControlLoop:
 
     def _remember(self) -> None:
         noise = self._noise.bit_generator.state if self._noise is not None else {}
-        self._moments[self.step] = _Moment(self.robot.snapshot(), self.latch.save(), noise, self.episode)
+        self._moments[self.step] = _Moment(
+            self.robot.snapshot(), self.policy.snapshot(), self.latch.save(), noise, self.episode
+        )
         while len(self._moments) > SNAPSHOTS_KEPT:
             self._moments.popitem(last=False)
 
@@ -173,6 +179,7 @@ class ControlLoop:
             )
         moment = self._moments[step]
         self.robot.restore(moment.robot)
+        self.policy.restore(moment.policy)
         self.latch.load(moment.latch)
         if self._noise is not None:
             self._noise.bit_generator.state = moment.noise

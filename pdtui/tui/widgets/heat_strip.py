@@ -13,7 +13,7 @@ from rich.style import Style
 from textual.color import Color
 from textual.strip import Strip
 
-from pdtui.policies.units import format_unit
+from pdtui.policies.units import format_unit, locate_unit
 from pdtui.teleop.snapshot import Snapshot, UnitView
 from pdtui.tui.ownership import owners
 from pdtui.tui.palette import HEAT_LEVELS
@@ -118,9 +118,9 @@ class HeatStrip(Panel):
 
     def _column(self, view: UnitView, columns: int, places: list[tuple[int, int]]) -> int:
         assert self.briefing is not None
-        layer, _, index = format_unit(view.unit, self.briefing.layers).partition(":")
-        rows = max(1, places[int(layer)][1])
-        return Grid(self.briefing.layers[int(layer)], rows, columns).column_of(int(index))
+        layer, index = locate_unit(view.unit, self.briefing.layers)
+        rows = max(1, places[layer][1])
+        return Grid(self.briefing.layers[layer], rows, columns).column_of(index)
 
 
 @lru_cache(maxsize=1024)
