@@ -86,20 +86,16 @@ class Ant(MujocoRobot, AntEnv):
         return self.observe()
 
     def read_attributes(self) -> Floats:
-        qpos, qvel = self.data.qpos, self.data.qvel
-        quaternion = qpos[3:7]
-        w, x, y, z = quaternion.tolist()
-        roll, pitch, yaw = roll_pitch_yaw(quaternion)
-        a, b, c = qvel[3:6].tolist()
+        _, _, height, w, x, y, z = self.data.qpos[:7].tolist()
+        vx, vy, _, a, b, c = self.data.qvel[:6].tolist()
+        roll, pitch, yaw = roll_pitch_yaw(w, x, y, z)
         # Third row of the rotation matrix: MuJoCo's angular velocity is in the body's frame.
         yaw_rate = 2 * (x * z - w * y) * a + 2 * (y * z + w * x) * b + (1 - 2 * (x * x + y * y)) * c
-        vx, vy = qvel[:2].tolist()
         torques = [
             gear * min(1.0, max(-1.0, command))
             for gear, command in zip(self._gears, self.data.ctrl.tolist(), strict=True)
         ]
-        speed, height = math.hypot(vx, vy), float(qpos[2])
-        return np.array([vx, vy, speed, yaw, yaw_rate, roll, pitch, height, *torques])
+        return np.array([vx, vy, math.hypot(vx, vy), yaw, yaw_rate, roll, pitch, height, *torques])
 
     def _fallen(self) -> str | None:
         height = float(self.data.qpos[2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from hashlib import blake2b
 from typing import Any, cast
 
@@ -12,7 +13,7 @@ from pdtui.errors import RobotError, SimulationDiverged
 from pdtui.robots.base import Robot
 from pdtui.robots.types import Floats, Link, RobotSnapshot
 
-_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _SHAPES = {
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): ("capsule", 2),
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", 1),
@@ -56,17 +57,17 @@ class MujocoRobot(Robot):
     data: mujoco.MjData
 
     def read_poses(self) -> Floats:
+        # After a step MuJoCo's poses are those of the state before its last substep.
         mujoco.mj_kinematics(self.model, self.data)
-        poses = np.empty((self.model.nbody - 1, 7))
-        poses[:, :3] = self.data.xpos[1:]
-        poses[:, 3:] = self.data.xquat[1:]
+        poses: Floats = np.concatenate((self.data.xpos[1:], self.data.xquat[1:]), axis=1)
         return poses
 
     def snapshot(self) -> RobotSnapshot:
-        return RobotSnapshot(self.name, self._state(), self._extras(), self.np_random.bit_generator.state)
+        random = self.np_random.bit_generator.state
+        return RobotSnapshot(self.name, self._state().copy(), self._extras(), random)
 
     def restore(self, snapshot: RobotSnapshot) -> None:
-        size = mujoco.mj_stateSize(self.model, _STATE)
+        size = self._state_buffer.size
         if snapshot.robot != self.name or snapshot.state.shape != (size,):
             raise RobotError(
                 f"{self.name}: expected a snapshot of {self.name} with {size} numbers, got one of "
@@ -82,12 +83,16 @@ class MujocoRobot(Robot):
         self.np_random.bit_generator.state = snapshot.rng
 
     def digest(self) -> int:
-        return int.from_bytes(blake2b(self._state().tobytes(), digest_size=8).digest(), "little") >> 1
+        return int.from_bytes(blake2b(self._state(), digest_size=8).digest(), "little") >> 1
 
     def _state(self) -> Floats:
-        state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
-        mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return state
+        """The state vector, in an array that the next call overwrites."""
+        mujoco.mj_getState(self.model, self.data, self._state_buffer, _STATE)
+        return self._state_buffer
+
+    @cached_property
+    def _state_buffer(self) -> Floats:
+        return np.empty(mujoco.mj_stateSize(self.model, _STATE))
 
     def _extras(self) -> tuple[Floats, ...]:
         return ()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,11 @@ class Index:
         return self.array
 
 
+def stacked(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """What `numpy.stack` gives for arrays (width,) of one width, in half the time for many short ones."""
+    return np.concatenate(arrays).reshape(len(arrays), -1)
+
+
 def indexes(steps: Sequence[int], dt: float) -> list[Index]:
     """Both timelines: the control step, and the simulated time at which it starts."""
     numbers = np.array(steps, dtype=np.int64)
@@ -74,14 +80,14 @@ def ragged(
 ) -> Column:
     """One list of its own length a row."""
     flat = [value for row in lists for value in row]
-    offsets = np.zeros(len(lists) + 1, dtype=np.int32)
-    np.cumsum([len(row) for row in lists], out=offsets[1:])
+    offsets = np.array([0, *accumulate(map(len, lists))], dtype=np.int32)
     return _listed(descriptor, pa.array(flat, kind), offsets)
 
 
 def texts(descriptor: rr.ComponentDescriptor | str, values: Iterable[str]) -> Column:
     """One text a row."""
-    return ragged(descriptor, [(value,) for value in values], pa.utf8())
+    array = pa.array(list(values), pa.utf8())
+    return _listed(descriptor, array, _regular(len(array), 1))
 
 
 def _regular(count: int, width: int) -> NDArray[np.int32]:

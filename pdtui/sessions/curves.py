@@ -52,6 +52,11 @@ class Curves(Generic[Key]):
         self._rows: dict[Key, list[tuple[int, tuple[Any, ...]]]] = {}
         self._last: tuple[Key, ...] = ()
 
+    @property
+    def drawing(self) -> bool:
+        """Whether the last control step had values: if so, the next has to be added, be it empty."""
+        return bool(self._last)
+
     def add(self, step: int, values: Mapping[Key, tuple[Any, ...]]) -> None:
         """Take in the values of one control step by key."""
         for key in self._last:
@@ -103,10 +108,15 @@ class HeatMap:
         """Units from top to bottom, time from left to right; 128 is zero, the largest magnitude 1 or 255."""
         if not self._columns:
             return None
-        values = np.nan_to_num(np.stack(self._columns, axis=1))
-        share = np.clip(values / max(float(np.abs(values).max()), 1e-9), -1.0, 1.0)
-        picture: NDArray[np.uint8] = np.rint(128 + 127 * share).astype(np.uint8)
-        return picture
+        values = np.concatenate(self._columns).reshape(len(self._columns), -1)
+        if not np.isfinite(values).all():
+            np.nan_to_num(values, copy=False)
+        # In place, and turned only when the numbers are small: this is the last thing that a drive waits for.
+        values /= max(float(values.max()), -float(values.min()), 1e-9)
+        values *= 127
+        values += 128
+        picture: NDArray[np.uint8] = np.rint(values, out=values).astype(np.uint8)
+        return np.ascontiguousarray(picture.T)
 
 
 def _shades(color: tuple[int, int, int]) -> list[tuple[int, int, int]]:

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import rerun as rr
 
-from pdtui.sessions.columns import Column, nested, ragged, rows, texts
+from pdtui.sessions.columns import Column, nested, ragged, rows, stacked, texts
 from pdtui.sessions.events import Event
 from pdtui.sessions.record import StepRecord
 from pdtui.sessions.schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION
@@ -21,11 +21,15 @@ def drive_columns(records: Sequence[StepRecord]) -> list[Column]:
 
     What no step of the batch has (behaviors, stimulation) gets no column.
     """
-    gains = np.array([(record.reward, record.cost, *record.action) for record in records], np.float64)
+    actions = stacked([record.action for record in records])
+    gains = np.empty((len(records), 2 + actions.shape[1]))
+    gains[:, 0] = [record.reward for record in records]
+    gains[:, 1] = [record.cost for record in records]
+    gains[:, 2:] = actions
     counters = np.array([(record.digest, record.episode) for record in records], np.int64)
     columns = [
-        nested("activations", np.stack([record.activations for record in records])),
-        nested("attributes", np.stack([record.attributes for record in records])),
+        nested("activations", stacked([record.activations for record in records])),
+        nested("attributes", stacked([record.attributes for record in records])),
         nested(REWARD_COST_ACTION, gains),
         rows(DIGEST_EPISODE, counters),
     ]

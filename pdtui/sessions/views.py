@@ -57,22 +57,25 @@ class Views:
         """Take in control steps."""
         self._pending += len(records)
         for record in records:
-            state = " + ".join([behavior.name for behavior in record.behaviors]) if record.behaviors else ""
+            behaviors, stimulation = record.behaviors, record.stimulation
+            state = " + ".join([behavior.name for behavior in behaviors]) if behaviors else ""
             if state != self._state:
                 self._changes.append((record.step, state))
                 self._state = state
             if record.step % self._draw_every == 0:
                 self._drawn.append((record.step, record.poses, state))
-            values = zip(record.natural, record.stimulation.values, strict=True)
-            self._units.add(record.step, dict(zip(record.stimulation.units, values, strict=True)))
-            self._controllers.add(
-                record.step,
-                {
-                    one.name: (one.target, one.value, one.error, one.magnitude)
-                    for one in record.behaviors
-                    if one.target is not None
-                },
-            )
+            if stimulation.units or self._units.drawing:
+                values = zip(record.natural, stimulation.values, strict=True)
+                self._units.add(record.step, dict(zip(stimulation.units, values, strict=True)))
+            if behaviors or self._controllers.drawing:
+                self._controllers.add(
+                    record.step,
+                    {
+                        one.name: (one.target, one.value, one.error, one.magnitude)
+                        for one in behaviors
+                        if one.target is not None
+                    },
+                )
             self._heat.add(record.step, record.activations)
 
     @property
@@ -85,7 +88,7 @@ class Views:
         if self._drawn:
             self._name_states()
             steps, poses, states = zip(*self._drawn, strict=True)
-            self._write_robot(steps, np.stack(poses), states)
+            self._write_robot(steps, np.array(poses), states)
             self._drawn = []
         self._pending = 0
         self._units.write()
@@ -115,7 +118,8 @@ class Views:
         positions[:, 0, :2] = poses[:, 0, :2]
         # A picture's y axis points down, and only in a picture does the viewer fit the path to the frame.
         above = positions[:, :, :2] * np.array([1.0, -1.0], np.float32)
-        colors = np.array([_packed(self._colors.get(state, _IDLE)) for state in states], np.uint32)
+        packed = {state: _packed(self._colors.get(state, _IDLE)) for state in set(states)}
+        colors = np.array([packed[state] for state in states], np.uint32)
         columns = [
             vectors(rr.Points3D.descriptor_positions(), positions),
             rows(rr.Points3D.descriptor_colors(), colors),
