@@ -6,7 +6,7 @@ import copy
 from dataclasses import dataclass
 
 from pdtui.errors import EventError
-from pdtui.policies.units import Stimulation, parse_unit
+from pdtui.policies.units import NO_STIMULATION, Stimulation, parse_unit
 from pdtui.robots.types import Attribute, Floats, column_of
 from pdtui.stimulation.magnitude import PidMagnitude
 from pdtui.stimulation.maps import Behavior, StimulationMap
@@ -38,6 +38,12 @@ class _Latched:
         self.factor = 1.0
         self.controller: PidMagnitude | None = None
         self.column = 0
+
+    def copy(self) -> _Latched:
+        """What changes is copied; the behavior and its weights never do."""
+        other = copy.copy(self)
+        other.controller = copy.deepcopy(self.controller)
+        return other
 
 
 class Latch:
@@ -149,6 +155,8 @@ class Latch:
         Args:
             attributes: the robot's present values, shape (J,).
         """
+        if not self._latched:
+            return NO_STIMULATION
         values: dict[int, float] = {}
         for latched in self._latched:
             factor = latched.factor
@@ -166,11 +174,11 @@ class Latch:
 
     def save(self) -> list[_Latched]:
         """A copy of the state, for `load`."""
-        return copy.deepcopy(self._latched)
+        return [latched.copy() for latched in self._latched]
 
     def load(self, state: list[_Latched]) -> None:
         """Return to a state that `save` gave."""
-        self._latched = copy.deepcopy(state)
+        self._latched = [latched.copy() for latched in state]
 
     def _behavior(self, name: str) -> Behavior:
         if name not in self._map.behaviors:
