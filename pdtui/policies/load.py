@@ -22,7 +22,8 @@ def decoder_for(spec: NetworkSpec) -> Decoder:
     middle, half = (high + low) / 2, (high - low) / 2
 
     def squashed(output: torch.Tensor, rng: np.random.Generator | None) -> NDArray[np.float32]:
-        mean, log_std = output.numpy().reshape(2, -1)
+        numbers = output.numpy()
+        mean, log_std = numbers[: spec.actions], numbers[spec.actions :]
         if rng is not None:
             mean = mean + np.exp(np.clip(log_std, -5.0, 2.0)) * rng.standard_normal(spec.actions, np.float32)
         action: NDArray[np.float32] = middle + half * np.tanh(mean)

@@ -52,7 +52,8 @@ class Policy:
         observations: length or shape of the observation.
         hidden: names of the submodules whose outputs are the units; by default every activation function and
             every recurrent layer.
-        decode: turns the network's output into an action.
+        decode: turns the network's output into an action, an array of its own: the next step overwrites the
+            output.
         batched: whether the network wants a leading axis of length 1 before the observation's own.
         initial_state: what a recurrent network is fed first: a tensor, or tuples of tensors.
         name: for messages.
@@ -82,12 +83,13 @@ class Policy:
         self._state = self._initial
         self._taps = Taps()
         plain = hidden is None and initial_state is None and not batched and len(self.shape) == 1
-        self._chain = chain_of(self.module) if plain else None
-        if self._chain is not None and not self._same_bits():
-            self._chain = None
-        names = self._watch(hidden) if self._chain is None else []
-        self._try()
-        self.layers = Layers((output.size for output in self._taps.outputs), names)
+        self._chain = chain_of(self.module, self.shape[0]) if plain else None
+        if self._chain is not None:
+            self.layers = Layers(self._chain.layers, [])
+        else:
+            names = self._watch(hidden)
+            self._try()
+            self.layers = Layers((output.size for output in self._taps.outputs), names)
         if not self.layers:
             raise PolicyError(
                 f"{name}: the network has no hidden layer to stimulate: no submodule is an activation "
@@ -124,19 +126,6 @@ class Policy:
             raise PolicyError(f"{self.name}: expected a hidden state of shapes {expected}, got {found}")
         self._state = memory.rebuild(self._initial, (torch.from_numpy(array.copy()) for array in state))
 
-    def _same_bits(self) -> bool:
-        """Whether the chain gives the module's own bits, on a few observations."""
-        rng = np.random.default_rng(0)
-        for observation in rng.normal(size=(8, *self.shape)).astype(np.float32):
-            try:
-                with torch.inference_mode():
-                    expected: torch.Tensor = self.module(torch.from_numpy(observation))
-                if not torch.equal(self._forward(observation), expected):
-                    return False
-            except RuntimeError:  # the module says so itself when it is tried
-                return False
-        return True
-
     def _watch(self, hidden: Sequence[str] | None) -> list[list[str]]:
         chosen = hidden_modules(self.module, hidden, self.name)
         names = name_layers(self.module, chosen, self._try)
@@ -147,7 +136,7 @@ class Policy:
     def _try(self) -> None:
         self._taps.begin()
         try:
-            self._forward(np.zeros(self.shape))
+            self._call(np.zeros(self.shape))
             memory.check(self._initial, self._state)
         except PolicyError as error:
             raise PolicyError(f"{self.name}: {error}") from error
@@ -159,17 +148,8 @@ class Policy:
                 f"{'with' if self.recurrent else 'without'} a hidden state): {reason}"
             ) from error
 
-    def _forward(self, observation: NDArray[Any]) -> torch.Tensor:
+    def _call(self, observation: NDArray[Any]) -> torch.Tensor:
         x = torch.from_numpy(observation.astype(np.float32))
-        if self._chain is None:
-            return self._call(x)
-        for function, has_units in self._chain:
-            x = function(x)
-            if has_units:
-                self._taps.overwrite(x)
-        return x
-
-    def _call(self, x: torch.Tensor) -> torch.Tensor:
         if self._batched:
             x = x.unsqueeze(0)
         with torch.inference_mode():
@@ -200,12 +180,15 @@ class Policy:
             raise PolicyError(
                 f"{self.name}: expected an observation of shape {self.shape}, got {observation.shape}"
             )
-        taps = self._taps
-        taps.begin(stimulation)
-        action = self._decode(self._forward(observation), rng)
-        activations = np.concatenate(taps.outputs)
+        if self._chain is not None:
+            output, activations, found = self._chain.run(observation, stimulation)
+        else:
+            self._taps.begin(stimulation)
+            output = self._call(observation)
+            activations, found = np.concatenate(self._taps.outputs), self._taps.natural
+        action = self._decode(output, rng)
         try:
-            natural = tuple([taps.natural[unit] for unit in stimulation.units])
+            natural = tuple([found[unit] for unit in stimulation.units])
         except KeyError as error:
             raise PolicyError(
                 f"{self.name}: unit number {error} does not exist; "

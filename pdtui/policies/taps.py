@@ -39,18 +39,6 @@ class Taps:
         elif self._pending:
             self._pending = ()
 
-    def overwrite(self, output: torch.Tensor) -> None:
-        """Take one layer's output, and overwrite it in place."""
-        # The array shares the tensor's memory, so writing to it is what the next layer reads.
-        values = output.numpy()
-        low, high = self._offset, self._offset + values.size
-        for unit, value in self._pending:
-            if low <= unit < high:
-                self.natural[unit] = float(values.flat[unit - low])
-                values.flat[unit - low] = value
-        self.outputs.append(values.reshape(-1))
-        self._offset = high
-
     def replace(self, output: Any) -> Any:
         """Take what a hidden submodule puts out, and return what it puts out instead; None lets it be.
 
