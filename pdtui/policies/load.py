@@ -23,8 +23,9 @@ def decoder_for(spec: NetworkSpec) -> Decoder:
 
     def squashed(output: torch.Tensor, rng: np.random.Generator | None) -> NDArray[np.float32]:
         numbers = output.numpy()
-        mean, log_std = numbers[: spec.actions], numbers[spec.actions :]
+        mean = numbers[: spec.actions]
         if rng is not None:
+            log_std = numbers[spec.actions :]
             mean = mean + np.exp(np.clip(log_std, -5.0, 2.0)) * rng.standard_normal(spec.actions, np.float32)
         action: NDArray[np.float32] = middle + half * np.tanh(mean)
         return action

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import accumulate
 from typing import Any
 
@@ -63,7 +64,7 @@ def rows(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> Colum
 def nested(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> Column:
     """A block (n, width) as n lists of one list each: only so can the viewer select one of its numbers."""
     inner = _regular(len(block), block.shape[1])
-    values = pa.ListArray.from_arrays(pa.array(inner), pa.array(block.reshape(-1)))
+    values = pa.ListArray.from_arrays(inner, pa.array(block.reshape(-1)))
     return _listed(descriptor, values, _regular(len(block), 1))
 
 
@@ -80,7 +81,7 @@ def ragged(
 ) -> Column:
     """One list of its own length a row."""
     flat = [value for row in lists for value in row]
-    offsets = np.array([0, *accumulate(map(len, lists))], dtype=np.int32)
+    offsets = pa.array([0, *accumulate(map(len, lists))], pa.int32())
     return _listed(descriptor, pa.array(flat, kind), offsets)
 
 
@@ -90,11 +91,12 @@ def texts(descriptor: rr.ComponentDescriptor | str, values: Iterable[str]) -> Co
     return _listed(descriptor, array, _regular(len(array), 1))
 
 
-def _regular(count: int, width: int) -> NDArray[np.int32]:
-    return np.arange(count + 1, dtype=np.int32) * np.int32(width)
+@lru_cache(maxsize=32)
+def _regular(count: int, width: int) -> pa.Array:
+    return pa.array(np.arange(count + 1, dtype=np.int32) * np.int32(width))
 
 
-def _listed(descriptor: rr.ComponentDescriptor | str, values: Any, offsets: NDArray[np.int32]) -> Column:
+def _listed(descriptor: rr.ComponentDescriptor | str, values: Any, offsets: pa.Array) -> Column:
     if isinstance(descriptor, str):
         descriptor = rr.ComponentDescriptor(descriptor)
-    return Column(descriptor, pa.ListArray.from_arrays(pa.array(offsets), values))
+    return Column(descriptor, pa.ListArray.from_arrays(offsets, values))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -21,24 +22,24 @@ def drive_columns(records: Sequence[StepRecord]) -> list[Column]:
 
     What no step of the batch has (behaviors, stimulation) gets no column.
     """
-    actions = stacked([record.action for record in records])
+    of: Any = StepRecord(*zip(*records, strict=True))
+    actions = stacked(of.action)
     gains = np.empty((len(records), 2 + actions.shape[1]))
-    gains[:, 0] = [record.reward for record in records]
-    gains[:, 1] = [record.cost for record in records]
-    gains[:, 2:] = actions
-    counters = np.array([(record.digest, record.episode) for record in records], np.int64)
+    gains[:, 0], gains[:, 1], gains[:, 2:] = of.reward, of.cost, actions
+    counters = np.empty((len(records), 2), np.int64)
+    counters[:, 0], counters[:, 1] = of.digest, of.episode
     columns = [
-        nested("activations", stacked([record.activations for record in records])),
-        nested("attributes", stacked([record.attributes for record in records])),
+        nested("activations", stacked(of.activations)),
+        nested("attributes", stacked(of.attributes)),
         nested(REWARD_COST_ACTION, gains),
         rows(DIGEST_EPISODE, counters),
     ]
-    if any(record.stimulation.units for record in records):
+    if any(stimulation.units for stimulation in of.stimulation):
         columns.append(ragged("stimulation", [_overwrites(record) for record in records], pa.float64()))
-    if any(record.behaviors for record in records):
-        names = [[behavior.name for behavior in record.behaviors] for record in records]
+    if any(of.behaviors):
+        names = [[behavior.name for behavior in behaviors] for behaviors in of.behaviors]
         states = [
-            [value for behavior in record.behaviors for value in _state(behavior)] for record in records
+            [value for behavior in behaviors for value in _state(behavior)] for behaviors in of.behaviors
         ]
         columns += [ragged("behaviors", names, pa.utf8()), ragged("active", states, pa.float64())]
     return columns

@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -82,8 +81,7 @@ def test_a_session_without_steps_is_a_session(recorded: Recorded, tmp_path: Path
 
 def test_a_diverged_step_is_kept_with_its_reason(recorded: Recorded, tmp_path: Path) -> None:
     _, loop, records = recorded
-    lost = replace(
-        records[1],
+    lost = records[1]._replace(
         attributes=np.full_like(records[1].attributes, np.nan),
         poses=np.full_like(records[1].poses, np.nan),
         ended="the simulation diverged at 0.05 s",
