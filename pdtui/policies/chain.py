@@ -79,7 +79,8 @@ class Chain:
         """One pass.
 
         Returns:
-            The output, which the next pass overwrites; all activations; what each stimulated unit that exists would have put out.
+            The output, which the next pass overwrites; all activations; and what each stimulated unit that
+            exists would have put out.
         """
         self._input[:] = observation
         values = self._activations

@@ -83,7 +83,7 @@ class MujocoRobot(Robot):
         self.np_random.bit_generator.state = snapshot.rng
 
     def digest(self) -> int:
-        return int.from_bytes(blake2b(self._state(), digest_size=8).digest(), "little") >> 1
+        return int.from_bytes(blake2b(self._state().data, digest_size=8).digest(), "little") >> 1
 
     def _state(self) -> Floats:
         """The state vector, in an array that the next call overwrites."""

@@ -22,7 +22,7 @@ def drive_columns(records: Sequence[StepRecord]) -> list[Column]:
 
     What no step of the batch has (behaviors, stimulation) gets no column.
     """
-    of: Any = StepRecord(*zip(*records, strict=True))
+    of: Any = StepRecord._make(zip(*records, strict=True))
     actions = stacked(of.action)
     gains = np.empty((len(records), 2 + actions.shape[1]))
     gains[:, 0], gains[:, 1], gains[:, 2:] = of.reward, of.cost, actions

@@ -90,16 +90,40 @@ def test_any_module_has_its_units_in_the_order_of_the_calls() -> None:
     np.testing.assert_allclose(step.action, expected.numpy(), atol=1e-6)
 
 
-def test_chain_and_hooks_give_the_same_bits() -> None:
+class _Centre(nn.Module):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return x - x.mean()
+
+
+@pytest.mark.parametrize(
+    ("stages", "hidden"),
+    [
+        ([nn.Linear(5, 32), nn.ELU(), nn.Linear(32, 32), nn.Tanh(), nn.Linear(32, 3)], ["1", "3"]),
+        ([_Centre(), nn.Linear(5, 40), nn.ReLU(), nn.Dropout(), nn.Linear(40, 8, bias=False)], ["2"]),
+        ([nn.Linear(5, 32), _Centre(), nn.Tanh(), nn.ReLU(), nn.Linear(32, 9), nn.Tanh()], ["2", "3", "5"]),
+    ],
+)
+def test_chain_and_hooks_give_the_same_bits(stages: list[nn.Module], hidden: list[str]) -> None:
     torch.manual_seed(0)
-    module = nn.Sequential(nn.Linear(5, 32), nn.ELU(), nn.Linear(32, 32), nn.Tanh(), nn.Linear(32, 3))
+    module = nn.Sequential(*stages)
     chain = Policy(module, 5)
-    hooks = Policy(module, 5, hidden=["1", "3"])
-    stimulation = Stimulation((4, 40), (1.5, -1.5))
+    hooks = Policy(module, 5, hidden=hidden)
+    assert chain.layers == hooks.layers
+    stimulation = Stimulation((4, chain.units - 1), (1.5, -1.5))
     for observation in _observations(20, 5):
         a, b = chain.act(observation, stimulation), hooks.act(observation, stimulation)
         np.testing.assert_array_equal(a.action, b.action)
         np.testing.assert_array_equal(a.activations, b.activations)
+        assert a.natural == b.natural
+
+
+def test_a_step_is_not_changed_by_the_next(policy: Policy) -> None:
+    first, second = _observations(2)
+    step = policy.act(first)
+    action, activations = step.action.copy(), step.activations.copy()
+    policy.act(second)
+    np.testing.assert_array_equal(step.action, action)
+    np.testing.assert_array_equal(step.activations, activations)
 
 
 def test_sampled_actions_come_from_the_generator(policy: Policy) -> None:
