@@ -51,22 +51,27 @@ class Candidates:
         return self._tidy(dict(zip(chosen.tolist(), sizes * rng.choice([-1.0, 1.0], units), strict=True)))
 
     def change(self, parent: Stimulation, most: int) -> Stimulation:
-        """One change: scale one output, swap or add a unit, drop one, or scale all; at most `most` units."""
+        """One change: scale some outputs, swap or add or drop units, or scale all; at most `most` units.
+
+        Of many units an eighth changes at once: one alone would hardly show.
+        """
         rng = self.rng
         values = _as_dict(parent)
+        some = max(1, len(values) // 8)
         kind = rng.random()
-        if kind < 0.45 or (kind < 0.7 and len(values) >= most):
-            unit = self._pick(values)
-            values[unit] *= float(np.exp(rng.normal(0.0, _SPREAD)))
-            if rng.random() < _FLIP:
-                values[unit] = -values[unit]
-        elif kind < 0.7:
+        if kind < 0.4 or (kind < 0.6 and len(values) >= most):
+            factor = float(np.exp(rng.normal(0.0, _SPREAD))) * (-1.0 if rng.random() < _FLIP else 1.0)
+            for unit in self._pick(values, some):
+                values[unit] *= factor
+        elif kind < 0.6:
             values |= _as_dict(self.draw(1))
-        elif kind < 0.85:
-            del values[self._pick(values)]
+        elif kind < 0.75:
+            for unit in self._pick(values, some):
+                del values[unit]
             values |= _as_dict(self.draw(1))
-        elif kind < 0.92 and len(values) > 1:
-            del values[self._pick(values)]
+        elif kind < 0.87 and len(values) > 1:
+            for unit in self._pick(values, some):
+                del values[unit]
         else:
             factors = np.exp(rng.normal(0.0, _SPREAD / 2, len(values)))
             values = {unit: v * float(f) for (unit, v), f in zip(values.items(), factors, strict=True)}
@@ -81,12 +86,13 @@ class Candidates:
         return ranked[int(self.rng.random() ** 2 * len(ranked))]
 
     def _fewer(self, values: dict[int, float], most: int) -> dict[int, float]:
-        while len(values) > most:
-            del values[self._pick(values)]
+        for unit in self._pick(values, max(0, len(values) - most)):
+            del values[unit]
         return values
 
-    def _pick(self, values: Mapping[int, float]) -> int:
-        return int(self.rng.choice(list(values)))
+    def _pick(self, values: Mapping[int, float], count: int) -> list[int]:
+        chosen: list[int] = self.rng.choice(list(values), size=count, replace=False).tolist()
+        return chosen
 
     def _tidy(self, values: Mapping[int, float]) -> Stimulation:
         """Units in order, values of three digits: what a map says is then exactly what was measured."""

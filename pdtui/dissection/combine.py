@@ -27,7 +27,7 @@ class Sizes:
         children: candidates of one generation.
         promoted: of them, those probed from more starts.
         most_units: units of a candidate at most, in the first round and in those that follow where the goal
-            was not reached: from the third unit or so on, it is a direction in a layer.
+            was not reached: a behavior of many units is a direction in a layer.
         generations: of one round, at most.
         patience: generations without progress before a round ends.
         quick_starts, quick_steps: of the first look at a child.
@@ -43,7 +43,7 @@ class Sizes:
     elite: int = 16
     children: int = 28
     promoted: int = 8
-    most_units: tuple[int, ...] = (3, 6, 12)
+    most_units: tuple[int, ...] = (3, 8, 24, 64)
     generations: int = 24
     patience: int = 6
     quick_starts: int = 3
@@ -100,39 +100,43 @@ class Starts:
 
 
 class Pool:
-    """Random pairs and triples, probed once: where searches begin when no single unit leads the way.
+    """Sets of units, probed once for all goals: where searches begin when no single unit leads the way.
 
     Args:
         prober: measures.
+        plans: what to probe.
         starts: a few of the search starts.
-        sizes: how much to do.
-        seed: of the draws.
+        steps: control steps of each roll-out.
         progress: called with (roll-outs done, roll-outs).
     """
 
     def __init__(
         self,
         prober: Prober,
+        plans: Sequence[Stimulation],
         starts: Sequence[Start],
-        sizes: Sizes,
-        seed: int,
+        steps: int,
         progress: Progress | None = None,
     ) -> None:
-        units = prober.crew.policy.units
-        source = Candidates(np.ones(units), sizes.bounds, seed)
-        most = min(3, units)
-        self.plans = tuple(
-            source.draw(int(source.rng.integers(min(2, most), most + 1))) for _ in range(sizes.pool)
-        )
-        steps = sizes.quick_steps
+        self.plans = tuple(plans)
         self.effects = prober.probe(
             self.plans, starts, steps=steps, measure_from=steps // 3, progress=progress
         )
 
-    def best(self, goal: Goal, column: int, count: int) -> list[Stimulation]:
-        """Those that went the goal's way furthest."""
+    def best(self, goal: Goal, column: int, count: int, most: int) -> list[Stimulation]:
+        """Those of at most so many units that went the goal's way furthest."""
+        if not self.plans:
+            return []
         scored = score(goal, column, self.effects, [len(plan.units) for plan in self.plans])
-        return [self.plans[index] for index in np.argsort(-scored, kind="stable")[:count]]
+        order = [int(index) for index in np.argsort(-scored, kind="stable")]
+        return [self.plans[index] for index in order if len(self.plans[index].units) <= most][:count]
+
+
+def random_sets(units: int, sizes: Sizes, seed: int) -> list[Stimulation]:
+    """Pairs and triples of units, drawn at random."""
+    source = Candidates(np.ones(units), sizes.bounds, seed)
+    most = min(3, units)
+    return [source.draw(int(source.rng.integers(min(2, most), most + 1))) for _ in range(sizes.pool)]
 
 
 class Search:
@@ -176,8 +180,9 @@ class Search:
         """
         sizes, source = self._sizes, self._candidates(sweeps)
         total = sizes.generations * len(sizes.most_units)
-        self._generation([*self._atoms(sweeps), *pool.best(self._goal, self._column, sizes.children)])
         for round_, most in enumerate(sizes.most_units):
+            first = self._atoms(sweeps) if round_ == 0 else []
+            self._generation([*first, *pool.best(self._goal, self._column, sizes.children, most)])
             idle = 0
             for number in range(sizes.generations):
                 if progress is not None:

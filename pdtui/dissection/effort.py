@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from pdtui.dissection.combine import Sizes
 from pdtui.dissection.hold import HoldSizes
+from pdtui.dissection.imprint import ImprintSizes
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class Effort:
         refine_values, refine_starts, refine_steps: those units again, from other starts.
         search_starts, selection_starts, held_out_starts: of the search for behaviors.
         walk: control steps between a reset and a start.
+        imprint: how many imprints the searches begin from.
         search, hold: sizes of the searches.
     """
 
@@ -36,5 +38,6 @@ class Effort:
     selection_starts: int = 12
     held_out_starts: int = 16
     walk: int = 100
+    imprint: ImprintSizes = field(default_factory=ImprintSizes)
     search: Sizes = field(default_factory=Sizes)
     hold: HoldSizes = field(default_factory=HoldSizes)

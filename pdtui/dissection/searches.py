@@ -8,13 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pdtui.dissection.combine import Found, Pool, Search, Starts
+from pdtui.dissection.combine import Found, Pool, Search, Starts, random_sets
 from pdtui.dissection.effort import Effort
 from pdtui.dissection.goals import goals_for
 from pdtui.dissection.hold import Aimed, Held, HoldSearch
-from pdtui.dissection.monitor import Progress
+from pdtui.dissection.imprint import imprints
+from pdtui.dissection.monitor import Progress, monitor
 from pdtui.dissection.probe import Prober, Sweep
 from pdtui.robots.base import Robot
+
+_IMPRINT_SEEDS = 1000
+"""Beyond the first seed of a dissection: no other stage has these."""
 
 
 class Clock:
@@ -57,8 +61,7 @@ class Searches:
         goals = goals_for(self.world.attributes)
         if not goals:
             return ()
-        few = starts.search[: self.plan.search.quick_starts]
-        pool = Pool(self.prober, few, self.plan.search, self.seed, self.stage("random pairs and triples"))
+        pool = self._pool(starts)
         found = []
         for number, goal in enumerate(goals):
             column = self.world.attribute_index(goal.aim.attribute)
@@ -66,6 +69,17 @@ class Searches:
             deadline = self.clock.share(len(goals) - number + 2)
             found.append(search.run(sweeps, pool, deadline, self.stage(f"search: {goal.name}")))
         return tuple(found)
+
+    def _pool(self, starts: Starts) -> Pool:
+        crew, sizes, imprint = self.prober.crew, self.plan.search, self.plan.imprint
+        seeds = range(self.seed + _IMPRINT_SEEDS, self.seed + _IMPRINT_SEEDS + imprint.episodes)
+        episodes = monitor(self.world, crew.policy, seeds, imprint.steps)
+        plans = [
+            *random_sets(crew.policy.units, sizes, self.seed),
+            *imprints(episodes, self.world.attributes, crew.policy.layers, imprint, sizes.bounds.largest),
+        ]
+        few = starts.search[: sizes.quick_starts]
+        return Pool(self.prober, plans, few, sizes.quick_steps, self.stage("sets of units"))
 
     def holds(self, sweep: Sweep, starts: Starts) -> tuple[Held, ...]:
         """The best controllers for heading and speed, where the robot has them and the time is not up."""

@@ -17,6 +17,7 @@ from pdtui.dissection.effort import Effort
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.goals import GOALS, gains, score
 from pdtui.dissection.hold import Held, HoldSizes
+from pdtui.dissection.imprint import ImprintSizes
 from pdtui.dissection.probe import Effects
 from pdtui.dissection.propose import propose
 from pdtui.dissection.report import render
@@ -39,6 +40,7 @@ SMALL = Effort(
     selection_starts=2,
     held_out_starts=2,
     walk=20,
+    imprint=ImprintSizes(episodes=2, steps=10, bins=2, units=(3,), factors=(1.0,)),
     search=Sizes(
         pool=4, atoms=4, elite=3, children=3, promoted=2, most_units=(3,), generations=1, quick_starts=1,
         quick_steps=12, full_starts=2, full_steps=16, finalists=2, final_steps=18,

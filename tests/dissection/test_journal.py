@@ -27,9 +27,7 @@ def test_an_interrupted_dissection_goes_on_without_loss(policy_file: Path, tmp_p
 
     journal = tmp_path / "rollouts"
     with pytest.raises(Interrupted):
-        dissect(
-            "ant", policy_file, episodes=2, workers=1, effort=SMALL, journal=journal, progress=interrupt
-        )
+        dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL, journal=journal, progress=interrupt)
     with Journal(journal, "") as left:
         assert len(left) > 16 * len(SMALL.screen_values) * SMALL.screen_starts
     resumed = dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL, journal=journal)
