@@ -35,6 +35,7 @@ class Sizes:
         finalists: elite that the selection starts decide between.
         final_steps: stimulated control steps of the selection and of the held-out score.
         satisfied: score at which it ends early.
+        safe: score from which no round with more units follows: what the search sees flatters a little.
         bounds: of the outputs v.
     """
 
@@ -53,6 +54,7 @@ class Sizes:
     finalists: int = 6
     final_steps: int = 300
     satisfied: float = 1.8
+    safe: float = 1.25
     bounds: Bounds = field(default_factory=Bounds)
 
 
@@ -65,6 +67,7 @@ class Found:
         stimulation: units and outputs v.
         score: on the held-out starts, in parts of what is enough (see `goals.score`).
         search_score: on the starts that the search saw; higher by what it owes to luck.
+        change: of the attribute itself on the held-out starts, with its interval and the falls.
         gain: mean over the held-out starts with its interval, as in `goals.gains`.
         success: share of the held-out starts on which it gained enough without a fall.
         falls: share of the held-out starts on which the robot fell.
@@ -77,6 +80,7 @@ class Found:
     stimulation: Stimulation
     score: float
     search_score: float
+    change: Measured
     gain: Measured
     success: float
     falls: float
@@ -130,6 +134,25 @@ class Pool:
         scored = score(goal, column, self.effects, [len(plan.units) for plan in self.plans])
         order = [int(index) for index in np.argsort(-scored, kind="stable")]
         return [self.plans[index] for index in order if len(self.plans[index].units) <= most][:count]
+
+    def opposites(self, column: int, count: int) -> list[tuple[Stimulation, Stimulation]]:
+        """Pairs of plans on the same units that raise and lower an attribute, the strongest pairs first.
+
+        A pair is as strong as its weaker side; plans that fell are left out.
+        """
+        effect = np.nan_to_num(self.effects.effects[..., column]).mean(axis=1)
+        effect[self.effects.falls.any(axis=1)] = 0.0
+        same: dict[tuple[int, ...], list[int]] = {}
+        for index, plan in enumerate(self.plans):
+            same.setdefault(plan.units, []).append(index)
+        pairs = []
+        for indices in same.values():
+            high, low = max(indices, key=lambda i: effect[i]), min(indices, key=lambda i: effect[i])
+            strength = min(float(effect[high]), -float(effect[low]))
+            if strength > 0:
+                pairs.append((strength, self.plans[high], self.plans[low]))
+        pairs.sort(key=lambda pair: (-pair[0], pair[1].units))
+        return [(high, low) for _, high, low in pairs[:count]]
 
 
 def random_sets(units: int, sizes: Sizes, seed: int) -> list[Stimulation]:
@@ -192,7 +215,7 @@ class Search:
                     break
                 self._generation([self._child(source, most) for _ in range(sizes.children)])
                 idle = 0 if self._elite[0][0] > best + 0.01 else idle + 1
-            if self._elite[0][0] >= 1.0:
+            if self._elite[0][0] >= sizes.safe:
                 break
         if progress is not None:
             progress(total, total)
@@ -272,11 +295,19 @@ class Search:
         held = self._probe([best], self._starts.held_out, sizes.final_steps)
         gain = gains(self._goal, column, held)[0]
         low, high = bootstrap_interval(gain, 0)
+        effects, falls = held.effects[0, :, column], held.falls[0]
+        change = Measured(
+            float(np.nanmean(effects)) if np.isfinite(effects).any() else 0.0,
+            *bootstrap_interval(effects, 0),
+            int(falls.sum()),
+            len(falls),
+        )
         return Found(
             goal=self._goal,
             stimulation=best,
             score=float(score(self._goal, column, held, [len(best.units)])[0]),
             search_score=self._elite[[plan for _, plan in self._elite].index(best)][0],
+            change=change,
             gain=Measured(float(gain.mean()), low, high),
             success=float(np.mean((gain >= self._goal.enough) & ~held.falls[0])),
             falls=float(held.falls[0].mean()),

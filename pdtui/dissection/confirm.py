@@ -115,7 +115,7 @@ def confirm(unit: int, column: int, screen: Sweep, refined: Sweep, seed: int) ->
         value=value,
         measured=Measured(effect, low, high),
         one_sign=bool(robust[dose] > 0),
-        exceeds=bool(abs(effect) > np.quantile(_sizes(screen, column, abs(value)), RARE)),
+        exceeds=exceeds_random(effect, value, column, screen),
         both_ways=_both_ways(refined, row, column),
         survived=refined.survived(unit),
     )
@@ -167,6 +167,12 @@ def rank_correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     if len(a) < 2 or np.ptp(a) == 0 or np.ptp(b) == 0:
         return float("nan")
     return float(np.corrcoef(rankdata(a), rankdata(b))[0, 1])
+
+
+def exceeds_random(effect: float, value: float, column: int, screen: Sweep) -> bool:
+    """Whether an effect is larger than that of `RARE` of all units at the same |v|, or the nearest one."""
+    screened = min((abs(v) for v in screen.values), key=lambda size: abs(size - abs(value)))
+    return bool(abs(effect) > np.quantile(_sizes(screen, column, screened), RARE))
 
 
 def _sizes(screen: Sweep, column: int, size: float) -> Floats:

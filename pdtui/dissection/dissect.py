@@ -8,6 +8,8 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
+import numpy as np
+
 from pdtui.dissection.combine import Starts
 from pdtui.dissection.confirm import draw_controls, select_units
 from pdtui.dissection.effort import Effort
@@ -19,6 +21,7 @@ from pdtui.dissection.phase import correlate
 from pdtui.dissection.probe import Prober
 from pdtui.dissection.searches import Clock, Searches
 from pdtui.dissection.spectrum import find_preset
+from pdtui.dissection.steer import movable, steer
 from pdtui.dissection.workers import Crew
 from pdtui.sessions.versions import environment_versions
 
@@ -89,9 +92,20 @@ def dissect(
             progress=stage("refine the best"),
         )
         starts = Starts(*pools[2:])
+        spread = np.concatenate([episode.attributes for episode in recorded]).std(axis=0)
+        steered = steer(
+            prober,
+            movable(world.attributes, spread),
+            spread,
+            screen,
+            refined,
+            starts.held_out,
+            plan.refine_steps,
+        )
         searches = Searches(prober, world, plan, seed, Clock(began, budget_minutes), stage)
-        behaviors = searches.behaviors((screen, refined), starts)
-        holds = searches.holds(refined, starts)
+        pool = searches.pool(starts)
+        behaviors = searches.behaviors((screen, refined), pool, starts)
+        holds = searches.holds(refined, pool, starts)
         if known is not None:
             known.remove()
         return Dissection(
@@ -108,6 +122,8 @@ def dissect(
             screen=screen,
             refined=refined,
             controls=controls,
+            spread=spread,
+            steered=steered,
             behaviors=behaviors,
             holds=holds,
             rollouts=crew.rollouts,

@@ -10,7 +10,8 @@ from pdtui.dissection.matching import Match
 from pdtui.dissection.phase import Phase
 from pdtui.dissection.probe import Sweep
 from pdtui.dissection.spectrum import Preset
-from pdtui.robots.types import Attribute, column_of
+from pdtui.dissection.steer import Steered
+from pdtui.robots.types import Attribute, Floats, column_of
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,8 @@ class Dissection:
         screen: every unit, at a few values.
         refined: the best of them, the first matches and the controls, from other starts.
         controls: units drawn at random.
+        spread: standard deviation of every attribute over the monitored steps, shape (J,).
+        steered: up and down for each attribute.
         behaviors: the best stimulation for each goal.
         holds: the best controllers.
         rollouts, control_steps, minutes: what it took.
@@ -49,6 +52,8 @@ class Dissection:
     screen: Sweep
     refined: Sweep
     controls: tuple[int, ...]
+    spread: Floats
+    steered: tuple[Steered, ...]
     behaviors: tuple[Found, ...]
     holds: tuple[Held, ...]
     rollouts: int

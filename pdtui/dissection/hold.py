@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from pdtui.policies.units import NO_STIMULATION, Stimulation
 from pdtui.robots.types import Floats
 from pdtui.stimulation.maps import Pid
 
-_FALL = 1.0
+_FALL = 2.0
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class Held:
 
     Attributes:
         weights: units, and how much of the controller's output each is overwritten with.
+        base: what is added to it, in the order of the units.
         pid: gains.
         error: mean distance from the targets over the held-out starts, in the attribute's unit.
         uncontrolled: the same distance without stimulation.
@@ -38,6 +40,7 @@ class Held:
     falls: float
     targets: tuple[float, ...]
     relative: bool
+    base: tuple[float, ...] = ()
 
     @property
     def holds(self) -> bool:
@@ -47,10 +50,18 @@ class Held:
 
 @dataclass(frozen=True)
 class HoldSizes:
-    """How much a search does: units tried alone, then finalists; control steps of either stage."""
+    """How much a search does.
+
+    Attributes:
+        units: tried alone.
+        pairs: opposite plans on the same units, tried as the two ends of a controller's range.
+        finalists: that the second stage decides between.
+        steps, final_steps: control steps of either stage.
+    """
 
     units: int = 10
-    finalists: int = 8
+    pairs: int = 6
+    finalists: int = 10
     steps: int = 150
     final_steps: int = 300
 
@@ -77,8 +88,14 @@ class Aimed:
         return float(size) or 1.0
 
 
+class _Candidate(NamedTuple):
+    weights: Stimulation
+    base: tuple[float, ...]
+    pid: Pid
+
+
 class HoldSearch:
-    """Tries controllers on the units whose effect grows most evenly with v.
+    """Tries controllers on units whose effect grows most evenly with v, and between opposite plans.
 
     Args:
         prober: measures.
@@ -93,65 +110,94 @@ class HoldSearch:
         self,
         sweep: Sweep,
         column: int,
+        opposites: Sequence[tuple[Stimulation, Stimulation]],
         search: Sequence[Start],
         held_out: Sequence[Start],
         deadline: Callable[[], bool],
     ) -> Held | None:
-        """The best controller, or None where no unit moves the attribute or the time is up.
+        """The best controller, or None where nothing moves the attribute or the time is up.
 
         Args:
             sweep: effect curves.
             column: of the attribute.
+            opposites: plans on the same units that raise and lower the attribute.
             search: starts of the search.
             held_out: starts that the search does not see; the first half of them decides between the
                 finalists, the other half gives the figures.
             deadline: says when time is up.
         """
-        units = _steerers(sweep, column)[: self._sizes.units]
-        if not units or deadline():
+        sizes = self._sizes
+        candidates = self._alone(_steerers(sweep, column)[: sizes.units])
+        candidates += self._between(opposites[: sizes.pairs])
+        if not candidates or deadline():
             return None
-        spread, sizes = self._aimed.spread, self._sizes
-        gains = (0.0,) if self._aimed.relative else (0.5, 2.0)
-        candidates = [
-            (Stimulation((unit,), (weight,)), self._pid(limit, kp / spread, ki))
-            for unit, weight in units
-            for limit in (2.0, 4.0, 8.0)
-            for kp in (limit, 3 * limit)
-            for ki in gains
-        ]
         cost = self._cost(candidates, search, sizes.steps)
         finalists = [candidates[index] for index in np.argsort(cost, kind="stable")[: sizes.finalists]]
         half = len(held_out) // 2
         cost = self._cost(finalists, held_out[:half], sizes.final_steps)
-        weights, pid = finalists[int(np.argmin(cost))]
-        errors, falls = self._measure(
-            [(weights, pid), (NO_STIMULATION, pid)], held_out[half:], sizes.final_steps
-        )
+        best = finalists[int(np.argmin(cost))]
+        without = _Candidate(NO_STIMULATION, (), best.pid)
+        errors, falls = self._measure([best, without], held_out[half:], sizes.final_steps)
         aimed = self._aimed
         return Held(
-            weights, pid, float(errors[0]), float(errors[1]), float(falls[0]), aimed.targets, aimed.relative
+            best.weights,
+            best.pid,
+            float(errors[0]),
+            float(errors[1]),
+            float(falls[0]),
+            aimed.targets,
+            aimed.relative,
+            best.base,
         )
 
-    def _pid(self, limit: float, kp: float, ki: float) -> Pid:
-        kp = float(f"{kp:.3g}")
+    def _alone(self, units: Sequence[tuple[int, float]]) -> list[_Candidate]:
+        """Single units, from 0 either way."""
+        return [
+            _Candidate(Stimulation((unit,), (weight,)), (), self._pid(limit, gain * limit, ki))
+            for unit, weight in units
+            for limit in (2.0, 4.0, 8.0)
+            for gain in (1.0, 3.0)
+            for ki in self._integral
+        ]
+
+    def _between(self, opposites: Sequence[tuple[Stimulation, Stimulation]]) -> list[_Candidate]:
+        """From one plan, at −1, to its opposite, at 1, and a little beyond."""
+        found = []
+        for high, low in opposites:
+            up, down = np.array(high.values), np.array(low.values)
+            weights = Stimulation(high.units, _rounded((up - down) / 2))
+            base = _rounded((up + down) / 2)
+            found += [
+                _Candidate(weights, base, self._pid(limit, gain, ki))
+                for limit in (1.0, 1.5)
+                for gain in (1.0, 2.0, 4.0)
+                for ki in self._integral
+            ]
+        return found
+
+    @property
+    def _integral(self) -> tuple[float, ...]:
+        return (0.0,) if self._aimed.relative else (0.5, 2.0)
+
+    def _pid(self, limit: float, gain: float, ki: float) -> Pid:
+        """A gain of 1 puts out 1 at the errors that the controller will meet."""
+        kp = float(f"{gain / self._aimed.spread:.3g}")
         step = float(f"{self._aimed.spread / 4:.1g}")
         return Pid(self._aimed.attribute, kp, float(f"{kp * ki:.3g}"), 0.0, limit, step)
 
-    def _cost(
-        self, candidates: Sequence[tuple[Stimulation, Pid]], starts: Sequence[Start], steps: int
-    ) -> Floats:
+    def _cost(self, candidates: Sequence[_Candidate], starts: Sequence[Start], steps: int) -> Floats:
         errors, falls = self._measure(candidates, starts, steps)
         cost: Floats = errors + _FALL * self._aimed.spread * falls
         return cost
 
     def _measure(
-        self, candidates: Sequence[tuple[Stimulation, Pid]], starts: Sequence[Start], steps: int
+        self, candidates: Sequence[_Candidate], starts: Sequence[Start], steps: int
     ) -> tuple[Floats, Floats]:
         """Mean error and share of falls of each candidate over targets and starts."""
         aimed = self._aimed
         plans = [
-            Hold(weights, pid, target, aimed.relative)
-            for weights, pid in candidates
+            Hold(one.weights, one.pid, target, aimed.relative, one.base)
+            for one in candidates
             for target in aimed.targets
         ]
         result = self._prober.probe(plans, starts, steps=steps, measure_from=steps // 3)
@@ -169,3 +215,8 @@ def _steerers(sweep: Sweep, column: int) -> list[tuple[int, float]]:
     slope = curves @ values
     order = np.argsort(-np.abs(slope), kind="stable")
     return [(sweep.units[row], float(np.sign(slope[row]))) for row in order if slope[row] != 0]
+
+
+def _rounded(values: Floats) -> tuple[float, ...]:
+    """Three digits, as a map's text says them."""
+    return tuple(float(f"{value:.3g}") for value in values.tolist())

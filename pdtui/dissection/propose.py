@@ -11,8 +11,10 @@ from pdtui.dissection.combine import Found
 from pdtui.dissection.confirm import Confirmation, best_probed
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.hold import Held
-from pdtui.policies.units import Stimulation, format_unit
-from pdtui.stimulation.maps import SCHEMA, Measured
+from pdtui.dissection.keys import Keys
+from pdtui.dissection.tomlparts import array, inline, measured_table, outputs_table, table
+from pdtui.policies.units import NO_STIMULATION, Stimulation, format_unit
+from pdtui.stimulation.maps import SCHEMA
 
 _PRIMITIVES = {
     "vx": "forward",
@@ -28,6 +30,7 @@ _HOLDS = {
 }
 # Below, v = c ρ would need a magnitude that says nothing: such a behavior names the unit instead.
 _USEFUL_RHO = 0.1
+_LISTED = 6
 
 
 def propose(dissection: Dissection) -> str:
@@ -43,19 +46,20 @@ def propose(dissection: Dissection) -> str:
         document.add(tomlkit.comment(line))
     document.add("schema", tomlkit.item(SCHEMA))
     document.add("robot", tomlkit.item(dissection.robot))
-    document.add("policy", _table({"name": dissection.policy, "sha256": dissection.policy_hash}))
-    document.add("keys", _table({"default": "space"}))
+    document.add("policy", table({"name": dissection.policy, "sha256": dissection.policy_hash}))
+    document.add("keys", table({"default": "space"}))
     names = {
         str(entry["unit"]): (str(entry["name"]), float(entry["rho"]))
         for entry in primitives
         if abs(float(entry["rho"])) >= _USEFUL_RHO
     }
     if primitives:
-        document.add("primitives", _array(primitives))
+        document.add("primitives", array(primitives))
     behaviors = [_behavior(found, dissection, names) for found in dissection.behaviors if found.reached]
     behaviors += [_hold(held, dissection) for held in dissection.holds if held.holds]
+    behaviors += _steered(dissection, {str(entry["key"]) for entry in behaviors})
     if behaviors:
-        document.add("behaviors", _array(behaviors))
+        document.add("behaviors", array(behaviors))
     return tomlkit.dumps(document)
 
 
@@ -85,8 +89,10 @@ def _header(dissection: Dissection, steered: set[str]) -> list[str]:
 
 
 def _describe(stimulation: Stimulation, layers: tuple[int, ...]) -> str:
-    pairs = zip(stimulation.units, stimulation.values, strict=True)
-    return ", ".join(f"{format_unit(unit, layers)} = {value:g}" for unit, value in pairs)
+    addresses = _addresses(stimulation, layers)
+    if len(addresses) > _LISTED:
+        return f"{len(addresses)} units"
+    return ", ".join(f"{unit} = {value:g}" for unit, value in addresses.items())
 
 
 def _primitives(dissection: Dissection) -> list[dict[str, Any]]:
@@ -116,7 +122,7 @@ def _primitive(
     discrepancy = float(dissection.matching.discrepancy[column, best.unit])
     if np.isfinite(discrepancy):
         entry["discrepancy"] = float(f"{discrepancy:.4g}")
-    return entry | {"value": best.value, "measured": _measured(best.measured)}
+    return entry | {"value": best.value, "measured": measured_table(best.measured)}
 
 
 def _behavior(found: Found, dissection: Dissection, names: dict[str, tuple[str, float]]) -> dict[str, Any]:
@@ -133,47 +139,56 @@ def _behavior(found: Found, dissection: Dissection, names: dict[str, tuple[str, 
         "name": goal.name,
         "key": goal.key,
         "says": goal.says,
-        "magnitudes": _inline(magnitudes),
-        "aim": _inline({"attribute": goal.aim.attribute, "direction": goal.aim.direction}),
+        "magnitudes": outputs_table(magnitudes),
+        "aim": inline({"attribute": goal.aim.attribute, "direction": goal.aim.direction}),
+        "measured": measured_table(found.change),
     }
+
+
+def _steered(dissection: Dissection, taken: set[str]) -> list[dict[str, Any]]:
+    """Up and down for every attribute that no goal aims at, as long as there are keys."""
+    aimed = {(one.goal.aim.attribute, one.goal.aim.direction) for one in dissection.behaviors}
+    keys, entries = Keys(taken), []
+    for one in dissection.steered:
+        name = dissection.attributes[one.column].name
+        direction = "increase" if one.sign > 0 else "decrease"
+        key = keys.take(name) if (name, direction) not in aimed else None
+        if key is None:
+            continue
+        says = f"{'raises' if one.sign > 0 else 'lowers'} {name}"
+        if one.alone is not None:
+            says += f"; the second unit takes side effects from {one.alone:.2g} to {one.side:.2g} deviations"
+        entries.append(
+            {
+                "name": f"{name} {'up' if one.sign > 0 else 'down'}",
+                "key": key,
+                "says": says,
+                "magnitudes": outputs_table(_addresses(one.stimulation, dissection.layers)),
+                "aim": inline({"attribute": name, "direction": direction}),
+                "measured": measured_table(one.measured),
+            }
+        )
+    return entries
+
+
+def _addresses(stimulation: Stimulation, layers: tuple[int, ...]) -> dict[str, float]:
+    pairs = zip(stimulation.units, stimulation.values, strict=True)
+    return {format_unit(unit, layers): value for unit, value in pairs}
 
 
 def _hold(held: Held, dissection: Dissection) -> dict[str, Any]:
     name, key, says = _HOLDS[held.pid.attribute]
-    pid = held.pid
+    pid, layers = held.pid, dissection.layers
     gains = {"kp": pid.kp, "ki": pid.ki, "kd": pid.kd, "limit": pid.limit, "step": pid.step}
+    base = Stimulation(held.weights.units, held.base) if held.base else NO_STIMULATION
     # By address even where a primitive has the unit: the controller was measured with these very weights.
-    pairs = zip(held.weights.units, held.weights.values, strict=True)
-    return {
+    entry = {
         "name": name,
         "key": key,
         "says": says,
         "mode": "pid",
-        "magnitudes": _inline({format_unit(unit, dissection.layers): weight for unit, weight in pairs}),
-        "pid": _inline({"attribute": pid.attribute} | {k: float(f"{v:.4g}") for k, v in gains.items()}),
+        "magnitudes": outputs_table(_addresses(held.weights, layers)),
+        "base": outputs_table(_addresses(base, layers)),
+        "pid": inline({"attribute": pid.attribute} | {k: float(f"{v:.4g}") for k, v in gains.items()}),
     }
-
-
-def _measured(measured: Measured) -> Any:
-    values = {"effect": measured.effect, "low": measured.low, "high": measured.high}
-    return _inline({key: float(f"{value:.4g}") for key, value in values.items()})
-
-
-def _inline(values: dict[str, Any]) -> Any:
-    table = tomlkit.inline_table()
-    table.update(values)
-    return table
-
-
-def _table(values: dict[str, Any]) -> Any:
-    table = tomlkit.table()
-    for key, value in values.items():
-        table.add(key, value)
-    return table
-
-
-def _array(entries: list[dict[str, Any]]) -> Any:
-    array = tomlkit.aot()
-    for entry in entries:
-        array.append(_table(entry))
-    return array
+    return {field: value for field, value in entry.items() if field != "base" or held.base}

@@ -12,6 +12,8 @@ from pdtui.dissection.confirm import BEST
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.summary import summarise
 
+_LISTED = 6
+
 
 def render(dissection: Dissection) -> RenderableType:
     """The tables that `pdtui dissect` prints."""
@@ -19,6 +21,7 @@ def render(dissection: Dissection) -> RenderableType:
     parts: list[RenderableType] = [
         _matching_table(summary),
         _probing_table(summary),
+        _steered_table(summary),
         _behavior_table(summary),
         _hold_table(summary),
     ]
@@ -85,6 +88,29 @@ def _probing_table(summary: dict[str, Any]) -> Table:
                 ]
             ),
             f"{_show(hits['held_out_matching'], '+.2f')} / {_show(hits['held_out_probing'], '+.2f')}",
+        )
+    return table
+
+
+def _steered_table(summary: dict[str, Any]) -> Table:
+    table = _table(
+        "Up and down, on starts that chose nothing",
+        "attribute",
+        "units",
+        "effect [95 %]",
+        "falls",
+        "in deviations",
+        "largest side effect",
+    )
+    for one in summary["steered"]:
+        alone = "" if one["side_alone"] is None else f" (one unit alone: {_show(one['side_alone'], '.2f')})"
+        table.add_row(
+            f"{one['attribute']} {one['direction']}",
+            _listed(one["units"]),
+            _effect(one),
+            f"{one['falls']} of {one['of']}",
+            _show(one["main"], ".2f"),
+            _show(one["side"], ".2f") + alone,
         )
     return table
 
@@ -160,6 +186,8 @@ def _effect(one: dict[str, Any] | None) -> str:
 
 
 def _listed(units: dict[str, float]) -> str:
+    if len(units) > _LISTED:
+        return f"{len(units)} units"
     return ", ".join(f"{unit} = {value:g}" for unit, value in units.items())
 
 

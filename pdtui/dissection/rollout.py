@@ -27,12 +27,14 @@ class Hold:
         pid: the controller and the attribute that it holds.
         target: where, in the attribute's unit.
         relative: whether the target counts from the attribute's value at the start.
+        base: outputs at which the controller's output is 0, in the order of `units`; empty for zeros.
     """
 
     units: Stimulation
     pid: Pid
     target: float
     relative: bool
+    base: tuple[float, ...] = ()
 
 
 Plan = Stimulation | Hold
@@ -107,6 +109,7 @@ class _Controller:
         self._column = robot.attribute_index(plan.pid.attribute)
         self._wraps = robot.attributes[self._column].wraps
         self._units = plan.units
+        self._base = plan.base or (0.0,) * len(plan.units.units)
         self._pid = PidMagnitude(plan.pid, self._wraps, robot.control_dt)
         value = float(values[self._column])
         self._pid.start(value)
@@ -114,7 +117,8 @@ class _Controller:
 
     def stimulate(self, values: Floats) -> Stimulation:
         output = self._pid.update(float(values[self._column]))
-        return Stimulation(self._units.units, tuple(weight * output for weight in self._units.values))
+        pairs = zip(self._base, self._units.values, strict=True)
+        return Stimulation(self._units.units, tuple(base + weight * output for base, weight in pairs))
 
     def distance(self, values: Floats) -> float:
         error = self._pid.target - float(values[self._column])

@@ -56,12 +56,9 @@ class Searches:
     clock: Clock
     stage: Callable[[str], Progress | None]
 
-    def behaviors(self, sweeps: Sequence[Sweep], starts: Starts) -> tuple[Found, ...]:
+    def behaviors(self, sweeps: Sequence[Sweep], pool: Pool, starts: Starts) -> tuple[Found, ...]:
         """The best stimulation for each goal that the robot has the attribute for."""
         goals = goals_for(self.world.attributes)
-        if not goals:
-            return ()
-        pool = self._pool(starts)
         found = []
         for number, goal in enumerate(goals):
             column = self.world.attribute_index(goal.aim.attribute)
@@ -70,7 +67,8 @@ class Searches:
             found.append(search.run(sweeps, pool, deadline, self.stage(f"search: {goal.name}")))
         return tuple(found)
 
-    def _pool(self, starts: Starts) -> Pool:
+    def pool(self, starts: Starts) -> Pool:
+        """Random sets and imprints, probed once for all searches."""
         crew, sizes, imprint = self.prober.crew, self.plan.search, self.plan.imprint
         seeds = range(self.seed + _IMPRINT_SEEDS, self.seed + _IMPRINT_SEEDS + imprint.episodes)
         episodes = monitor(self.world, crew.policy, seeds, imprint.steps)
@@ -81,7 +79,7 @@ class Searches:
         few = starts.search[: sizes.quick_starts]
         return Pool(self.prober, plans, few, sizes.quick_steps, self.stage("sets of units"))
 
-    def holds(self, sweep: Sweep, starts: Starts) -> tuple[Held, ...]:
+    def holds(self, sweep: Sweep, pool: Pool, starts: Starts) -> tuple[Held, ...]:
         """The best controllers for heading and speed, where the robot has them and the time is not up."""
         usual = 0.0
         names = [attribute.name for attribute in self.world.attributes]
@@ -95,9 +93,10 @@ class Searches:
         held = []
         for number, target in enumerate(wanted):
             column, deadline = names.index(target.attribute), self.clock.share(len(wanted) - number)
-            search, held_out = starts.search[:3], (*starts.selection[:4], *starts.held_out[:4])
+            search, held_out = starts.search[:4], (*starts.selection[:6], *starts.held_out[:6])
             searcher = HoldSearch(self.prober, target, self.plan.hold)
-            held.append(searcher.run(sweep, column, search, held_out, deadline))
+            opposites = pool.opposites(column, self.plan.hold.pairs)
+            held.append(searcher.run(sweep, column, opposites, search, held_out, deadline))
             progress = self.stage(f"search: hold {target.attribute}")
             if progress is not None:
                 progress(1, 1)

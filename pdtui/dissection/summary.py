@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from pdtui.dissection.confirm import BEST, Confirmation, best_probed, confirm, hit_rate
 from pdtui.dissection.findings import Dissection
+from pdtui.dissection.steer import Steered
 from pdtui.policies.units import Stimulation, format_unit
 
 
@@ -28,6 +31,8 @@ def summarise(dissection: Dissection, matches: int = 3) -> dict[str, Any]:
         "attributes": [
             _attribute(dissection, column, matches) for column in range(len(dissection.attributes))
         ],
+        "steered": [_steered(dissection, one) for one in dissection.steered],
+        "side_effects": _side_effects(dissection),
         "behaviors": [_behavior(dissection, number) for number in range(len(dissection.behaviors))],
         "holds": [_hold(dissection, number) for number in range(len(dissection.holds))],
         "rollouts": dissection.rollouts,
@@ -94,6 +99,40 @@ def _confirmation(dissection: Dissection, column: int, one: Confirmation) -> dic
     }
 
 
+def _steered(dissection: Dissection, one: Steered) -> dict[str, Any]:
+    return {
+        "attribute": dissection.attributes[one.column].name,
+        "direction": "up" if one.sign > 0 else "down",
+        "units": _units(dissection, one.stimulation),
+        "effect": _number(one.measured.effect),
+        "low": _number(one.measured.low),
+        "high": _number(one.measured.high),
+        "falls": one.measured.falls,
+        "of": one.measured.of,
+        "main": _number(one.main),
+        "side": _number(one.side),
+        "side_alone": None if one.alone is None else _number(one.alone),
+    }
+
+
+def _side_effects(dissection: Dissection) -> dict[str, Any]:
+    """Refined units × attributes at the largest screened outputs, in parts of each attribute's spread."""
+    refined, spread = dissection.refined, dissection.spread
+    largest = max(dissection.screen.values, key=abs)
+    values = [value for value in (-abs(largest), abs(largest)) if value in refined.values]
+    matrices = {}
+    for value in values:
+        means = np.nan_to_num(refined.effects[:, refined.values.index(value)]).mean(axis=1)
+        parts = np.divide(means, spread, out=np.full_like(means, np.nan), where=spread > 0)
+        matrices[f"{value:g}"] = [[_number(cell) for cell in row] for row in parts]
+    return {
+        "units": [format_unit(unit, dissection.layers) for unit in refined.units],
+        "controls": [format_unit(unit, dissection.layers) for unit in dissection.controls],
+        "attributes": [attribute.name for attribute in dissection.attributes],
+        "by_value": matrices,
+    }
+
+
 def _behavior(dissection: Dissection, number: int) -> dict[str, Any]:
     found = dissection.behaviors[number]
     return {
@@ -103,6 +142,7 @@ def _behavior(dissection: Dissection, number: int) -> dict[str, Any]:
         "enough": found.goal.enough,
         "units": _units(dissection, found.stimulation),
         "reached": found.reached,
+        "effect": _number(found.change.effect),
         "gain": _number(found.gain.effect),
         "low": _number(found.gain.low),
         "high": _number(found.gain.high),

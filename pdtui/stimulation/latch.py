@@ -33,8 +33,10 @@ class ActiveBehavior:
 
 
 class _Latched:
-    def __init__(self, behavior: Behavior, weights: dict[int, float], steps: int | None) -> None:
-        self.behavior, self.weights, self.remaining = behavior, weights, steps
+    def __init__(
+        self, behavior: Behavior, weights: dict[int, float], base: dict[int, float], steps: int | None
+    ) -> None:
+        self.behavior, self.weights, self.base, self.remaining = behavior, weights, base, steps
         self.factor = 1.0
         self.controller: PidMagnitude | None = None
         self.column = 0
@@ -70,6 +72,10 @@ class Latch:
         self._map, self._attributes, self._dt = stimulation_map, attributes, dt
         self._weights = {
             name: {parse_unit(unit, layers): v for unit, v in stimulation_map.units_of(behavior).items()}
+            for name, behavior in stimulation_map.behaviors.items()
+        }
+        self._bases = {
+            name: {parse_unit(unit, layers): v for unit, v in behavior.base.items()}
             for name, behavior in stimulation_map.behaviors.items()
         }
         self._columns = {
@@ -116,7 +122,7 @@ class Latch:
         if was_on and behavior.pid is not None:
             return
         steps = None if behavior.period is None else max(1, round(behavior.period / self._dt))
-        latched = _Latched(behavior, self._weights[name], steps)
+        latched = _Latched(behavior, self._weights[name], self._bases[name], steps)
         if behavior.pid is not None:
             latched.column = self._columns[name]
             wraps = self._attributes[latched.column].wraps
@@ -162,7 +168,9 @@ class Latch:
             factor = latched.factor
             if latched.controller is not None:
                 factor *= latched.controller.update(float(attributes[latched.column]))
-            values |= {unit: weight * factor for unit, weight in latched.weights.items()}
+            values |= latched.base
+            for unit, weight in latched.weights.items():
+                values[unit] = latched.base.get(unit, 0.0) + weight * factor
         return Stimulation.of(values)
 
     def tick(self) -> None:

@@ -67,8 +67,8 @@ class _Table:
             return None
         return _Table(self._source, self._text, f"{self._where}, {name}", value, self._header, self._number)
 
-    def numbers(self, name: str) -> dict[str, float]:
-        data = self.take(name, dict)
+    def numbers(self, name: str, default: Any = ...) -> dict[str, float]:
+        data = self.take(name, dict, default)
         for key, value in data.items():
             if isinstance(value, bool) or not isinstance(value, _NUMBER) or not math.isfinite(value):
                 raise self.error(name, f"'{key}': expected a finite number, found {value!r}")
@@ -147,11 +147,6 @@ def _primitive(table: _Table) -> Primitive:
     unit = table.text("unit")
     if not ADDRESS.fullmatch(unit):
         raise table.error("unit", f"expected layer:index, such as 0:12, found '{unit}'")
-    measured = table.table("measured", None)
-    effect = None
-    if measured is not None:
-        effect = Measured(*(float(measured.take(name, _NUMBER)) for name in ("effect", "low", "high")))
-        measured.done()
     discrepancy, value = table.take("discrepancy", _NUMBER, None), table.take("value", _NUMBER, None)
     primitive = Primitive(
         name=table.text("name"),
@@ -160,12 +155,22 @@ def _primitive(table: _Table) -> Primitive:
         rho=float(table.take("rho", _NUMBER)),
         discrepancy=None if discrepancy is None else float(discrepancy),
         value=None if value is None else float(value),
-        measured=effect,
+        measured=_measured(table),
     )
     if not -1.0 <= primitive.rho <= 1.0:
         raise table.error("rho", f"expected a number in −1..1, found {primitive.rho}")
     table.done()
     return primitive
+
+
+def _measured(parent: _Table) -> Measured | None:
+    table = parent.table("measured", None)
+    if table is None:
+        return None
+    effect, low, high = (float(table.take(name, _NUMBER)) for name in ("effect", "low", "high"))
+    measured = Measured(effect, low, high, table.take("falls", int, None), table.take("of", int, None))
+    table.done()
+    return measured
 
 
 def _behavior(table: _Table, primitives: dict[str, Primitive]) -> Behavior:
@@ -192,6 +197,12 @@ def _behavior(table: _Table, primitives: dict[str, Primitive]) -> Behavior:
     pid_table, pid = table.table("pid", None), None
     if (pid_table is not None) != (mode == "pid"):
         raise table.error("pid", 'expected with mode = "pid", and only there')
+    base = table.numbers("base", {})
+    if base and mode != "pid":
+        raise table.error("base", 'expected only with mode = "pid"')
+    for key in base:
+        if not ADDRESS.fullmatch(key):
+            raise table.error("base", f"'{key}': expected layer:index, such as 0:12")
     if pid_table is not None:
         gains = {name: float(pid_table.take(name, _NUMBER)) for name in ("kp", "ki", "kd", "limit", "step")}
         pid = Pid(attribute=pid_table.text("attribute"), **gains)
@@ -203,10 +214,12 @@ def _behavior(table: _Table, primitives: dict[str, Primitive]) -> Behavior:
         key=table.text("key"),
         says=table.text("says", ""),
         magnitudes=magnitudes,
+        base=base,
         period=None if period is None else float(period),
         together=tuple(together),
         mode=mode,
         aim=aim,
+        measured=_measured(table),
         pid=pid,
     )
     table.done()
@@ -235,7 +248,8 @@ def _line_of(text: str, header: str, number: int, field: str) -> int:
         start = starts[number] if number < len(starts) else 0
     pattern = re.compile(rf"""(^|[{{,\s])["']?{re.escape(field)}["']?\s*=""")
     for row in range(start, len(lines)):
-        if row > start and re.match(r"\s*\[", lines[row]) and header:
+        inside = lines[row].strip().startswith(f"[{header.strip('[]')}.")
+        if row > start and re.match(r"\s*\[", lines[row]) and header and not inside:
             break
         if pattern.search(lines[row].split("#")[0]):
             return row + 1

@@ -33,11 +33,20 @@ Direction = Literal["increase", "decrease", "stop"]
 
 @dataclass(frozen=True)
 class Measured:
-    """An effect and its 95 % interval, in the attribute's unit."""
+    """An effect and its 95 % interval, in the attribute's unit.
+
+    Attributes:
+        effect: mean change of the attribute.
+        low, high: interval of it.
+        falls: roll-outs in which the robot fell,
+        of: of so many; None where a map does not say.
+    """
 
     effect: float
     low: float
     high: float
+    falls: int | None = None
+    of: int | None = None
 
 
 @dataclass(frozen=True)
@@ -100,10 +109,13 @@ class Behavior:
         says: one sentence on what one sees.
         magnitudes: c for the name of a primitive, v for a ``layer:index``. In mode ``pid`` these are weights
             that the controller's output multiplies.
+        base: in mode ``pid``, outputs v at which the controller's output is 0, by ``layer:index``: its
+            operating point, to which weight × output is added. A unit that is not named has 0.
         period: activation period T in s; None lasts until another key.
         together: names of behaviors that may stay latched with this one.
         mode: ``fixed`` magnitudes, or ``pid``.
         aim: what it is meant to do.
+        measured: change of the aim's attribute, against the default.
         pid: the controller of mode ``pid``.
     """
 
@@ -111,10 +123,12 @@ class Behavior:
     key: str
     says: str
     magnitudes: dict[str, float]
+    base: dict[str, float] = field(default_factory=dict)
     period: float | None = None
     together: tuple[str, ...] = ()
     mode: Mode = "fixed"
     aim: Aim | None = None
+    measured: Measured | None = None
     pid: Pid | None = None
 
 
@@ -173,7 +187,7 @@ class StimulationMap:
                 f"the policy here has {policy_hash[:12]}…; --force drives all the same"
             )
         for behavior in self.behaviors.values():
-            for address in self.units_of(behavior):
+            for address in {**self.units_of(behavior), **behavior.base}:
                 try:
                     parse_unit(address, layers)
                 except PolicyError as error:

@@ -95,14 +95,15 @@ def test_a_small_trembling_ant_gets_no_behavior_and_the_map_says_so(dissection: 
     parsed = tomllib.loads(text)
     reached = [found.goal.name for found in dissection.behaviors if found.reached]
     held = ["hold heading" for held in dissection.holds if held.holds]
-    assert len(parsed.get("behaviors", [])) == len(reached) + len(held)
+    names = [behavior["name"] for behavior in parsed.get("behaviors", [])]
+    assert names[: len(reached) + len(held)] == reached + held
     for found in dissection.behaviors:
         assert (f"# Not found: {found.goal.name}." in text) == (found.goal.name not in reached)
 
 
 def test_what_was_found_is_in_the_map(dissection: Dissection) -> None:
     sure = Measured(1.2, 1.0, 1.4)
-    up = Found(GOALS[1], Stimulation((3, 9), (-2.5, 4.0)), 1.5, 1.6, sure, 1.0, 0.0, 1.2, 0.0, 10)
+    up = Found(GOALS[1], Stimulation((3, 9), (-2.5, 4.0)), 1.5, 1.6, sure, sure, 1.0, 0.0, 1.2, 0.0, 10)
     held = Held(
         Stimulation((9,), (-1.0,)), Pid("yaw", 6.0, 0.0, 0.0, 4.0, 0.2), 0.1, 0.6, 0.0, (-0.4, 0.4), True
     )
@@ -111,8 +112,9 @@ def test_what_was_found_is_in_the_map(dissection: Dissection) -> None:
     parse_map(text, "proposed").check("ant", dissection.layers, dissection.policy_hash)
     assert parsed["schema"] == 1
     assert parsed["policy"]["sha256"] == dissection.policy_hash
-    first, second = parsed["behaviors"]
+    first, second = parsed["behaviors"][:2]
     assert (first["name"], first["key"]) == ("up", "w")
+    assert first["measured"] == {"effect": 1.2, "low": 1.0, "high": 1.4}
     assert first["aim"] == {"attribute": "vy", "direction": "increase"}
     units = {entry["name"]: (entry["unit"], entry["rho"]) for entry in parsed.get("primitives", [])}
     outputs = {}

@@ -16,17 +16,17 @@ from pdtui.policies.units import Stimulation
 from tests.dissection.test_dissect import SMALL
 
 
-class Interrupted(Exception):
+class InterruptedHereError(Exception):
     pass
 
 
 def test_an_interrupted_dissection_goes_on_without_loss(policy_file: Path, tmp_path: Path) -> None:
     def interrupt(stage: str, done: int, of: int) -> None:
         if stage == "refine the best" and done > of // 2:
-            raise Interrupted
+            raise InterruptedHereError
 
     journal = tmp_path / "rollouts"
-    with pytest.raises(Interrupted):
+    with pytest.raises(InterruptedHereError):
         dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL, journal=journal, progress=interrupt)
     with Journal(journal, "") as left:
         assert len(left) > 16 * len(SMALL.screen_values) * SMALL.screen_starts

@@ -1,0 +1,50 @@
+"""Parts of a map's text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import tomlkit
+
+from pdtui.stimulation.maps import Measured
+
+_ON_ONE_LINE = 5
+
+
+def measured_table(measured: Measured) -> Any:
+    """An effect as maps hold it."""
+    values: dict[str, Any] = {"effect": measured.effect, "low": measured.low, "high": measured.high}
+    rounded: dict[str, Any] = {key: float(f"{value:.4g}") for key, value in values.items()}
+    if measured.falls is not None and measured.of is not None:
+        rounded |= {"falls": measured.falls, "of": measured.of}
+    return inline(rounded)
+
+
+def inline(values: Mapping[str, Any]) -> Any:
+    """A table on one line."""
+    table = tomlkit.inline_table()
+    table.update(values)
+    return table
+
+
+def table(values: Mapping[str, Any]) -> Any:
+    """A table of its own lines."""
+    result = tomlkit.table()
+    for key, value in values.items():
+        result.add(key, value)
+    return result
+
+
+def outputs_table(values: Mapping[str, float]) -> Any:
+    """Units and their outputs: on one line, or a line each where there are many."""
+    return inline(values) if len(values) <= _ON_ONE_LINE else table(values)
+
+
+def array(entries: Sequence[Mapping[str, Any]]) -> Any:
+    """Tables under one name; within each, subtables come last, as TOML wants it."""
+    result = tomlkit.aot()
+    for entry in entries:
+        last = {key: value for key, value in entry.items() if isinstance(value, tomlkit.items.Table)}
+        result.append(table({key: value for key, value in entry.items() if key not in last} | last))
+    return result
