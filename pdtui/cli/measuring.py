@@ -19,6 +19,7 @@ from pdtui.cli.common import (
     show_result,
     workers_option,
 )
+from pdtui.errors import MapError
 
 
 @click.command()
@@ -33,6 +34,11 @@ from pdtui.cli.common import (
 @click.option(
     "--policy-only", is_flag=True, help="Measure the policy without any behavior: 1000 steps a seed."
 )
+@click.option(
+    "--update",
+    is_flag=True,
+    help="Write what was measured of the behaviors into the map; its comments stay.",
+)
 @workers_option
 @json_option
 def evaluate(
@@ -43,13 +49,19 @@ def evaluate(
     seeds: range,
     target: str | None,
     policy_only: bool,
+    update: bool,
     workers: int | None,
     as_json: bool,
 ) -> None:
     """Measure what every behavior of ROBOT's map does, against the default."""
     from pdtui.experiments import evaluate as behaviors
     from pdtui.experiments import tables, tracking, walking
+    from pdtui.stimulation.remeasured import update_map
 
+    if update and (policy_only or target is not None):
+        raise MapError(
+            "--update writes what was measured of behaviors; --target and --policy-only measure none"
+        )
     order = order_of_drive(robot, map_name, policy, force=force)
     if target is not None:
         with progress_bar_or_none("holding targets", quiet=as_json) as advance:
@@ -62,6 +74,8 @@ def evaluate(
     else:
         with progress_bar_or_none("evaluating", quiet=as_json) as advance:
             result = behaviors.evaluate_map(order, seeds, workers=cores(workers), progress=advance)
+        if update:
+            update_map(Path(order.stimulation_map.source), result.measured())
         show_result(result.as_dict(), as_json, lambda: tables.behavior_table(result))
 
 

@@ -12,9 +12,10 @@ from pdtui.dissection.confirm import Confirmation, best_probed
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.hold import Held
 from pdtui.dissection.keys import Keys
-from pdtui.dissection.tomlparts import array, inline, measured_table, outputs_table, table
+from pdtui.dissection.tomlparts import array, inline, outputs_table, table
 from pdtui.policies.units import NO_STIMULATION, Stimulation, format_unit
 from pdtui.stimulation.maps import SCHEMA
+from pdtui.stimulation.remeasured import measured_table
 
 _PRIMITIVES = {
     "vx": "forward",

@@ -7,18 +7,7 @@ from typing import Any
 
 import tomlkit
 
-from pdtui.stimulation.maps import Measured
-
 _ON_ONE_LINE = 5
-
-
-def measured_table(measured: Measured) -> Any:
-    """An effect as maps hold it."""
-    values: dict[str, Any] = {"effect": measured.effect, "low": measured.low, "high": measured.high}
-    rounded: dict[str, Any] = {key: float(f"{value:.4g}") for key, value in values.items()}
-    if measured.falls is not None and measured.of is not None:
-        rounded |= {"falls": measured.falls, "of": measured.of}
-    return inline(rounded)
 
 
 def inline(values: Mapping[str, Any]) -> Any:

@@ -17,7 +17,7 @@ from scipy import stats
 
 from pdtui.robots.types import Floats
 from pdtui.sessions.events import Event
-from pdtui.stimulation.maps import Behavior
+from pdtui.stimulation.maps import Behavior, Measured
 from pdtui.teleop.drive import build_loop
 from pdtui.teleop.loop import ControlLoop
 from pdtui.teleop.order import DriveOrder
@@ -73,6 +73,13 @@ class Evaluation:
             "policy": self.policy,
             "seeds": list(self.seeds),
             "behaviors": [asdict(result) for result in self.behaviors],
+        }
+
+    def measured(self) -> dict[str, Measured]:
+        """Effects by behavior, as maps hold them."""
+        return {
+            one.behavior: Measured(one.effect, one.low, one.high, one.falls, len(self.seeds))
+            for one in self.behaviors
         }
 
 

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from pdtui.errors import EventError, RobotError
+from pdtui.policies.units import Stimulation
 from pdtui.robots.types import Attribute
 from pdtui.stimulation.latch import Latch
 from pdtui.stimulation.magnitude import PidMagnitude
+from pdtui.stimulation.mapfile import parse_map
 from pdtui.stimulation.maps import Pid, StimulationMap
 
 ATTRIBUTES = (Attribute("vy", "m/s"), Attribute("yaw", "rad", wraps=True))
@@ -118,6 +120,19 @@ def test_pid_is_that_of_the_textbook() -> None:
         expected = float(np.clip(kp * error + integral - kd * slope, -limit, limit))
         assert controller.update(value) == pytest.approx(expected)
         before = value
+
+
+def test_a_controllers_output_is_added_to_its_base(map_text: str) -> None:
+    text = map_text.replace('mode = "pid"', 'mode = "pid"\nbase = { "0:5" = 0.5, "1:1" = -2.0 }')
+    latch = Latch(parse_map(text, "m"), (16, 16), ATTRIBUTES, 0.05)
+    latch.press("hold heading", AT_REST)
+    assert latch.stimulate(AT_REST) == Stimulation((5, 17), (0.5, -2.0))
+    latch.set_target("hold heading", 0.2)
+    stimulation = latch.stimulate(AT_REST)
+    controller = latch.active[0].magnitude
+    assert controller is not None
+    assert controller > 0
+    assert stimulation == Stimulation((5, 17), (0.5 + controller, -2.0))
 
 
 def test_a_heading_crosses_pi_without_a_jump() -> None:

@@ -90,3 +90,19 @@ def test_own_maps_come_before_shipped_ones(
     assert "not a TOML file" in listed["torn"].problem
     with pytest.raises(MapError, match="no map 'walrus'; there are ant"):
         find_map("walrus")
+
+
+def test_a_controller_may_start_from_a_base(map_text: str) -> None:
+    text = map_text.replace('mode = "pid"', 'mode = "pid"\nbase = { "0:5" = 0.5, "1:1" = -2.0 }')
+    assert parse_map(text, "m").behaviors["hold heading"].base == {"0:5": 0.5, "1:1": -2.0}
+    with pytest.raises(MapError, match="'base' expected only with mode"):
+        parse_map(map_text.replace('key = "t"', 'key = "t"\nbase = { "0:5" = 0.5 }'), "m")
+    with pytest.raises(MapError, match="'base' 'sway': expected layer:index"):
+        parse_map(text.replace('"1:1" = -2.0', '"sway" = -2.0'), "m")
+
+
+def test_mistakes_in_a_table_of_its_own_lines_are_named(map_text: str) -> None:
+    lines = '[behaviors.magnitudes]\n"0:1" = 1.0\n"0:2" = "x"\n'
+    text = map_text.replace('magnitudes = { "1:2" = -3.0 }\nperiod = 0.5\ntogether = ["push"]\n', lines)
+    with pytest.raises(MapError, match="'0:2': expected a finite number, found 'x'"):
+        parse_map(text, "m")

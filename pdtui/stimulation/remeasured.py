@@ -1,0 +1,61 @@
+"""New figures in a map that somebody edited: everything else stays as it was written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import tomlkit
+
+from pdtui.errors import MapError
+from pdtui.stimulation.mapfile import parse_map
+from pdtui.stimulation.maps import Measured
+
+
+def measured_table(measured: Measured) -> tomlkit.items.InlineTable:
+    """An effect as maps hold it: four digits, and the falls where they were counted."""
+    table = tomlkit.inline_table()
+    for name in ("effect", "low", "high"):
+        table[name] = float(f"{getattr(measured, name):.4g}")
+    if measured.falls is not None and measured.of is not None:
+        table.update({"falls": measured.falls, "of": measured.of})
+    return table
+
+
+def with_measured(text: str, measured: Mapping[str, Measured], source: str) -> str:
+    """The map's text with what was measured of its behaviors; comments, order and layout stay.
+
+    Args:
+        text: of a map.
+        measured: effects by the names of behaviors.
+        source: of the text, for messages.
+
+    Raises:
+        MapError: the text is no map, or has no such behavior.
+    """
+    known = parse_map(text, source).behaviors
+    missing = [name for name in measured if name not in known]
+    if missing:
+        raise MapError(f"{source}: no behavior '{missing[0]}'; there are {', '.join(known)}")
+    document = tomlkit.parse(text)
+    for table in document.get("behaviors", []):
+        if table["name"] in measured:
+            table["measured"] = measured_table(measured[table["name"]])
+    changed = tomlkit.dumps(document)
+    parse_map(changed, source)
+    return changed
+
+
+def update_map(path: Path, measured: Mapping[str, Measured]) -> None:
+    """Write figures into a map's file, in one step.
+
+    Raises:
+        MapError: as `with_measured`, or the file cannot be written.
+    """
+    partial = path.with_name(path.name + ".part")
+    try:
+        changed = with_measured(path.read_text(encoding="utf-8"), measured, str(path))
+        partial.write_text(changed, encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        raise MapError(f"{path}: cannot be written: {error.strerror}") from error

@@ -1,0 +1,36 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pdtui.errors import MapError
+from pdtui.stimulation.mapfile import load_map
+from pdtui.stimulation.maps import Measured
+from pdtui.stimulation.remeasured import update_map, with_measured
+
+EDITED = "# my own remark\n"
+FIGURES = {"push": Measured(1.23456, 1.0, 1.5, 2, 20)}
+
+
+def test_figures_come_in_and_comments_stay(map_text: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    text = EDITED + map_text.replace('key = "w"', 'key = "k"  # nearer')
+    path.write_text(text)
+    update_map(path, FIGURES)
+    assert load_map(path).behaviors["push"].measured == Measured(1.235, 1.0, 1.5, 2, 20)
+    added = [line for line in path.read_text().splitlines() if line not in text.splitlines()]
+    assert added == ["measured = {effect = 1.235, low = 1.0, high = 1.5, falls = 2, of = 20}"]
+    assert set(text.splitlines()) <= set(path.read_text().splitlines())
+
+
+def test_measuring_again_replaces_only_the_figure(map_text: str) -> None:
+    once = with_measured(map_text, FIGURES, "m.toml")
+    twice = with_measured(once, {"push": Measured(0.5, 0.4, 0.6)}, "m.toml")
+    changed = [pair for pair in zip(once.splitlines(), twice.splitlines(), strict=True) if pair[0] != pair[1]]
+    assert [new for _, new in changed] == ["measured = {effect = 0.5, low = 0.4, high = 0.6}"]
+
+
+def test_a_behavior_that_the_map_does_not_have_is_named(map_text: str) -> None:
+    with pytest.raises(MapError, match=r"m\.toml: no behavior 'dance'; there are push, twitch, hold heading"):
+        with_measured(map_text, {"dance": FIGURES["push"]}, "m.toml")
