@@ -23,14 +23,16 @@ from pdtui.dissection.searches import Clock, Searches
 from pdtui.dissection.spectrum import find_preset
 from pdtui.dissection.steer import movable, steer
 from pdtui.dissection.workers import Crew
+from pdtui.policies.runtime import Policy
+from pdtui.robots.base import Robot
 from pdtui.sessions.versions import environment_versions
 
 StageProgress = Callable[[str, int, int], None]
 
 
 def dissect(
-    robot: str,
-    policy: str | Path,
+    robot: str | Robot,
+    policy: str | Path | Policy,
     *,
     preset: str = "paper",
     episodes: int = 5,
@@ -47,13 +49,13 @@ def dissect(
     workers. Monitored episodes take the seeds from `seed` on, starts those from ``seed + 100`` on.
 
     Args:
-        robot: name of the robot.
-        policy: weights file or name of a shipped policy.
+        robot: name of the robot, or a robot.
+        policy: weights file, name of a shipped policy, or a policy.
         preset: ``paper`` or ``authors``.
         episodes: monitored (the paper: 5).
         seed: of everything.
         budget_minutes: the searches end, with the best so far, when this is over; screening always completes.
-        workers: processes.
+        workers: processes; one, this one, where robot or policy is given as an object.
         effort: how much to do.
         progress: called with (stage, done, of).
         journal: remembers roll-outs, so that a run that was interrupted goes on here; removed at the end.
@@ -109,8 +111,8 @@ def dissect(
         if known is not None:
             known.remove()
         return Dissection(
-            robot=robot,
-            policy=str(policy),
+            robot=robot if isinstance(robot, str) else robot.name,
+            policy=policy.name if isinstance(policy, Policy) else str(policy),
             policy_hash=network.sha256,
             layers=network.layers,
             attributes=world.attributes,

@@ -41,3 +41,26 @@ class Effort:
     imprint: ImprintSizes = field(default_factory=ImprintSizes)
     search: Sizes = field(default_factory=Sizes)
     hold: HoldSizes = field(default_factory=HoldSizes)
+
+
+QUICK = Effort(
+    steps=130,
+    screen_values=(-3.0, 3.0),
+    screen_steps=16,
+    refine_keep=1,
+    controls=2,
+    refine_values=(-3.0, 0.0, 3.0),
+    refine_starts=2,
+    refine_steps=16,
+    search_starts=2,
+    selection_starts=2,
+    held_out_starts=2,
+    walk=20,
+    imprint=ImprintSizes(episodes=2, steps=10, bins=2, units=(3,), factors=(1.0,)),
+    search=Sizes(
+        pool=4, atoms=4, elite=3, children=3, promoted=2, most_units=(3,), generations=1, quick_starts=1,
+        quick_steps=12, full_starts=2, full_steps=16, finalists=2, final_steps=18,
+    ),
+    hold=HoldSizes(units=1, finalists=2, steps=12, final_steps=18),
+)  # fmt: skip
+"""Enough to see that a policy can be dissected, not to find out what its units do."""

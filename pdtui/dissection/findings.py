@@ -11,7 +11,10 @@ from pdtui.dissection.phase import Phase
 from pdtui.dissection.probe import Sweep
 from pdtui.dissection.spectrum import Preset
 from pdtui.dissection.steer import Steered
+from pdtui.policies.units import format_unit
 from pdtui.robots.types import Attribute, Floats, column_of
+from pdtui.stimulation.mapfile import parse_map
+from pdtui.stimulation.maps import StimulationMap
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,28 @@ class Dissection:
     rollouts: int
     control_steps: int
     minutes: float
+
+    def __repr__(self) -> str:
+        return (
+            f"<Dissection of {self.policy} on {self.robot}: {sum(self.layers)} units, "
+            f"{len(self.attributes)} attributes, {sum(one.reached for one in self.behaviors)} of "
+            f"{len(self.behaviors)} behaviors reached; {self.rollouts} roll-outs, {self.minutes:.1f} min>"
+        )
+
+    def matches(self, attribute: str, count: int = 5) -> list[str]:
+        """Addresses of the units whose spectrograms are nearest to an attribute's, the nearest first.
+
+        Raises:
+            RobotError: the robot has no such attribute.
+        """
+        ranked = self.matching.ranked(self.column(attribute))[:count]
+        return [format_unit(int(unit), self.layers) for unit in ranked]
+
+    def to_map(self) -> StimulationMap:
+        """The map that the measurements propose; its `text` is what a map's file holds."""
+        from pdtui.dissection.propose import propose  # which reads dissections
+
+        return parse_map(propose(self), f"dissection of {self.policy}")
 
     def column(self, attribute: str) -> int:
         """Column of an attribute.

@@ -61,19 +61,22 @@ class Crew:
     Processes are started by the first call of `run`, not before.
 
     Args:
-        robot: name of the robot.
-        policy: weights file or name of a shipped policy.
-        workers: processes.
+        robot: name of the robot, or a robot.
+        policy: weights file, name of a shipped policy, or a policy.
+        workers: processes, which load robot and policy by their names; what is given as an object stays in
+            this one.
 
     Raises:
         RobotError: no such robot. PolicyError: no such policy, or one for another robot.
     """
 
-    def __init__(self, robot: str, policy: str | Path, workers: int = 2) -> None:
+    def __init__(self, robot: str | Robot, policy: str | Path | Policy, workers: int = 2) -> None:
         # Built here too: the caller needs both, and what is wrong with them is raised in this process.
-        self.robot, self.policy = make_robot(robot), load_policy(policy, robot)
-        self._names = (robot, str(policy))
-        self._workers = max(1, workers)
+        self.robot = make_robot(robot) if isinstance(robot, str) else robot
+        self.policy = policy if isinstance(policy, Policy) else load_policy(policy, self.robot.name)
+        named = isinstance(robot, str) and not isinstance(policy, Policy)
+        self._names = (robot if isinstance(robot, str) else robot.name, str(policy))
+        self._workers = max(1, workers) if named else 1
         self._pool: ProcessPoolExecutor | None = None
         self.steps_run = 0
         self.rollouts = 0
@@ -160,7 +163,7 @@ class Crew:
                 yield futures[future], future.result()
         except BrokenProcessPool as error:
             raise RobotError(
-                f"{self._names[0]}: a worker process died (out of memory, or killed); one worker runs "
+                f"{self.robot.name}: a worker process died (out of memory, or killed); one worker runs "
                 "without other processes"
             ) from error
         except BaseException:

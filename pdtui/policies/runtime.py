@@ -120,7 +120,9 @@ class Policy:
         """
         if self._initial is None and not state:
             return
-        expected = [tuple(tensor.shape) for tensor in memory.flatten(self._initial or ())]
+        expected = [
+            tuple(tensor.shape) for tensor in memory.flatten(() if self._initial is None else self._initial)
+        ]
         found = [array.shape for array in state]
         if expected != found:
             raise PolicyError(f"{self.name}: expected a hidden state of shapes {expected}, got {found}")

@@ -9,7 +9,9 @@ import numpy as np
 
 from pdtui.errors import EventError, SimulationDiverged
 from pdtui.policies.load import load_policy
+from pdtui.policies.runtime import Policy
 from pdtui.robots import make_robot
+from pdtui.robots.base import Robot
 from pdtui.sessions.events import Event
 from pdtui.sessions.record import StepRecord
 from pdtui.sessions.recorder import SessionRecorder
@@ -37,15 +39,15 @@ class DriveSummary:
     mean: dict[str, float]
 
 
-def build_loop(order: DriveOrder) -> ControlLoop:
-    """Load robot and policy and set the loop at step 0.
+def build_loop(order: DriveOrder, robot: Robot | None = None, policy: Policy | None = None) -> ControlLoop:
+    """Load robot and policy, where they are not given, and set the loop at step 0.
 
     Raises:
         PdtuiError: the robot, the policy or the map cannot be had, or they do not fit each other.
     """
-    policy = load_policy(order.policy or order.stimulation_map.policy, order.robot)
+    policy = policy or load_policy(order.policy or order.stimulation_map.policy, order.robot)
     order.stimulation_map.check(order.robot, policy.layers, policy.sha256, force=order.force)
-    robot = make_robot(order.robot)
+    robot = robot or make_robot(order.robot)
     return ControlLoop(robot, policy, order.stimulation_map, order.seed, stochastic=order.stochastic)
 
 

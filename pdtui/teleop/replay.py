@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from pdtui.policies.runtime import Policy
+from pdtui.robots.base import Robot
 from pdtui.sessions.events import events_by_step
 from pdtui.sessions.reader import Session, read_session
 from pdtui.sessions.versions import differences, environment_versions
@@ -53,21 +55,27 @@ def order_of(session: Session, source: str, policy: str = "") -> DriveOrder:
 
 
 def replay_session(
-    path: Path, *, policy: str = "", progress: Callable[[int, int], None] | None = None
+    path: Path,
+    *,
+    policy: str | Policy = "",
+    robot: Robot | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> ReplayResult:
     """Run a session from its file and its policy alone, comparing the digest of every step.
 
     Args:
         path: the session.
-        policy: weights file, where the one that the map names is elsewhere now.
+        policy: the policy or its weights file, where the one that the map names is elsewhere now.
+        robot: the robot, where its name is not known.
         progress: called with steps done and steps in all.
 
     Raises:
         PdtuiError: the session cannot be read or its policy cannot be had.
     """
     session = read_session(path)
-    order = order_of(session, str(path), policy)
-    loop = build_loop(order)
+    given = policy if isinstance(policy, Policy) else None
+    order = order_of(session, str(path), policy if isinstance(policy, str) else "")
+    loop = build_loop(order, robot, given)
     events = events_by_step(session.events)
     environment = tuple(differences(session.versions, environment_versions()))
     for step, digest in enumerate(order.digests):

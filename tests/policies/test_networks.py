@@ -172,6 +172,10 @@ def test_a_cell_keeps_its_natural_state_and_reads_what_the_layer_before_was_over
     np.testing.assert_array_equal(pushed.action, expected.numpy())
     for state, other in zip(kept, policy.snapshot(), strict=True):
         np.testing.assert_array_equal(state, other)
+    policy.restore(kept)
+    again = policy.act(x).action
+    policy.restore(kept)
+    np.testing.assert_array_equal(policy.act(x).action, again)
     policy.reset()
     policy.act(x, Stimulation((2,), (3.0,)))
     assert not np.array_equal(policy.snapshot()[0], kept[0])
