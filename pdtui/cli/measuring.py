@@ -174,7 +174,7 @@ def bench() -> None:
 @click.argument("robot")
 @map_option
 @click.option(
-    "--steps", type=click.IntRange(100), default=1500, show_default=True, help="Control steps a round."
+    "--steps", type=click.IntRange(100), default=5000, show_default=True, help="Control steps a round."
 )
 @json_option
 def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bool) -> None:

@@ -42,7 +42,7 @@ class LoopBench:
 def bench_loop(
     order: DriveOrder,
     *,
-    steps: int = 1500,
+    steps: int = 5000,
     rounds: int = ROUNDS,
     progress: Callable[[int, int], None] | None = None,
 ) -> LoopBench:
