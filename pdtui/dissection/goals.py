@@ -42,7 +42,7 @@ GOALS: tuple[Goal, ...] = (
 )
 _QUANTILE = 0.2
 _FALL = 2.0
-_UNIT = 0.01
+_DOUBLING = 0.02
 
 
 def goals_for(attributes: Sequence[Attribute]) -> tuple[Goal, ...]:
@@ -73,7 +73,7 @@ def score(goal: Goal, column: int, result: Effects, units: Sequence[int]) -> Flo
 
     Halfway between the mean of the gains over the starts and their lower fifth, because a behavior has to
     work from any state, and a search has to see that it gets nearer; less twice the share of falls, and a
-    little for every further unit.
+    little for every doubling of the units.
 
     Args:
         goal: what is aimed at.
@@ -83,6 +83,6 @@ def score(goal: Goal, column: int, result: Effects, units: Sequence[int]) -> Flo
     """
     gain = gains(goal, column, result)
     sure = 0.5 * (gain.mean(axis=1) + np.quantile(gain, _QUANTILE, axis=1)) / goal.enough
-    further = np.maximum(np.array(units, np.float64) - 1.0, 0.0)
-    value: Floats = sure - _FALL * result.falls.mean(axis=1) - _UNIT * further
+    doublings = np.log2(np.maximum(np.array(units, np.float64), 1.0))
+    value: Floats = sure - _FALL * result.falls.mean(axis=1) - _DOUBLING * doublings
     return value

@@ -159,7 +159,7 @@ def test_scores_want_every_start_and_no_falls() -> None:
     result = effects([[0.7] * 5, [2.0, 2.0, 2.0, 0.0, 0.0]], never, [0.0] * 5)
     # By hand: halfway between mean (0.7 and 1.2) and lower fifth (0.7 and 0), in parts of 0.7.
     np.testing.assert_allclose(score(up, 0, result, [1, 1]), [1.0, 0.6 / 0.7])
-    np.testing.assert_allclose(score(up, 0, result, [3, 3]), [0.98, 0.6 / 0.7 - 0.02])
+    np.testing.assert_allclose(score(up, 0, result, [4, 4]), [0.96, 0.6 / 0.7 - 0.04])
     assert score(down, 0, result, [1, 1])[0] == pytest.approx(-1.0)
     fell = effects([[1.4] * 5], [[True, False, False, False, False]], [0.0] * 5)
     np.testing.assert_allclose(gains(up, 0, fell), [[0.0, 1.4, 1.4, 1.4, 1.4]])
