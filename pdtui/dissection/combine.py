@@ -3,59 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from pdtui.dissection.candidates import Bounds, Candidates
+from pdtui.dissection.candidates import Candidates
+from pdtui.dissection.effort import Sizes
 from pdtui.dissection.goals import Goal, gains, score
 from pdtui.dissection.monitor import Progress, Start
+from pdtui.dissection.pool import Pool
 from pdtui.dissection.probe import Effects, Prober, Sweep, bootstrap_interval
 from pdtui.policies.units import Stimulation
 from pdtui.robots.types import Floats
 from pdtui.stimulation.maps import Measured
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """How much a search does.
-
-    Attributes:
-        pool: random pairs and triples, probed once and shared by all goals.
-        atoms: single units and values from the sweeps that it combines.
-        elite: candidates kept from one generation to the next.
-        children: candidates of one generation.
-        promoted: of them, those probed from more starts.
-        most_units: units of a candidate at most, in the first round and in those that follow where the goal
-            was not reached: a behavior of many units is a direction in a layer.
-        generations: of one round, at most.
-        patience: generations without progress before a round ends.
-        quick_starts, quick_steps: of the first look at a child.
-        full_starts, full_steps: of the second.
-        finalists: elite that the selection starts decide between.
-        final_steps: stimulated control steps of the selection and of the held-out score.
-        satisfied: score at which it ends early.
-        safe: score from which no round with more units follows: what the search sees flatters a little.
-        bounds: of the outputs v.
-    """
-
-    pool: int = 240
-    atoms: int = 40
-    elite: int = 16
-    children: int = 28
-    promoted: int = 8
-    most_units: tuple[int, ...] = (3, 8, 24, 64)
-    generations: int = 24
-    patience: int = 6
-    quick_starts: int = 3
-    quick_steps: int = 110
-    full_starts: int = 8
-    full_steps: int = 240
-    finalists: int = 6
-    final_steps: int = 300
-    satisfied: float = 1.8
-    safe: float = 1.25
-    bounds: Bounds = field(default_factory=Bounds)
 
 
 @dataclass(frozen=True)
@@ -101,65 +61,6 @@ class Starts:
     search: tuple[Start, ...]
     selection: tuple[Start, ...]
     held_out: tuple[Start, ...]
-
-
-class Pool:
-    """Sets of units, probed once for all goals: where searches begin when no single unit leads the way.
-
-    Args:
-        prober: measures.
-        plans: what to probe.
-        starts: a few of the search starts.
-        steps: control steps of each roll-out.
-        progress: called with (roll-outs done, roll-outs).
-    """
-
-    def __init__(
-        self,
-        prober: Prober,
-        plans: Sequence[Stimulation],
-        starts: Sequence[Start],
-        steps: int,
-        progress: Progress | None = None,
-    ) -> None:
-        self.plans = tuple(plans)
-        self.effects = prober.probe(
-            self.plans, starts, steps=steps, measure_from=steps // 3, progress=progress
-        )
-
-    def best(self, goal: Goal, column: int, count: int, most: int) -> list[Stimulation]:
-        """Those of at most so many units that went the goal's way furthest."""
-        if not self.plans:
-            return []
-        scored = score(goal, column, self.effects, [len(plan.units) for plan in self.plans])
-        order = [int(index) for index in np.argsort(-scored, kind="stable")]
-        return [self.plans[index] for index in order if len(self.plans[index].units) <= most][:count]
-
-    def opposites(self, column: int, count: int) -> list[tuple[Stimulation, Stimulation]]:
-        """Pairs of plans on the same units that raise and lower an attribute, the strongest pairs first.
-
-        A pair is as strong as its weaker side; plans that fell are left out.
-        """
-        effect = np.nan_to_num(self.effects.effects[..., column]).mean(axis=1)
-        effect[self.effects.falls.any(axis=1)] = 0.0
-        same: dict[tuple[int, ...], list[int]] = {}
-        for index, plan in enumerate(self.plans):
-            same.setdefault(plan.units, []).append(index)
-        pairs = []
-        for indices in same.values():
-            high, low = max(indices, key=lambda i: effect[i]), min(indices, key=lambda i: effect[i])
-            strength = min(float(effect[high]), -float(effect[low]))
-            if strength > 0:
-                pairs.append((strength, self.plans[high], self.plans[low]))
-        pairs.sort(key=lambda pair: (-pair[0], pair[1].units))
-        return [(high, low) for _, high, low in pairs[:count]]
-
-
-def random_sets(units: int, sizes: Sizes, seed: int) -> list[Stimulation]:
-    """Pairs and triples of units, drawn at random."""
-    source = Candidates(np.ones(units), sizes.bounds, seed)
-    most = min(3, units)
-    return [source.draw(int(source.rng.integers(min(2, most), most + 1))) for _ in range(sizes.pool)]
 
 
 class Search:

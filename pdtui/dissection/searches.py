@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pdtui.dissection.combine import Found, Pool, Search, Starts, random_sets
+from pdtui.dissection.combine import Found, Search, Starts
 from pdtui.dissection.effort import Effort
 from pdtui.dissection.goals import goals_for
 from pdtui.dissection.hold import Aimed, Held, HoldSearch
 from pdtui.dissection.imprint import imprints
 from pdtui.dissection.monitor import Progress, monitor
+from pdtui.dissection.pool import Pool, random_sets
 from pdtui.dissection.probe import Prober, Sweep
 from pdtui.robots.base import Robot
 

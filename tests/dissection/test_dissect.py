@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from pdtui.dissection.combine import Found, Sizes
+from pdtui.dissection.combine import Found
 from pdtui.dissection.confirm import rank_correlation
 from pdtui.dissection.dissect import dissect
-from pdtui.dissection.effort import Effort
+from pdtui.dissection.effort import Effort, Sizes
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.goals import GOALS, gains, score
 from pdtui.dissection.hold import Held, HoldSizes
