@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
@@ -13,23 +14,35 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
 from pdtui.errors import PolicyError
+from pdtui.policies.choices import find_beside
 from pdtui.policies.network import NetworkSpec, PolicyNetwork
 
 WEIGHTS = Path(__file__).parent / "weights"
 _KEY = "pdtui"
 
 
-def find_weights(name: str) -> Path:
-    """Path of a weights file: as given, or a shipped one by its name.
+def find_weights(name: str, folders: Sequence[Path] = ()) -> Path:
+    """Path of a weights file: as given, from one of the folders, or a shipped one by its name.
 
     Raises:
-        PolicyError: there is neither; the message lists the shipped ones.
+        PolicyError: there is none; the message lists the shipped ones.
     """
-    for candidate in (Path(name), WEIGHTS / f"{name}.safetensors"):
-        if candidate.is_file():
-            return candidate
-    shipped = ", ".join(sorted(path.stem for path in WEIGHTS.glob("*.safetensors"))) or "none"
-    raise PolicyError(f"no policy '{name}': neither a file nor a shipped policy; shipped are: {shipped}")
+    own = find_beside(name, folders)
+    if own is not None:
+        return own
+    if (shipped := WEIGHTS / f"{name}.safetensors").is_file():
+        return shipped
+    known = ", ".join(sorted(path.stem for path in WEIGHTS.glob("*.safetensors"))) or "none"
+    raise PolicyError(f"no policy '{name}': neither a file nor a shipped policy; shipped are: {known}")
+
+
+def is_own_format(path: Path) -> bool:
+    """Whether `save_network` wrote the file: safetensors with metadata of ours."""
+    try:
+        with safe_open(str(path), framework="pt") as handle:
+            return _KEY in (handle.metadata() or {})
+    except (OSError, SafetensorError):
+        return False
 
 
 def file_hash(path: Path) -> str:

@@ -2,57 +2,79 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from pdtui.errors import PolicyError
-from pdtui.policies.decoders import Decoder
-from pdtui.policies.files import file_hash, find_weights, load_network
-from pdtui.policies.network import NetworkSpec
+from pdtui.policies.choices import NO_CHOICES, NO_NORMALISER, PolicyChoices, Spaces, find_beside
+from pdtui.policies.decoders import decoder_for
+from pdtui.policies.files import file_hash, find_weights, is_own_format, load_network
+from pdtui.policies.importers import import_network
+from pdtui.policies.network import PolicyNetwork
 from pdtui.policies.runtime import Policy
 
 
-def decoder_for(spec: NetworkSpec) -> Decoder:
-    """How this network's output becomes an action inside its bounds."""
-    low = np.array(spec.action_low, np.float32)
-    high = np.array(spec.action_high, np.float32)
-    middle, half = (high + low) / 2, (high - low) / 2
-
-    def squashed(output: torch.Tensor, rng: np.random.Generator | None) -> NDArray[np.float32]:
-        numbers = output.numpy()
-        mean = numbers[: spec.actions]
-        if rng is not None:
-            log_std = numbers[spec.actions :]
-            mean = mean + np.exp(np.clip(log_std, -5.0, 2.0)) * rng.standard_normal(spec.actions, np.float32)
-        action: NDArray[np.float32] = middle + half * np.tanh(mean)
-        return action
-
-    def clipped(output: torch.Tensor, rng: np.random.Generator | None) -> NDArray[np.float32]:
-        if rng is not None:
-            raise PolicyError("this policy has no action distribution; it acts with its mean only")
-        action: NDArray[np.float32] = np.clip(output.numpy(), low, high)
-        return action
-
-    return squashed if spec.head == "squashed_gaussian" else clipped
-
-
-def load_policy(name: str | Path, robot: str | None = None) -> Policy:
+def load_policy(
+    name: str | Path,
+    robot: str | None = None,
+    *,
+    choices: PolicyChoices = NO_CHOICES,
+    spaces: Spaces | None = None,
+    folders: Sequence[Path] = (),
+) -> Policy:
     """Load a weights file, or a shipped policy by its name.
 
-    PyTorch is set to one thread: at this size more threads only cost, and sums keep their order.
+    A file that pdtui did not write is imported (`pdtui.policies.importers`); its policy belongs to no robot
+    and fits every world with its shapes. PyTorch is set to one thread: at this size more threads only cost,
+    and sums keep their order.
+
+    Args:
+        name: file or shipped name.
+        robot: what it is to drive.
+        choices: what the file may leave open.
+        spaces: of the world that it is to act in, to be compared with the policy's shapes.
+        folders: where to look for files beside the working directory.
 
     Raises:
-        PolicyError: no such file, unreadable, or made for another robot.
+        PolicyError: no such file, unreadable, made for another robot, of other shapes than the world's, or
+            in need of a choice.
     """
-    path = find_weights(str(name))
-    network = load_network(path)
+    path = find_weights(str(name), folders)
+    network, digest = load_any_network(path, choices, spaces, folders)
     spec = network.spec
-    if robot is not None and spec.robot != robot:
+    if robot is not None and spec.robot not in ("", robot):
         raise PolicyError(f"{path}: expected a policy for robot '{robot}', found one for '{spec.robot}'")
+    if spaces is not None:
+        discrete = spec.head == "categorical"
+        spaces.check(str(path), spec.observations, spec.action_size, spec.actions if discrete else 0)
     torch.set_num_threads(1)
-    return Policy(
-        network, spec.observations, decode=decoder_for(spec), name=path.stem, sha256=file_hash(path)
-    )
+    return Policy(network, spec.observations, decode=decoder_for(network), name=path.stem, sha256=digest)
+
+
+def load_any_network(
+    path: Path, choices: PolicyChoices, spaces: Spaces | None, folders: Sequence[Path] = ()
+) -> tuple[PolicyNetwork, str]:
+    """The network of a file that pdtui or somebody else wrote, and its hash.
+
+    The hash is the file's SHA-256; where statistics come from a second file, that of both hashes.
+
+    Raises:
+        PolicyError: as `load_policy`.
+    """
+    if is_own_format(path):
+        if choices != NO_CHOICES:
+            raise PolicyError(f"{path}: states activation, squash and normaliser itself; expected no choices")
+        return load_network(path), file_hash(path)
+    statistics = None
+    if choices.normaliser and choices.normaliser != NO_NORMALISER:
+        statistics = find_beside(choices.normaliser, (*folders, path.parent))
+        if statistics is None:
+            raise PolicyError(f"{choices.normaliser}: no such file of statistics of the observation")
+    network = import_network(path, choices, spaces, normaliser=statistics)
+    digest = file_hash(path)
+    if statistics is not None:
+        digest = sha256((digest + file_hash(statistics)).encode()).hexdigest()
+    return network, digest

@@ -10,8 +10,8 @@ import torch
 from torch import nn
 
 from pdtui.errors import PolicyError
+from pdtui.policies.decoders import decoder_for
 from pdtui.policies.files import load_network
-from pdtui.policies.load import decoder_for
 from pdtui.policies.runtime import Policy
 from pdtui.policies.units import Stimulation, format_unit, parse_unit
 
@@ -22,7 +22,7 @@ def _observations(count: int, size: int = 27) -> np.ndarray:
 
 def test_without_stimulation_actions_are_those_of_the_bare_network(weights: Path, policy: Policy) -> None:
     network = load_network(weights)
-    decode = decoder_for(network.spec)
+    decode = decoder_for(network)
     for observation in _observations(100):
         with torch.inference_mode():
             bare = decode(network(torch.from_numpy(observation.astype(np.float32))), None)

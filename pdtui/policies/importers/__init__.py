@@ -1,0 +1,100 @@
+"""Other people's policies: one module a format, none of which runs anything that a file holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pdtui.errors import PolicyError
+from pdtui.policies.choices import NO_CHOICES, NO_NORMALISER, PolicyChoices, Spaces
+from pdtui.policies.importers.archive import Archive, read_bounded, shorten
+from pdtui.policies.importers.build import build
+from pdtui.policies.importers.chain import import_chain
+from pdtui.policies.importers.cleanrl import import_cleanrl
+from pdtui.policies.importers.found import Found
+from pdtui.policies.importers.kinds import Kind, kind_of
+from pdtui.policies.importers.rllib import import_rllib
+from pdtui.policies.importers.rsl_rl import import_rsl_rl
+from pdtui.policies.importers.sb3 import OTHER_NETWORKS, import_sb3, is_sb3
+from pdtui.policies.importers.statistics import read_statistics
+from pdtui.policies.importers.tensors import Tensors, flatten, from_npz, from_safetensors, from_torch
+from pdtui.policies.network import PolicyNetwork
+
+FORMATS = (
+    "Stable-Baselines3 .zip, PyTorch .pt or .pth, .npz or .safetensors of RLlib, rsl_rl, CleanRL or a plain "
+    "chain of linear layers"
+)
+
+
+def import_network(
+    path: Path,
+    choices: PolicyChoices = NO_CHOICES,
+    spaces: Spaces | None = None,
+    *,
+    normaliser: Path | None = None,
+) -> PolicyNetwork:
+    """Read somebody else's policy, a multilayer perceptron, as one of pdtui's networks.
+
+    Args:
+        path: the file; its content says what it is, not its name.
+        choices: what the file may leave open.
+        spaces: of the world that the policy is to act in; gives the bounds that a file may lack.
+        normaliser: file of the statistics of the observation, found already.
+
+    Raises:
+        PolicyError: the message says what was found, or which choice is needed.
+    """
+    source = str(path)
+    try:
+        found = _find(read_bounded(path), source, choices)
+        if normaliser is not None and choices.normaliser != NO_NORMALISER:
+            found = found.having(read_statistics(normaliser, found.layers[0].shape[1]))
+        return build(found, choices, spaces, source)
+    except PolicyError as error:
+        text = str(error)
+        named = text.startswith(source) or (normaliser is not None and text.startswith(str(normaliser)))
+        raise error if named else PolicyError(f"{source}: {text}") from error
+
+
+def _find(content: bytes, source: str, choices: PolicyChoices) -> Found:
+    match kind_of(content):
+        case Kind.ZIP:
+            return _from_zip(content, source, choices)
+        case Kind.SAFETENSORS:
+            return _from_tensors(flatten(from_safetensors(content, source)), source)
+        case Kind.PICKLE:
+            raise PolicyError(
+                f"{source}: a pickle, which can run anything when it is read, so pdtui reads none; save the "
+                "tensors alone: torch.save(model.state_dict(), FILE) of PyTorch 1.6 or later, or numpy.savez"
+            )
+        case other:
+            raise PolicyError(f"{source}: {other.value}; expected {FORMATS}")
+
+
+def _from_zip(content: bytes, source: str, choices: PolicyChoices) -> Found:
+    archive = Archive(content, source)
+    names = archive.names
+    if is_sb3(names):
+        return import_sb3(archive, choices)
+    if names and all(name.endswith(".npy") for name in names):
+        return _from_tensors(flatten(from_npz(archive)), source)
+    if any(name.endswith("/constants.pkl") for name in names):
+        raise PolicyError(f"{source}: TorchScript, which this function does not read: its code would run")
+    if any(name.endswith("/data.pkl") for name in names):
+        return _from_tensors(flatten(from_torch(content, source)), source)
+    raise PolicyError(f"{source}: a zip that holds no policy: its entries are {archive.listing()}")
+
+
+def _from_tensors(tensors: Tensors, source: str) -> Found:
+    if not tensors:
+        raise PolicyError(f"{source}: expected weights, found no tensor")
+    if any(tensor.ndim > 2 and "weight" in name for name, tensor in tensors.items()):
+        kernels = [f"{name} {tuple(t.shape)}" for name, t in tensors.items() if t.ndim > 2]
+        raise PolicyError(
+            f"{source}: expected linear layers, found convolutions: {shorten(kernels)}; {OTHER_NETWORKS}"
+        )
+    return (
+        import_rllib(tensors)
+        or import_rsl_rl(tensors)
+        or import_cleanrl(tensors)
+        or import_chain(tensors, source)
+    )

@@ -1,0 +1,69 @@
+"""CleanRL state dicts, alone or as the first of several in one file.
+
+PPO's actor is ``actor_mean.0 …`` with ``actor_logstd``, or ``actor.0 …`` with logits. SAC's is ``fc1``,
+``fc2``, ``fc_mean``, ``fc_logstd``; that of TD3 and DDPG ends in ``fc_mu``; both keep ``action_scale`` and
+``action_bias``.
+"""
+
+from __future__ import annotations
+
+import re
+
+from pdtui.errors import PolicyError
+from pdtui.policies.importers.found import Found, chained, linear, paired, sequence
+from pdtui.policies.importers.tensors import Tensors
+
+_FIRST = re.compile(r"(?:(0|actor)\.)?(?=(?:actor_mean|fc1)\.)")
+
+
+def import_cleanrl(tensors: Tensors) -> Found | None:
+    """The actor of a CleanRL state dict; None if it is named otherwise.
+
+    Raises:
+        PolicyError: shapes that do not go together.
+    """
+    prefixes = {match[0] for name in tensors if (match := _FIRST.match(name))}
+    prefix = min(prefixes, key=len, default="")
+    named = {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}
+    if "actor_mean.0.weight" in named:
+        layers = sequence(named, "actor_mean")
+        return Found("CleanRL PPO", layers, log_std=named.get("actor_logstd"))
+    if "actor.0.weight" in named and "critic.0.weight" in named:
+        return Found("CleanRL PPO", sequence(named, "actor"), "categorical")
+    last = next((name for name in ("fc_mean", "fc_mu") if f"{name}.weight" in named), None)
+    if last is None or "fc1.weight" not in named:
+        return None
+    return _off_policy(named, last)
+
+
+def _off_policy(named: Tensors, last: str) -> Found:
+    numbers = sorted(int(match[1]) for name in named if (match := re.fullmatch(r"fc(\d{1,4})\.weight", name)))
+    hidden = [linear(named, f"fc{number}") for number in numbers]
+    low, high = _bounds(named)
+    if last == "fc_mu":
+        layers = chained([*hidden, linear(named, last)], "fc")
+        return Found("CleanRL TD3 or DDPG", layers, squash="tanh", low=low, high=high)
+    head = paired(linear(named, last), linear(named, "fc_logstd"))
+    return Found(
+        "CleanRL SAC",
+        chained([*hidden, head], "fc"),
+        "gaussian pair",
+        squash="tanh",
+        low=low,
+        high=high,
+        log_std_low=-5.0,
+        log_std_high=2.0,
+        log_std_rule="tanh",
+    )
+
+
+def _bounds(named: Tensors) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    if "action_scale" not in named or "action_bias" not in named:
+        return (), ()
+    scale, bias = named["action_scale"].reshape(-1), named["action_bias"].reshape(-1)
+    if scale.shape != bias.shape:
+        raise PolicyError(
+            f"tensor 'action_scale': expected the shape {tuple(bias.shape)} of 'action_bias', found "
+            f"{tuple(scale.shape)}"
+        )
+    return tuple((bias - scale).tolist()), tuple((bias + scale).tolist())

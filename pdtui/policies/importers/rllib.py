@@ -1,0 +1,72 @@
+"""RLlib weights, as its TensorFlow policies name them, in an ``.npz``.
+
+Kernels are stored (inputs, outputs). SAC's actor is ``…/action_1 … action_out``, a mean and a log standard
+deviation squashed by tanh; PPO's is ``…/fc_1 … fc_out``, whose outputs are such a pair,
+or the logits of a choice.
+"""
+
+from __future__ import annotations
+
+import re
+
+from pdtui.errors import PolicyError
+from pdtui.policies.importers.found import Found, Linear, chained, linear
+from pdtui.policies.importers.tensors import Tensors
+
+_SAC = re.compile(r"(.*?/?)(?:sequential/)?(action)_(\d{1,4}|out)/kernel")
+_PPO = re.compile(r"(.*?/?)(fc)_(\d{1,4}|out)/kernel")
+
+
+def import_rllib(tensors: Tensors) -> Found | None:
+    """The policy in RLlib's weights; None if they are named otherwise.
+
+    A policy and its target network have the same layers: the first in the file acts.
+
+    Raises:
+        PolicyError: shapes that do not go together.
+    """
+    for pattern, output, squash, log_std_range in (
+        (_SAC, "gaussian pair", "tanh", (-5.0, 2.0)),
+        (_PPO, "unknown pair", "", (-20.0, 20.0)),
+    ):
+        layers = _actor(tensors, pattern)
+        if layers:
+            low, high = log_std_range
+            name = "RLlib SAC" if output == "gaussian pair" else "RLlib PPO"
+            return Found(
+                name,
+                layers,
+                "gaussian pair" if output == "gaussian pair" else "unknown pair",
+                squash=squash,
+                log_std_low=low,
+                log_std_high=high,
+            )
+    return None
+
+
+def _actor(tensors: Tensors, pattern: re.Pattern[str]) -> tuple[Linear, ...]:
+    layers: dict[str, Linear] = {}
+    scope = None
+    for name in tensors:
+        match = pattern.fullmatch(name)
+        if match is None:
+            continue
+        prefix = name.removesuffix("/kernel")
+        here = prefix.rpartition("/")[0]
+        scope = here if scope is None else scope
+        if here == scope:
+            layers[match[3]] = _transposed(tensors, prefix)
+    if "out" not in layers:
+        return ()
+    order = sorted((key for key in layers if key != "out"), key=int)
+    return chained([layers[key] for key in [*order, "out"]], scope or "")
+
+
+def _transposed(tensors: Tensors, prefix: str) -> Linear:
+    kernel, bias = tensors[f"{prefix}/kernel"], tensors.get(f"{prefix}/bias")
+    if kernel.ndim != 2:
+        raise PolicyError(
+            f"tensor '{prefix}/kernel': expected shape (inputs, outputs), found {tuple(kernel.shape)}"
+        )
+    named = {"layer.weight": kernel.T.contiguous()} | ({} if bias is None else {"layer.bias": bias})
+    return linear(named, "layer")

@@ -1,0 +1,63 @@
+"""rsl_rl weights: a checkpoint ``.pt``, or its tensors as an ``.npz`` or ``.safetensors``.
+
+Three generations of names are read: ``actor.0.weight`` with ``std`` or ``log_std``; the same with
+``actor_obs_normalizer``, or statistics under ``obs_norm_state_dict``; and ``actor_state_dict`` with
+``mlp.0.weight`` and ``distribution.std_param``.
+"""
+
+from __future__ import annotations
+
+import torch
+
+from pdtui.policies.importers.found import Found, Statistics, sequence
+from pdtui.policies.importers.tensors import Tensors
+
+# rsl_rl's EmpiricalNormalization divides by std + 0.01, a constant that it does not store.
+_EPSILON = 1e-2
+_STDS = ("std", "distribution.std_param")
+_LOG_STDS = ("log_std", "distribution.log_std_param")
+_NORMALISERS = ("actor_obs_normalizer", "obs_normalizer", "obs_norm_state_dict")
+
+
+def import_rsl_rl(tensors: Tensors) -> Found | None:
+    """The actor of rsl_rl's weights; None if they are named otherwise.
+
+    Raises:
+        PolicyError: shapes that do not go together.
+    """
+    named = _unwrapped(tensors)
+    prefix = next((prefix for prefix in ("actor", "mlp") if f"{prefix}.0.weight" in named), None)
+    log_std = _log_std(named)
+    if prefix is None or log_std is None:
+        return None
+    return Found(
+        "rsl_rl", sequence(named, prefix), squash="none", log_std=log_std, statistics=_statistics(named)
+    )
+
+
+def _unwrapped(tensors: Tensors) -> Tensors:
+    """Names without the checkpoint around them; those of the critic and of optimisers stay as they are."""
+    named: Tensors = {}
+    for name, tensor in tensors.items():
+        for wrapper in ("model_state_dict.", "actor_state_dict."):
+            if name.startswith(wrapper):
+                named[name.removeprefix(wrapper)] = tensor
+                break
+        else:
+            named[name] = tensor
+    return named
+
+
+def _log_std(named: Tensors) -> torch.Tensor | None:
+    for name in _LOG_STDS:
+        if name in named:
+            return named[name]
+    return next((torch.log(named[name].clamp(min=1e-6)) for name in _STDS if name in named), None)
+
+
+def _statistics(named: Tensors) -> Statistics | None:
+    for prefix in _NORMALISERS:
+        mean, std = named.get(f"{prefix}._mean"), named.get(f"{prefix}._std")
+        if mean is not None and std is not None:
+            return Statistics(mean.reshape(-1), std.reshape(-1) + _EPSILON)
+    return None
