@@ -10,7 +10,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pdtui.api import QUICK, Dissection, Drive, Effort, Policy, dissect, drive, load_policy, replay
+    from pdtui.api import (
+        QUICK,
+        Dissection,
+        Drive,
+        Effort,
+        Policy,
+        PolicyChoices,
+        dissect,
+        drive,
+        load_policy,
+        replay,
+    )
 
 __version__ = "0.1.0"
 __all__ = [
@@ -19,6 +30,7 @@ __all__ = [
     "Drive",
     "Effort",
     "Policy",
+    "PolicyChoices",
     "__version__",
     "dissect",
     "drive",

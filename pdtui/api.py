@@ -13,6 +13,7 @@ from pdtui.dissection.effort import QUICK, Effort
 from pdtui.dissection.findings import Dissection
 from pdtui.errors import SessionError
 from pdtui.policies import load
+from pdtui.policies.choices import NO_CHOICES, PolicyChoices, Spaces
 from pdtui.policies.decoders import Decoder
 from pdtui.policies.modules import policy_of_module
 from pdtui.policies.runtime import Policy
@@ -22,19 +23,32 @@ from pdtui.sessions.recorder import SessionRecorder
 from pdtui.stimulation.library import find_map
 from pdtui.stimulation.mapfile import load_map
 from pdtui.stimulation.maps import StimulationMap
+from pdtui.stimulation.settle import settle
 from pdtui.teleop.arrays import Drive, drive_to_arrays
 from pdtui.teleop.drive import build_loop
 from pdtui.teleop.keys import read_keystrokes
 from pdtui.teleop.order import DriveOrder
 from pdtui.teleop.replay import ReplayResult, replay_session
 
-__all__ = ["QUICK", "Dissection", "Drive", "Effort", "Policy", "dissect", "drive", "load_policy", "replay"]
+__all__ = [
+    "QUICK",
+    "Dissection",
+    "Drive",
+    "Effort",
+    "Policy",
+    "PolicyChoices",
+    "dissect",
+    "drive",
+    "load_policy",
+    "replay",
+]
 
 
 def load_policy(
     policy: str | Path | nn.Module,
     robot: str | Robot | None = None,
     *,
+    choices: PolicyChoices = NO_CHOICES,
     observations: int | Sequence[int] | None = None,
     hidden: Sequence[str] | None = None,
     decode: Decoder | None = None,
@@ -61,16 +75,19 @@ def load_policy(
 
     Args:
         policy: a weights file, the name of a shipped policy, or a `torch.nn.Module`, which is copied.
-        robot: that it is for.
+        robot: that it is for; gives the bounds of actions that somebody else's file may lack.
+        choices: what somebody else's file leaves open; see `pdtui.policies.importers`.
         observations, hidden, decode, batched, initial_state, name: of a live network; see
             `pdtui.policies.modules.policy_of_module`.
 
     Raises:
         PdtuiError: it cannot be had, or is for another robot.
     """
-    if not isinstance(policy, nn.Module):
-        return load.load_policy(policy, robot.name if isinstance(robot, Robot) else robot)
     world = make_robot(robot) if isinstance(robot, str) else robot
+    if not isinstance(policy, nn.Module):
+        if world is None:
+            return load.load_policy(policy, choices=choices)
+        return load.load_policy(policy, world.name, choices=choices, spaces=Spaces.of_world(world))
     return policy_of_module(
         policy,
         world.observation_space if world is not None else None,
@@ -88,6 +105,7 @@ def dissect(
     robot: str | Robot,
     policy: str | Path | nn.Module | Policy,
     *,
+    choices: PolicyChoices = NO_CHOICES,
     preset: str = "paper",
     episodes: int = 5,
     seed: int = 1000,
@@ -115,7 +133,7 @@ def dissect(
     Args:
         robot: its name, or a `Robot`.
         policy: a weights file, a shipped name, a live network, or a `Policy`.
-        preset, episodes, seed, budget_minutes, workers, effort, progress, journal: as for
+        choices, preset, episodes, seed, budget_minutes, workers, effort, progress, journal: as for
             `pdtui.dissection.dissect.dissect`.
 
     Raises:
@@ -124,6 +142,7 @@ def dissect(
     return dissection.dissect(
         robot,
         load_policy(policy, robot) if isinstance(policy, nn.Module) else policy,
+        choices=choices,
         preset=preset,
         episodes=episodes,
         seed=seed,
@@ -140,6 +159,7 @@ def drive(
     stimulation_map: str | Path | StimulationMap | None = None,
     *,
     policy: str | Path | nn.Module | Policy | None = None,
+    choices: PolicyChoices = NO_CHOICES,
     keys: Mapping[int, str | Sequence[str]] | str | Path | None = None,
     steps: int = 1000,
     seed: int = 0,
@@ -160,6 +180,7 @@ def drive(
         robot: its name, or a `Robot`.
         stimulation_map: a map, or its name or file; by default the one named as the robot.
         policy: instead of the map's; a live network's has to be the one that the map was made for.
+        choices: what the weights file leaves open, over what the map says.
         keys: one key or several, by the control step before which they are pressed; or a keystroke file.
         steps: control steps.
         seed: of the reset and of every random number.
@@ -176,7 +197,8 @@ def drive(
     live = load_policy(policy, robot) if isinstance(policy, nn.Module) else policy
     given = live if isinstance(live, Policy) else None
     named = "" if given is not None or live is None else str(live)
-    order = DriveOrder(name, stimulation_map, seed, named, stochastic, force)
+    stimulation_map = settle(stimulation_map, named, choices)
+    order = DriveOrder(name, stimulation_map, seed, stochastic=stochastic, force=force)
     loop = build_loop(order, robot if isinstance(robot, Robot) else None, given)
     presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
     if record is not None and Path(record).exists():

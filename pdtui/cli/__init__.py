@@ -10,7 +10,7 @@ import click
 from pdtui import __version__
 from pdtui.cli.common import OneLineErrors
 from pdtui.cli.driving import drive, pick_and_drive, replay
-from pdtui.cli.measuring import bench, dissect, evaluate, train
+from pdtui.cli.measuring import bench, convert, dissect, evaluate, train
 
 
 @click.group(cls=OneLineErrors, invoke_without_command=True)
@@ -25,5 +25,5 @@ def main(ctx: click.Context) -> None:
         pick_and_drive()
 
 
-for command in (drive, replay, evaluate, dissect, train, bench):
+for command in (drive, replay, evaluate, dissect, convert, train, bench):
     main.add_command(command)

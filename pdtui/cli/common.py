@@ -7,11 +7,13 @@ import os
 import re
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from pdtui.errors import PdtuiError
+from pdtui.policies.choices import ACTIVATION_NAMES, NO_CHOICES, SQUASH_NAMES, PolicyChoices
 
 if TYPE_CHECKING:
     from pdtui.teleop.order import DriveOrder
@@ -43,7 +45,6 @@ class Seeds(click.ParamType[range]):
 map_option = click.option(
     "--map", "map_name", metavar="MAP", help="A map by name or file; default: the robot's."
 )
-policy_option = click.option("--policy", default="", help="Weights to use instead of the map's.")
 force_option = click.option(
     "--force", is_flag=True, help="Use the map although it was made for another policy."
 )
@@ -53,12 +54,54 @@ workers_option = click.option(
 )
 
 
+def choice_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """``--activation``, ``--squash`` and ``--normaliser``, given to the command as `choices`."""
+
+    @wraps(command)
+    def choosing(
+        *args: Any, activation: str | None, squash: str | None, normaliser: str, **others: Any
+    ) -> Any:
+        return command(*args, choices=PolicyChoices(activation or "", squash or "", normaliser), **others)
+
+    for option in (
+        click.option(
+            "--normaliser", default="", metavar="FILE", help="Statistics of the observation, or 'none'."
+        ),
+        click.option(
+            "--squash",
+            type=click.Choice(SQUASH_NAMES),
+            help="How the policy's output becomes an action, where its file does not say.",
+        ),
+        click.option(
+            "--activation",
+            type=click.Choice(ACTIVATION_NAMES),
+            help="Activation function of the hidden layers, where the policy's file does not say.",
+        ),
+    ):
+        choosing = option(choosing)
+    return choosing
+
+
+def policy_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """``--policy`` and the choices that its file may leave open, given as `policy` and `choices`."""
+    return click.option("--policy", default="", help="Weights to use instead of the map's.")(
+        choice_options(command)
+    )
+
+
 def order_of_drive(
-    robot: str, map_name: str | None, policy: str, *, seed: int = 0, **options: Any
+    robot: str,
+    map_name: str | None,
+    policy: str,
+    choices: PolicyChoices = NO_CHOICES,
+    *,
+    seed: int = 0,
+    **options: Any,
 ) -> DriveOrder:
     from pdtui.robots import check_robot
     from pdtui.stimulation.library import find_map
     from pdtui.stimulation.mapfile import load_map
+    from pdtui.stimulation.settle import settle
     from pdtui.teleop.order import DriveOrder
 
     if map_name is None and robot.endswith(".toml"):
@@ -67,7 +110,7 @@ def order_of_drive(
     else:
         check_robot(robot)
         stimulation_map = load_map(find_map(map_name or robot))
-    return DriveOrder(check_robot(robot), stimulation_map, seed, policy, **options)
+    return DriveOrder(check_robot(robot), settle(stimulation_map, policy, choices), seed, **options)
 
 
 def cores(workers: int | None) -> int:

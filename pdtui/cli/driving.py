@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pdtui.cli.common import force_option, map_option, order_of_drive, policy_option, progress_bar_or_none
+from pdtui.cli.common import force_option, map_option, order_of_drive, policy_options, progress_bar_or_none
 from pdtui.errors import EventError, ScreenError, SessionError
+from pdtui.policies.choices import PolicyChoices
 
 if TYPE_CHECKING:
     from pdtui.teleop.order import DriveOrder
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("robot")
 @map_option
-@policy_option
+@policy_options
 @force_option
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True)
 @click.option(
@@ -40,6 +41,7 @@ def drive(
     robot: str,
     map_name: str | None,
     policy: str,
+    choices: PolicyChoices,
     force: bool,
     seed: int,
     stochastic: bool,
@@ -51,7 +53,7 @@ def drive(
     steps: int,
 ) -> None:
     """Drive ROBOT with its map's keys; ROBOT may be a map's file, too."""
-    order = order_of_drive(robot, map_name, policy, force=force, seed=seed, stochastic=stochastic)
+    order = order_of_drive(robot, map_name, policy, choices, force=force, seed=seed, stochastic=stochastic)
     if record is not None and record.exists():
         raise SessionError(f"{record}: exists already; a drive is recorded into a new file")
     if keys is not None and not headless:

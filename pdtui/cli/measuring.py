@@ -9,23 +9,25 @@ import click
 
 from pdtui.cli.common import (
     Seeds,
+    choice_options,
     cores,
     force_option,
     json_option,
     map_option,
     order_of_drive,
-    policy_option,
+    policy_options,
     progress_bar_or_none,
     show_result,
     workers_option,
 )
 from pdtui.errors import MapError
+from pdtui.policies.choices import PolicyChoices, Spaces
 
 
 @click.command()
 @click.argument("robot")
 @map_option
-@policy_option
+@policy_options
 @force_option
 @click.option("--seeds", type=Seeds(), default="100-119", show_default=True)
 @click.option(
@@ -45,6 +47,7 @@ def evaluate(
     robot: str,
     map_name: str | None,
     policy: str,
+    choices: PolicyChoices,
     force: bool,
     seeds: range,
     target: str | None,
@@ -62,7 +65,7 @@ def evaluate(
         raise MapError(
             "--update writes what was measured of behaviors; --target and --policy-only measure none"
         )
-    order = order_of_drive(robot, map_name, policy, force=force)
+    order = order_of_drive(robot, map_name, policy, choices, force=force)
     if target is not None:
         with progress_bar_or_none("holding targets", quiet=as_json) as advance:
             tracked = tracking.evaluate_tracking(order, target, seeds, progress=advance)
@@ -82,6 +85,7 @@ def evaluate(
 @click.command()
 @click.argument("robot")
 @click.option("--policy", default="", help="Weights to dissect; default: the robot's shipped policy.")
+@choice_options
 @click.option("--preset", type=click.Choice(["paper", "authors"]), default="paper", show_default=True)
 @click.option("--episodes", type=click.IntRange(1, 1000), default=5, show_default=True)
 @click.option("--seed", type=click.IntRange(1000, 2**31 - 1), default=1000, show_default=True)
@@ -100,6 +104,7 @@ def evaluate(
 def dissect(
     robot: str,
     policy: str,
+    choices: PolicyChoices,
     preset: str,
     episodes: int,
     seed: int,
@@ -120,6 +125,7 @@ def dissect(
             robot,
             policy or robot,
             output or Path("maps") / f"{robot}-dissected.toml",
+            choices=choices,
             overwrite=overwrite,
             preset=preset,
             episodes=episodes,
@@ -129,6 +135,25 @@ def dissect(
             progress=advance,
         )
     show_result(result.as_dict(), as_json, result.table)
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="The safetensors file.")
+@click.option("--robot", help="The robot that it drives; it gives bounds of actions that FILE may lack.")
+@choice_options
+def convert(file: Path, output: Path, robot: str | None, choices: PolicyChoices) -> None:
+    """Write somebody else's policy FILE as safetensors that state everything."""
+    from pdtui.policies.load import convert_policy
+    from pdtui.robots import make_robot
+
+    spaces = None if robot is None else Spaces.of_world(make_robot(robot))
+    spec = convert_policy(file, output, choices, spaces)
+    layers = " ".join(str(width) for width in spec.layers)
+    click.echo(
+        f"wrote {output}: {spec.observations} observations, hidden {layers} {spec.activation}, "
+        f"{spec.actions} actions, head {spec.head}; {spec.command}"
+    )
 
 
 @click.command()

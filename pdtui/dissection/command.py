@@ -16,6 +16,7 @@ from pdtui.dissection.propose import propose
 from pdtui.dissection.report import render
 from pdtui.dissection.summary import summarise
 from pdtui.errors import MapError
+from pdtui.policies.choices import NO_CHOICES, PolicyChoices
 from pdtui.stimulation.mapfile import parse_map
 
 
@@ -42,6 +43,7 @@ def dissect_to_map(
     policy: str,
     output: Path,
     *,
+    choices: PolicyChoices = NO_CHOICES,
     overwrite: bool,
     preset: str,
     episodes: int,
@@ -69,6 +71,7 @@ def dissect_to_map(
     dissection = dissect(
         robot,
         policy,
+        choices=choices,
         preset=preset,
         episodes=episodes,
         seed=seed,

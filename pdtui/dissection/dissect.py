@@ -23,6 +23,7 @@ from pdtui.dissection.searches import Clock, Searches
 from pdtui.dissection.spectrum import find_preset
 from pdtui.dissection.steer import movable, steer
 from pdtui.dissection.workers import Crew
+from pdtui.policies.choices import NO_CHOICES, PolicyChoices
 from pdtui.policies.runtime import Policy
 from pdtui.robots.base import Robot
 from pdtui.sessions.versions import environment_versions
@@ -34,6 +35,7 @@ def dissect(
     robot: str | Robot,
     policy: str | Path | Policy,
     *,
+    choices: PolicyChoices = NO_CHOICES,
     preset: str = "paper",
     episodes: int = 5,
     seed: int = 1000,
@@ -51,6 +53,7 @@ def dissect(
     Args:
         robot: name of the robot, or a robot.
         policy: weights file, name of a shipped policy, or a policy.
+        choices: what the weights file leaves open.
         preset: ``paper`` or ``authors``.
         episodes: monitored (the paper: 5).
         seed: of everything.
@@ -68,7 +71,7 @@ def dissect(
     def stage(name: str) -> Progress | None:
         return None if progress is None else lambda done, of: progress(name, done, of)
 
-    with Crew(robot, policy, workers) as crew, ExitStack() as stack:
+    with Crew(robot, policy, workers, choices) as crew, ExitStack() as stack:
         known = None
         if journal is not None:
             known = stack.enter_context(Journal(journal, _identity(crew)))
@@ -131,6 +134,7 @@ def dissect(
             rollouts=crew.rollouts,
             control_steps=crew.steps_run,
             minutes=(time.monotonic() - began) / 60,
+            choices=choices,
         )
 
 

@@ -11,6 +11,7 @@ from pdtui.dissection.phase import Phase
 from pdtui.dissection.probe import Sweep
 from pdtui.dissection.spectrum import Preset
 from pdtui.dissection.steer import Steered
+from pdtui.policies.choices import NO_CHOICES, PolicyChoices
 from pdtui.policies.units import format_unit
 from pdtui.robots.types import Attribute, Floats, column_of
 from pdtui.stimulation.mapfile import parse_map
@@ -40,6 +41,7 @@ class Dissection:
         behaviors: the best stimulation for each goal.
         holds: the best controllers.
         rollouts, control_steps, minutes: what it took.
+        choices: what the weights file leaves open.
     """
 
     robot: str
@@ -62,6 +64,7 @@ class Dissection:
     rollouts: int
     control_steps: int
     minutes: float
+    choices: PolicyChoices = NO_CHOICES
 
     def __repr__(self) -> str:
         return (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,9 @@ def propose(dissection: Dissection) -> str:
         document.add(tomlkit.comment(line))
     document.add("schema", tomlkit.item(SCHEMA))
     document.add("robot", tomlkit.item(dissection.robot))
-    document.add("policy", table({"name": dissection.policy, "sha256": dissection.policy_hash}))
+    chosen = {name: value for name, value in asdict(dissection.choices).items() if value}
+    policy = {"name": dissection.policy, "sha256": dissection.policy_hash, **chosen}
+    document.add("policy", table(policy))
     document.add("keys", table({"default": "space"}))
     names = {
         str(entry["unit"]): (str(entry["name"]), float(entry["rho"]))

@@ -16,6 +16,7 @@ from types import TracebackType
 from pdtui.dissection.monitor import Start
 from pdtui.dissection.rollout import Job, Outcome, roll_out
 from pdtui.errors import RobotError
+from pdtui.policies.choices import NO_CHOICES, PolicyChoices, Spaces
 from pdtui.policies.load import load_policy
 from pdtui.policies.runtime import Policy
 from pdtui.robots import make_robot
@@ -27,12 +28,17 @@ _STEPS_A_CHUNK = 1200
 _worker: tuple[Robot, Policy] | None = None
 
 
-def _start_worker(robot: str, policy: str) -> None:
+def _start_worker(robot: str, policy: str, choices: PolicyChoices) -> None:
     global _worker  # noqa: PLW0603  (a process's own robot is its global state)
     # Ctrl-C reaches the whole process group; only the parent answers it, or every worker prints a traceback.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    _worker = (make_robot(robot), load_policy(policy, robot))
+    world = make_robot(robot)
+    _worker = (world, _load(policy, world, choices))
+
+
+def _load(policy: str | Path, world: Robot, choices: PolicyChoices) -> Policy:
+    return load_policy(policy, world.name, choices=choices, spaces=Spaces.of_world(world))
 
 
 def _end_with_parent() -> None:
@@ -65,17 +71,24 @@ class Crew:
         policy: weights file, name of a shipped policy, or a policy.
         workers: processes, which load robot and policy by their names; what is given as an object stays in
             this one.
+        choices: what the weights file leaves open.
 
     Raises:
         RobotError: no such robot. PolicyError: no such policy, or one for another robot.
     """
 
-    def __init__(self, robot: str | Robot, policy: str | Path | Policy, workers: int = 2) -> None:
+    def __init__(
+        self,
+        robot: str | Robot,
+        policy: str | Path | Policy,
+        workers: int = 2,
+        choices: PolicyChoices = NO_CHOICES,
+    ) -> None:
         # Built here too: the caller needs both, and what is wrong with them is raised in this process.
         self.robot = make_robot(robot) if isinstance(robot, str) else robot
-        self.policy = policy if isinstance(policy, Policy) else load_policy(policy, self.robot.name)
+        self.policy = policy if isinstance(policy, Policy) else _load(policy, self.robot, choices)
         named = isinstance(robot, str) and not isinstance(policy, Policy)
-        self._names = (robot if isinstance(robot, str) else robot.name, str(policy))
+        self._names = (robot if isinstance(robot, str) else robot.name, str(policy), choices)
         self._workers = max(1, workers) if named else 1
         self._pool: ProcessPoolExecutor | None = None
         self.steps_run = 0

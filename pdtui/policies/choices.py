@@ -90,6 +90,15 @@ class Spaces:
             return cls(owner, observations, actions)
         return cls(owner, observations, actions, tuple(low), tuple(high))
 
+    @classmethod
+    def of_world(cls, world: Any) -> Spaces:
+        """Of a robot, by its name and spaces.
+
+        Raises:
+            PolicyError: as `of`.
+        """
+        return cls.of(world.name, world.observation_space, world.action_space)
+
     def check(self, source: str, observations: int, actions: int, choices: int) -> None:
         """See that a policy of these sizes fits.
 

@@ -18,7 +18,7 @@ Decoder = Callable[[torch.Tensor, np.random.Generator | None], _Floats]
 def mean_action(output: torch.Tensor, rng: np.random.Generator | None) -> NDArray[np.float32]:
     """The network's output is the action."""
     del rng
-    action: NDArray[np.float32] = output.reshape(-1).numpy().astype(np.float32, copy=False)
+    action: NDArray[np.float32] = output.reshape(-1).numpy().astype(np.float32)
     return action
 
 

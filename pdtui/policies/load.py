@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -11,9 +12,9 @@ import torch
 from pdtui.errors import PolicyError
 from pdtui.policies.choices import NO_CHOICES, NO_NORMALISER, PolicyChoices, Spaces, find_beside
 from pdtui.policies.decoders import decoder_for
-from pdtui.policies.files import file_hash, find_weights, is_own_format, load_network
+from pdtui.policies.files import file_hash, find_weights, is_own_format, load_network, save_network
 from pdtui.policies.importers import import_network
-from pdtui.policies.network import PolicyNetwork
+from pdtui.policies.network import NetworkSpec, PolicyNetwork
 from pdtui.policies.runtime import Policy
 
 
@@ -59,22 +60,63 @@ def load_any_network(
 ) -> tuple[PolicyNetwork, str]:
     """The network of a file that pdtui or somebody else wrote, and its hash.
 
-    The hash is the file's SHA-256; where statistics come from a second file, that of both hashes.
+    The hash is the file's SHA-256; choices enter it, too, because with others it is another policy.
 
     Raises:
         PolicyError: as `load_policy`.
     """
-    if is_own_format(path):
-        if choices != NO_CHOICES:
-            raise PolicyError(f"{path}: states activation, squash and normaliser itself; expected no choices")
-        return load_network(path), file_hash(path)
-    statistics = None
-    if choices.normaliser and choices.normaliser != NO_NORMALISER:
-        statistics = find_beside(choices.normaliser, (*folders, path.parent))
-        if statistics is None:
-            raise PolicyError(f"{choices.normaliser}: no such file of statistics of the observation")
-    network = import_network(path, choices, spaces, normaliser=statistics)
     digest = file_hash(path)
-    if statistics is not None:
-        digest = sha256((digest + file_hash(statistics)).encode()).hexdigest()
+    if is_own_format(path):
+        network = load_network(path)
+        _check_agreement(path, network.spec, choices)
+        return network, digest
+    statistics = _find_statistics(path, choices, folders)
+    network = import_network(path, choices, spaces, normaliser=statistics)
+    if choices != NO_CHOICES:
+        parts = digest, choices.activation, choices.squash, file_hash(statistics) if statistics else ""
+        digest = sha256("\n".join(parts).encode()).hexdigest()
     return network, digest
+
+
+def _check_agreement(path: Path, spec: NetworkSpec, choices: PolicyChoices) -> None:
+    """A file of pdtui's own states everything: a choice may repeat it, not change it."""
+    squash = "tanh" if spec.head in ("squashed_gaussian", "tanh") else "clip" if spec.action_low else "none"
+    for what, stated, chosen in (
+        ("activation", spec.activation, choices.activation),
+        ("squash", squash, choices.squash),
+        ("normaliser", NO_NORMALISER, choices.normaliser),
+    ):
+        if chosen and chosen != stated:
+            raise PolicyError(f"{path}: its {what} is '{stated}' and cannot be chosen, found '{chosen}'")
+
+
+def _find_statistics(path: Path, choices: PolicyChoices, folders: Sequence[Path]) -> Path | None:
+    """The file that the choices name: from the working directory, a folder, or beside the weights."""
+    name = choices.normaliser
+    if not name or name == NO_NORMALISER:
+        return None
+    found = find_beside(name, (*folders, path.parent)) or find_beside(str(path.parent / Path(name).name), ())
+    if found is None:
+        raise PolicyError(f"{name}: no such file; expected the statistics of the observation for {path}")
+    return found
+
+
+def convert_policy(path: Path, output: Path, choices: PolicyChoices, spaces: Spaces | None) -> NetworkSpec:
+    """Write somebody else's policy as safetensors that state everything, for the world of these spaces.
+
+    Returns:
+        What was written, without the weights.
+
+    Raises:
+        PolicyError: as `load_policy`; or the output exists already or cannot be written.
+    """
+    if output.exists():
+        raise PolicyError(f"{output}: exists already; a policy is converted into a new file")
+    network, _ = load_any_network(path, choices, spaces)
+    if spaces is not None:
+        network.spec = replace(network.spec, robot=spaces.owner)
+    try:
+        save_network(output, network)
+    except OSError as error:
+        raise PolicyError(f"{output}: cannot be written: {error.strerror}") from error
+    return network.spec

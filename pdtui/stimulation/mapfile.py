@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from pdtui.errors import MapError
+from pdtui.policies.choices import ACTIVATION_NAMES, SQUASH_NAMES, PolicyChoices
 from pdtui.policies.units import ADDRESS
 from pdtui.stimulation.maps import (
     RESERVED_KEYS,
@@ -57,7 +58,7 @@ class _Table:
 
     def choice(self, name: str, choices: tuple[str, ...], default: Any = ...) -> str:
         value = self.text(name, default)
-        if value not in choices:
+        if value not in choices and value != default:
             raise self.error(name, f"expected one of {', '.join(choices)}, found '{value}'")
         return value
 
@@ -114,6 +115,11 @@ def parse_map(text: str, source: str) -> StimulationMap:
     robot = top.text("robot")
     policy = _Table(source, text, "policy", top.take("policy", dict), "[policy]", 0)
     name, sha256 = policy.text("name"), policy.text("sha256")
+    choices = PolicyChoices(
+        policy.choice("activation", ACTIVATION_NAMES, ""),
+        policy.choice("squash", SQUASH_NAMES, ""),
+        policy.text("normaliser", ""),
+    )
     policy.done()
     keys = _Table(source, text, "keys", top.take("keys", dict, {"default": "space"}), "[keys]", 0)
     default_key = keys.text("default")
@@ -140,7 +146,7 @@ def parse_map(text: str, source: str) -> StimulationMap:
                 raise MapError(
                     f"{source}: behavior '{behavior.name}': together names '{other}', which does not exist"
                 )
-    return StimulationMap(robot, name, sha256, default_key, primitives, behaviors, text, source)
+    return StimulationMap(robot, name, sha256, default_key, primitives, behaviors, text, source, choices)
 
 
 def _primitive(table: _Table) -> Primitive:

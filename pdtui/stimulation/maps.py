@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pdtui.errors import MapError
+from pdtui.policies.choices import NO_CHOICES, PolicyChoices
 from pdtui.policies.units import parse_unit
 
 SCHEMA = 1
@@ -145,6 +146,7 @@ class StimulationMap:
         behaviors: by name, in the order of the file.
         text: the file's text.
         source: where it came from, for messages.
+        choices: what the weights file leaves open.
     """
 
     robot: str
@@ -155,6 +157,7 @@ class StimulationMap:
     behaviors: dict[str, Behavior]
     text: str = field(default="", repr=False)
     source: str = "map"
+    choices: PolicyChoices = NO_CHOICES
 
     def units_of(self, behavior: Behavior) -> dict[str, float]:
         """The behavior's outputs v by unit address; ``v = c ρ`` for a primitive (section 3.3)."""

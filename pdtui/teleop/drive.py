@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from pdtui.errors import EventError, SimulationDiverged
+from pdtui.policies.choices import Spaces
 from pdtui.policies.load import load_policy
 from pdtui.policies.runtime import Policy
 from pdtui.robots import make_robot
@@ -45,10 +47,16 @@ def build_loop(order: DriveOrder, robot: Robot | None = None, policy: Policy | N
     Raises:
         PdtuiError: the robot, the policy or the map cannot be had, or they do not fit each other.
     """
-    policy = policy or load_policy(order.policy or order.stimulation_map.policy, order.robot)
-    order.stimulation_map.check(order.robot, policy.layers, policy.sha256, force=order.force)
-    robot = robot or make_robot(order.robot)
-    return ControlLoop(robot, policy, order.stimulation_map, order.seed, stochastic=order.stochastic)
+    robot, wanted = robot or make_robot(order.robot), order.stimulation_map
+    policy = policy or load_policy(
+        order.policy or wanted.policy,
+        order.robot,
+        choices=wanted.choices,
+        spaces=Spaces.of_world(robot),
+        folders=(Path(wanted.source).parent,),
+    )
+    wanted.check(order.robot, policy.layers, policy.sha256, force=order.force)
+    return ControlLoop(robot, policy, wanted, order.seed, stochastic=order.stochastic)
 
 
 def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pdtui.policies.runtime import Policy
@@ -43,6 +43,8 @@ def order_of(session: Session, source: str, policy: str = "") -> DriveOrder:
     """
     info = session.info
     stimulation_map = parse_map(info.map_text, f"{source} (map)")
+    # A drive that was forced had other weights than its map was made for; a replay wants the session's own.
+    stimulation_map = replace(stimulation_map, policy_hash=info.policy_hash)
     return DriveOrder(
         robot=info.robot,
         stimulation_map=stimulation_map,

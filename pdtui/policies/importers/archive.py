@@ -31,6 +31,11 @@ class Archive:
             self._zip = zipfile.ZipFile(io.BytesIO(content))
         except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError) as error:
             raise PolicyError(f"{source}: a zip file that is cut off or damaged: {error}") from error
+        if min((info.header_offset for info in self._zip.infolist()), default=0) > 0:
+            # The directory that was found is that of an archive inside, its own being gone.
+            raise PolicyError(
+                f"{source}: a zip file that is cut off or damaged: it has no directory of its own"
+            )
         self._entries = {info.filename: info for info in self._zip.infolist()}
         self.names: tuple[str, ...] = tuple(self._entries)
         total = sum(info.file_size for info in self._entries.values())

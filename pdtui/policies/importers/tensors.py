@@ -103,7 +103,7 @@ def _reason(error: Exception) -> str:
             f"holds other objects than tensors, which pdtui does not load ({found[:160]}); save the state "
             "dict alone: torch.save(model.state_dict(), FILE)"
         )
-    return f"a PyTorch file that is cut off or damaged: {text.splitlines()[0][:160]}"
+    return f"a PyTorch file that is cut off or damaged: {text.splitlines()[0].split('. ')[0][:160]}"
 
 
 def flatten(content: Any, prefix: str = "", depth: int = 0) -> Tensors:

@@ -1,0 +1,125 @@
+"""The paper authors' weights load, have the right shapes, and give the numbers of their own formulas."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pdtui.policies.choices import PolicyChoices, Spaces
+from pdtui.policies.load import load_policy
+from pdtui.policies.units import NO_STIMULATION, Stimulation
+from pdtui.robots import make_robot
+
+Reference = Callable[[str], Path]
+Draw = Callable[[int], NDArray[np.float32]]
+ANT = Spaces("Ant with contact forces", 111, 8, (-1.0,) * 8, (1.0,) * 8)
+
+
+def _forward(
+    x: NDArray[np.float64], layers: list[tuple[NDArray[np.float64], NDArray[np.float64]]], elu: bool
+) -> NDArray[np.float64]:
+    for weight, bias in layers[:-1]:
+        x = weight @ x + bias
+        x = np.where(x > 0, x, np.expm1(x)) if elu else np.tanh(x)
+    weight, bias = layers[-1]
+    return weight @ x + bias
+
+
+def _layers(path: Path, names: list[str]) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    with np.load(path, allow_pickle=False) as arrays:
+        return [
+            (arrays[f"{n}.weight"].astype(float), arrays[f"{n}.bias"].astype(float))
+            if f"{n}.weight" in arrays
+            else (arrays[f"{n}/kernel"].T.astype(float), arrays[f"{n}/bias"].astype(float))
+            for n in names
+        ]
+
+
+def test_the_ant_is_an_rllib_sac(reference: Reference, observations: Draw) -> None:
+    path = reference("ant.npz")
+    policy = load_policy(path, choices=PolicyChoices("tanh"), spaces=ANT)
+    assert (policy.shape, policy.layers) == ((111,), (256, 256))
+    layers = _layers(path, [f"default_policy/sequential/action_{name}" for name in ("1", "2", "out")])
+    for observation in observations(111):
+        expected = np.tanh(_forward(observation.astype(float), layers, elu=False)[:8])
+        np.testing.assert_allclose(policy.act(observation).action, expected, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "observed", "widths", "activation"),
+    [
+        ("anymal_forward_tanh.npz", 47, (128, 64, 32), "tanh"),
+        ("anymal_tanh.npz", 49, (128, 64, 32), "tanh"),
+        ("forward_cassie_elu.npz", 170, (512, 256, 128), "elu"),
+    ],
+)
+def test_rsl_rl_weights(
+    name: str,
+    observed: int,
+    widths: tuple[int, ...],
+    activation: str,
+    reference: Reference,
+    observations: Draw,
+) -> None:
+    path = reference(name)
+    policy = load_policy(path, choices=PolicyChoices(activation))
+    assert (policy.shape, policy.layers) == ((observed,), widths)
+    layers = _layers(path, [f"actor.{number}" for number in (0, 2, 4, 6)])
+    for observation in observations(observed):
+        expected = _forward(observation.astype(float), layers, elu=activation == "elu")
+        np.testing.assert_allclose(policy.act(observation).action, expected, rtol=1e-4, atol=1e-4)
+    with np.load(path) as arrays:
+        spread = arrays["std"]
+    rng = np.random.default_rng(0)
+    drawn = np.array([policy.act(observation, rng=rng).action for _ in range(2000)])
+    np.testing.assert_allclose(drawn.std(0), spread, rtol=0.12)
+
+
+def test_the_a1_is_a_plain_chain_with_statistics(reference: Reference, observations: Draw) -> None:
+    path, statistics = reference("quadrupedal.npz"), reference("quadrupedal_obs_normalizer.npz")
+    choices = PolicyChoices("tanh", "tanh", str(statistics))
+    policy = load_policy(path, choices=choices, spaces=Spaces("A1", 93, 6, (-1.0,) * 6, (1.0,) * 6))
+    assert (policy.shape, policy.layers) == ((93,), (256,) * 4)
+    names = ["base.seq_fcs.0", "base.seq_fcs.2", *(f"seq_append_fcs.{number}" for number in (0, 2, 4))]
+    layers = _layers(path, names)
+    with np.load(statistics) as arrays:
+        mean, std = arrays["mean"], np.sqrt(arrays["var"] + 1e-8)
+    for draw in observations(93):
+        # Around the statistics' own mean: the A1's first three numbers hardly vary.
+        observation = mean + draw * std
+        expected = np.tanh(_forward(draw.astype(float), layers, elu=False))
+        np.testing.assert_allclose(policy.act(observation).action, expected, atol=2e-3)
+
+
+@pytest.mark.slow
+def test_the_authors_brake_brakes(reference: Reference) -> None:
+    """Unit 0:156 at −20 stops their Ant (20 seeds); it observes 84 zeros where contact forces would be."""
+    policy = load_policy(reference("ant.npz"), choices=PolicyChoices("tanh"), spaces=ANT)
+    robot = make_robot("ant")
+    speed = robot.attribute_index("speed")
+
+    def mean_speed(seed: int, stimulation: Stimulation) -> float:
+        observation, _ = robot.reset(seed=seed)
+        speeds: list[float] = []
+        for step in count():
+            if step == 400:
+                return float(np.mean(speeds[-200:]))
+            padded = np.concatenate([observation, np.zeros(84)])
+            acted = policy.act(padded, stimulation if step >= 100 else NO_STIMULATION)
+            observation, _, fell, _, _ = robot.step(acted.action)
+            speeds.append(robot.read_attributes()[speed])
+            if fell:
+                break
+        return float(np.mean(speeds[-20:]))
+
+    brake = Stimulation((156,), (-20.0,))
+    free = [mean_speed(seed, NO_STIMULATION) for seed in range(20)]
+    braked = [mean_speed(seed, brake) for seed in range(20)]
+    print(f"unperturbed {np.mean(free):.2f} m/s, braked {np.mean(braked):.3f} m/s, worst {max(braked):.3f}")
+    assert np.mean(free) > 4.5
+    assert np.mean(braked) < 0.3
