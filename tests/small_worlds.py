@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -64,8 +64,8 @@ class _Small(Robot):
 class Dot(_Small):
     """A dot on a field of 6×6 pixels that is to go to a mark; at the mark, the mark jumps."""
 
-    name: ClassVar[str] = "dot"
-    title: ClassVar[str] = "Dot"
+    name = "dot"
+    title = "Dot"
     attributes = (Attribute("x", "px"), Attribute("y", "px"), Attribute("distance", "px"))
     observation_space = gymnasium.spaces.Box(0.0, 1.0, (2, SIDE, SIDE), np.float64)
     action_space = gymnasium.spaces.Discrete(len(MOVES))  # type: ignore[assignment]
@@ -93,8 +93,8 @@ class Dot(_Small):
 class Pole(_Small):
     """An inverted pendulum that shows its angle only; it falls beyond 0.6 rad."""
 
-    name: ClassVar[str] = "pole"
-    title: ClassVar[str] = "Pole"
+    name = "pole"
+    title = "Pole"
     attributes = (Attribute("angle", "rad"), Attribute("rate", "rad/s"))
     observation_space = gymnasium.spaces.Box(-2.0, 2.0, (1,), np.float64)
     action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,))

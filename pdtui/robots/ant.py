@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium.envs.mujoco.ant_v5 import AntEnv
@@ -28,8 +28,8 @@ class Ant(MujocoRobot, AntEnv):
             is vx, as in stock Ant (facts differ on which one trains; physics is the same).
     """
 
-    name: ClassVar[str] = "ant"
-    title: ClassVar[str] = "Ant (MuJoCo)"
+    name = "ant"
+    title = "Ant (MuJoCo)"
 
     def __init__(self, forward: str = "either") -> None:
         super().__init__(include_cfrc_ext_in_observation=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar
 
 import gymnasium
 import numpy as np
@@ -18,8 +17,8 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     `step` puts ``cost`` (float) into its info and, when the episode ends, ``reason`` (str).
     """
 
-    name: ClassVar[str]
-    title: ClassVar[str]
+    name: str
+    title: str
     attributes: tuple[Attribute, ...]
     links: tuple[Link, ...]
 

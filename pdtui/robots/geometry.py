@@ -54,6 +54,11 @@ def roll_pitch_yaw(w: float, x: float, y: float, z: float) -> tuple[float, float
     return roll, pitch, yaw
 
 
+def root_body(links: Sequence[Link]) -> int:
+    """Row of the poses that stands for the robot's place: the body of its first shape."""
+    return links[0].body if links else 0
+
+
 def place_links(links: Sequence[Link], poses: Floats) -> Floats:
     """World poses of links, shape (..., L, 7), from body poses, shape (..., B, 7)."""
     bodies = poses[..., [link.body for link in links], :]

@@ -16,8 +16,12 @@ from pdtui.robots.types import Floats, Link, RobotSnapshot
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _SHAPES = {
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): ("capsule", 2),
+    # A cylinder's rim rounds off; what is no primitive is drawn as the box around it.
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): ("capsule", 2),
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", 1),
     int(mujoco.mjtGeom.mjGEOM_BOX): ("box", 3),
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): ("box", 3),
+    int(mujoco.mjtGeom.mjGEOM_MESH): ("box", 3),
 }
 # Its own handler prints and leaves a log file in the user's folder; `_check_finite` says what matters.
 mujoco.set_mju_user_warning(lambda *_: None)
@@ -29,25 +33,78 @@ _DIVERGED = (
 
 
 def links_of(model: mujoco.MjModel) -> tuple[Link, ...]:
-    """The model's capsules, spheres and boxes that move with a body."""
+    """The model's visible geoms that belong to a body, as primitive shapes."""
     links = []
     for index in range(model.ngeom):
         geom = model.geom(index)
         body, kind = int(geom.bodyid[0]), int(geom.type[0])
-        if body == 0 or kind not in _SHAPES:
+        if body == 0 or kind not in _SHAPES or geom.rgba[3] == 0:
             continue
         shape, sizes = _SHAPES[kind]
+        size = model.geom_aabb[index, 3:] if kind == mujoco.mjtGeom.mjGEOM_MESH else geom.size
         links.append(
             Link(
                 name=geom.name or f"{model.body(body).name or f'body {body}'} {index}",
                 body=body - 1,
                 shape=cast(Any, shape),
-                size=tuple(float(value) for value in geom.size[:sizes]),
+                size=tuple(float(value) for value in size[:sizes]),
                 position=cast(Any, tuple(float(value) for value in geom.pos)),
                 quaternion=cast(Any, tuple(float(value) for value in geom.quat)),
             )
         )
     return tuple(links)
+
+
+def state_of(model: mujoco.MjModel, data: mujoco.MjData) -> Floats:
+    """All that the next physics step reads, shape (S,)."""
+    state = np.empty(mujoco.mj_stateSize(model, _STATE))
+    mujoco.mj_getState(model, data, state, _STATE)
+    return state
+
+
+def set_state(model: mujoco.MjModel, data: mujoco.MjData, state: Floats, owner: str) -> None:
+    """Return to what `state_of` gave, bit-exactly.
+
+    Raises:
+        RobotError: the state has another size; the message names `owner`.
+    """
+    size = mujoco.mj_stateSize(model, _STATE)
+    if state.shape != (size,):
+        raise RobotError(f"{owner}: expected a state of {size} numbers, got {state.size}")
+    mujoco.mj_setState(model, data, state, _STATE)
+    mujoco.mj_forward(model, data)
+    # mj_forward moves the solver's warm start, which the next step reads: put it back.
+    mujoco.mj_setState(model, data, state, _STATE)
+    for index in range(len(data.warning)):
+        data.warning[index].number = 0
+
+
+def poses_of(data: mujoco.MjData) -> Floats:
+    """World poses of all bodies but the world, from up-to-date kinematics, shape (B, 7)."""
+    poses: Floats = np.concatenate((data.xpos[1:], data.xquat[1:]), axis=1)
+    return poses
+
+
+def digest_state(state: Floats) -> int:
+    """A 63-bit digest of what `state_of` gave."""
+    return int.from_bytes(blake2b(state.data, digest_size=8).digest(), "little") >> 1
+
+
+def check_finite(data: mujoco.MjData, owner: str) -> None:
+    """Raise where MuJoCo met a number it could not integrate.
+
+    MuJoCo resets a diverged state by itself, so only its warning counters remember what happened.
+
+    Raises:
+        SimulationDiverged: the last steps were not finite; the message names `owner`.
+    """
+    for warning in _DIVERGED:
+        if data.warning[int(warning)].number:
+            quantity = warning.name.removeprefix("mjWARN_BAD").lower()
+            raise SimulationDiverged(
+                f"{owner}: the simulation diverged at {data.time:.2f} s "
+                f"({quantity} is not finite or too large)"
+            )
 
 
 class MujocoRobot(Robot):
@@ -59,31 +116,21 @@ class MujocoRobot(Robot):
     def read_poses(self) -> Floats:
         # After a step MuJoCo's poses are those of the state before its last substep.
         mujoco.mj_kinematics(self.model, self.data)
-        poses: Floats = np.concatenate((self.data.xpos[1:], self.data.xquat[1:]), axis=1)
-        return poses
+        return poses_of(self.data)
 
     def snapshot(self) -> RobotSnapshot:
-        random = self.np_random.bit_generator.state
-        return RobotSnapshot(self.name, self._state().copy(), self._extras(), random)
+        state = state_of(self.model, self.data)
+        return RobotSnapshot(self.name, state, self._extras(), self.np_random.bit_generator.state)
 
     def restore(self, snapshot: RobotSnapshot) -> None:
-        size = self._state_buffer.size
-        if snapshot.robot != self.name or snapshot.state.shape != (size,):
-            raise RobotError(
-                f"{self.name}: expected a snapshot of {self.name} with {size} numbers, got one of "
-                f"{snapshot.robot} with {snapshot.state.size}"
-            )
-        mujoco.mj_setState(self.model, self.data, snapshot.state, _STATE)
-        mujoco.mj_forward(self.model, self.data)
-        # mj_forward moves the solver's warm start, which the next step reads: put it back.
-        mujoco.mj_setState(self.model, self.data, snapshot.state, _STATE)
-        for index in range(len(self.data.warning)):
-            self.data.warning[index].number = 0
+        if snapshot.robot != self.name:
+            raise RobotError(f"{self.name}: expected a snapshot of {self.name}, got one of {snapshot.robot}")
+        set_state(self.model, self.data, snapshot.state, self.name)
         self._set_extras(snapshot.extras)
         self.np_random.bit_generator.state = snapshot.rng
 
     def digest(self) -> int:
-        return int.from_bytes(blake2b(self._state().data, digest_size=8).digest(), "little") >> 1
+        return digest_state(self._state())
 
     def _state(self) -> Floats:
         """The state vector, in an array that the next call overwrites."""
@@ -101,17 +148,4 @@ class MujocoRobot(Robot):
         del extras
 
     def _check_finite(self) -> None:
-        """Raise where MuJoCo met a number it could not integrate.
-
-        MuJoCo resets a diverged state by itself, so only its warning counters remember what happened.
-
-        Raises:
-            SimulationDiverged: the last steps were not finite.
-        """
-        for warning in _DIVERGED:
-            if self.data.warning[int(warning)].number:
-                quantity = warning.name.removeprefix("mjWARN_BAD").lower()
-                raise SimulationDiverged(
-                    f"{self.name}: the simulation diverged at {self.data.time:.2f} s "
-                    f"({quantity} is not finite or too large)"
-                )
+        check_finite(self.data, self.name)

@@ -63,12 +63,14 @@ class RobotSnapshot:
         state: the simulator's state vector.
         extras: what the robot's own Python side remembers.
         rng: state of the robot's random generator.
+        memory: what the Python side of a wrapped environment remembers, plain data; None where there is none.
     """
 
     robot: str
     state: Floats
     extras: tuple[Floats, ...]
     rng: Mapping[str, Any]
+    memory: Any = None
 
 
 def column_of(name: str, attributes: Sequence[Attribute], owner: str) -> int:

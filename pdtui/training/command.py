@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pdtui.errors import TrainingError
-from pdtui.robots import check_robot
+from pdtui.robots import ROBOTS
 
 
 def train_policy(
@@ -24,10 +24,11 @@ def train_policy(
     """Train, or go on training, in a folder; returns the best weights.
 
     Raises:
-        TrainingError: the extra ``train`` is not installed, or the folder holds something else.
-        RobotError: no such robot.
+        TrainingError: the extra ``train`` is not installed, the robot is none of pdtui's own, or the folder
+            holds something else.
     """
-    check_robot(robot)
+    if robot not in ROBOTS:
+        raise TrainingError(f"expected one of pdtui's own robots ({', '.join(ROBOTS)}), found '{robot}'")
     try:
         from pdtui.training.ppo import PpoConfig
         from pdtui.training.ppo_run import PpoRun

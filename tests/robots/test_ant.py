@@ -121,7 +121,7 @@ def test_snapshot_of_another_size_is_refused(ant: Ant) -> None:
     from dataclasses import replace
 
     broken = replace(ant.snapshot(), state=np.zeros(3))
-    with pytest.raises(RobotError, match="expected a snapshot of ant with .* got one of ant with 3"):
+    with pytest.raises(RobotError, match="ant: expected a state of .* numbers, got 3"):
         ant.restore(broken)
 
 

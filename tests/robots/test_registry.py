@@ -1,0 +1,151 @@
+"""From a name to a robot: which code a name may choose, and what a wrong one says."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pdtui.errors import RobotError
+from pdtui.robots import check_robot, file_stem, make_robot
+
+GUIDE = Path(__file__).parents[2] / "docs" / "worlds.md"
+MODULE = """\
+import pathlib
+import gymnasium
+pathlib.Path("imported").touch()
+gymnasium.register("Thing-v0", "gymnasium.envs.classic_control.pendulum:PendulumEnv")
+"""
+
+
+def run_python(code: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run code in a fresh process that finds what is installed in a folder."""
+    path = os.pathsep.join([str(folder), str(GUIDE.parents[1])])
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": path, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def install(folder: Path, name: str, value: str, module: str = "") -> None:
+    """Put a module and a distribution with an entry point into a folder, as pip would."""
+    info = folder / "some_package-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: some-package\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[pdtui.robots]\n{name} = {value}\n")
+    if module:
+        (folder / f"{value.partition(':')[0]}.py").write_text(module)
+
+
+def test_an_unknown_name_lists_close_ones() -> None:
+    with pytest.raises(RobotError, match="unknown robot 'Hoper-v5'; close are Hopper-v5"):
+        make_robot("Hoper-v5")
+    with pytest.raises(RobotError, match="unknown robot 'qqqqqqqq'; there are ant, and every environment"):
+        check_robot("qqqqqqqq")
+    with pytest.raises(RobotError, match="unknown robot 'Hopper'"):
+        check_robot("Hopper")  # a map must say which version its numbers hold for
+
+
+def test_an_environment_that_needs_more_says_what_to_install(tmp_path: Path) -> None:
+    """As where the library is missing: a module that cannot be imported stands in its place."""
+    (tmp_path / "Box2D.py").write_text("raise ImportError('no Box2D here')\n")
+    code = "from pdtui.robots import make_robot; make_robot('LunarLander-v3')"
+    result = run_python(code, tmp_path)
+    assert result.returncode != 0
+    last = result.stderr.strip().splitlines()[-1]
+    assert "environment 'LunarLander-v3' needs a package that is not installed" in last
+    assert "gymnasium[box2d]" in last
+
+
+def test_a_module_is_not_imported_because_a_name_says_so(tmp_path: Path) -> None:
+    (tmp_path / "things.py").write_text(MODULE)
+    code = "from pdtui.robots import make_robot; make_robot('things:Thing-v0')"
+    result = run_python(code, tmp_path)
+    assert "RobotError: robot 'things:Thing-v0': the module 'things' is not imported because" in result.stderr
+    assert not (tmp_path / "imported").exists()
+
+
+def test_a_module_that_the_user_named_is_imported(tmp_path: Path) -> None:
+    (tmp_path / "things.py").write_text(MODULE)
+    code = "from pdtui.robots import make_robot; print(make_robot('things:Thing-v0').name)"
+    assert run_python(code, tmp_path, PDTUI_ENVIRONMENT_MODULES="json,things").stdout == "things:Thing-v0\n"
+    trusting = code.replace("import", "import trust_module,", 1).replace(
+        "; ", "; trust_module('things:'); ", 1
+    )
+    assert run_python(trusting, tmp_path).stdout == "things:Thing-v0\n"
+
+
+def test_a_module_that_is_imported_already_is_looked_up(tmp_path: Path) -> None:
+    (tmp_path / "things.py").write_text(MODULE)
+    code = "import things; from pdtui.robots import check_robot; print(check_robot('things:Thing-v0'))"
+    assert run_python(code, tmp_path).stdout == "things:Thing-v0\n"
+
+
+def test_the_guides_example_is_a_robot(tmp_path: Path) -> None:
+    found = re.search(r"```python\n(.*?)```", GUIDE.read_text(), re.DOTALL)
+    assert found is not None
+    assert len(found[1].splitlines()) <= 30
+    install(tmp_path, "pendulum", "pendulum_robot:Pendulum", found[1])
+    result = run_python(
+        """
+import numpy as np
+from pdtui.robots import make_robot
+robot = make_robot("pendulum")
+robot.reset(seed=1)
+for _ in range(20):
+    robot.step(np.array([1.5], np.float32))
+values = dict(zip([a.name for a in robot.attributes], robot.read_attributes()))
+assert values["torque"] == 1.5, values
+observed = robot.observe()
+assert np.allclose([np.cos(values["angle"]), np.sin(values["angle"])], observed[:2], atol=1e-6), values
+assert np.isclose(values["angular velocity"], observed[2]), values
+from pdtui.robots.geometry import capsule_ends, place_links
+tip = capsule_ends(robot.links, place_links(robot.links, robot.read_poses()))[0, 1]
+assert np.allclose(tip, [np.sin(values["angle"]), 0, 1.2 + np.cos(values["angle"])]), tip
+snapshot = robot.snapshot()
+ahead = [robot.step(np.array([-1.0], np.float32))[1] for _ in range(20)]
+robot.restore(snapshot)
+assert ahead == [robot.step(np.array([-1.0], np.float32))[1] for _ in range(20)]
+print(robot.title)
+""",
+        tmp_path,
+    )
+    assert result.stdout == "Pendulum\n", result.stderr
+
+
+@pytest.mark.parametrize(
+    ("value", "module", "said"),
+    [
+        ("nowhere:Thing", "", "cannot be built: ModuleNotFoundError: No module named 'nowhere'"),
+        ("things:Thing", "", "cannot be built: AttributeError"),
+        ("things:Thing", "Thing = dict\n", "expected a pdtui.robots.Robot, found dict"),
+        ("things:Thing", "def Thing():\n    1 / 0\n", "cannot be built: ZeroDivisionError: division by zero"),
+        (
+            "things:Thing",
+            "from pdtui.robots.ant import Ant as Thing\n",
+            "expected the class to have that name, found 'ant'",
+        ),
+    ],
+)
+def test_a_broken_entry_point_is_named_with_its_package(
+    value: str, module: str, said: str, tmp_path: Path
+) -> None:
+    install(tmp_path, "broken", value, module)
+    if not module and value.startswith("things"):
+        (tmp_path / "things.py").write_text("")
+    result = run_python("from pdtui.robots import make_robot; make_robot('broken')", tmp_path)
+    last = result.stderr.strip().splitlines()[-1]
+    assert f"robot 'broken' (entry point {value} of some-package): {said}" in last
+
+
+def test_a_name_becomes_part_of_a_file_name() -> None:
+    assert file_stem("Hopper-v5") == "Hopper-v5"
+    assert file_stem("a.b:ALE/Pong-v5") == "a.b-ALE-Pong-v5"
