@@ -17,6 +17,7 @@ from pdtui.dissection.monitor import Start
 from pdtui.dissection.rollout import Job, Outcome, roll_out
 from pdtui.errors import RobotError
 from pdtui.policies.choices import NO_CHOICES, PolicyChoices, Spaces
+from pdtui.policies.fit import check_fit
 from pdtui.policies.load import load_policy
 from pdtui.policies.runtime import Policy
 from pdtui.robots import make_robot
@@ -74,7 +75,8 @@ class Crew:
         choices: what the weights file leaves open.
 
     Raises:
-        RobotError: no such robot. PolicyError: no such policy, or one for another robot.
+        RobotError: no such robot.
+        PolicyError: no such policy, one for another robot, or one whose shapes do not fit it.
     """
 
     def __init__(
@@ -87,6 +89,7 @@ class Crew:
         # Built here too: the caller needs both, and what is wrong with them is raised in this process.
         self.robot = make_robot(robot) if isinstance(robot, str) else robot
         self.policy = policy if isinstance(policy, Policy) else _load(policy, self.robot, choices)
+        check_fit(self.policy, self.robot, self.robot.name)
         named = isinstance(robot, str) and not isinstance(policy, Policy)
         self._names = (robot if isinstance(robot, str) else robot.name, str(policy), choices)
         self._workers = max(1, workers) if named else 1

@@ -10,6 +10,7 @@ import numpy as np
 
 from pdtui.errors import EventError, SimulationDiverged
 from pdtui.policies.choices import Spaces
+from pdtui.policies.fit import check_fit
 from pdtui.policies.load import load_policy
 from pdtui.policies.runtime import Policy
 from pdtui.robots import make_robot
@@ -56,6 +57,7 @@ def build_loop(order: DriveOrder, robot: Robot | None = None, policy: Policy | N
         folders=(Path(wanted.source).parent,),
     )
     wanted.check(order.robot, policy.layers, policy.sha256, force=order.force)
+    check_fit(policy, robot, order.robot)
     return ControlLoop(robot, policy, wanted, order.seed, stochastic=order.stochastic)
 
 
