@@ -98,7 +98,7 @@ def order_of_drive(
     seed: int = 0,
     **options: Any,
 ) -> DriveOrder:
-    from pdtui.robots import check_robot
+    from pdtui.robots import check_robot, file_stem, trust_module
     from pdtui.stimulation.library import find_map
     from pdtui.stimulation.mapfile import load_map
     from pdtui.stimulation.settle import settle
@@ -108,8 +108,10 @@ def order_of_drive(
         stimulation_map = load_map(find_map(robot))
         robot = stimulation_map.robot
     else:
+        # Typed by the user, unlike the name inside a map.
+        trust_module(robot)
         check_robot(robot)
-        stimulation_map = load_map(find_map(map_name or robot))
+        stimulation_map = load_map(find_map(map_name or file_stem(robot)))
     return DriveOrder(check_robot(robot), settle(stimulation_map, policy, choices), seed, **options)
 
 

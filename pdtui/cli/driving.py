@@ -90,7 +90,9 @@ def replay(session: Path, watch: bool, policy: str) -> None:
 
 
 def _new_session(order: DriveOrder) -> Path:
-    return Path("sessions") / f"{order.robot}-{datetime.now():%Y%m%d-%H%M%S}-seed{order.seed}.rrd"
+    from pdtui.robots import file_stem
+
+    return Path("sessions") / f"{file_stem(order.robot)}-{datetime.now():%Y%m%d-%H%M%S}-seed{order.seed}.rrd"
 
 
 def _drive_headless(order: DriveOrder, keys: Path | None, steps: int, record: Path | None) -> None:

@@ -83,7 +83,13 @@ def evaluate(
 
 
 @click.command()
-@click.argument("robot")
+@click.argument("robot", required=False)
+@click.option(
+    "--env",
+    metavar="ID",
+    help="Instead of ROBOT: an environment registered with Gymnasium, such as Hopper-v5. With a module in "
+    "front (package.module:Thing-v0), that is imported first.",
+)
 @click.option("--policy", default="", help="Weights to dissect; default: the robot's shipped policy.")
 @choice_options
 @click.option("--preset", type=click.Choice(["paper", "authors"]), default="paper", show_default=True)
@@ -102,7 +108,8 @@ def evaluate(
 @workers_option
 @json_option
 def dissect(
-    robot: str,
+    robot: str | None,
+    env: str | None,
     policy: str,
     choices: PolicyChoices,
     preset: str,
@@ -119,12 +126,18 @@ def dissect(
     Interrupted, the same line goes on where it was.
     """
     from pdtui.dissection.command import dissect_to_map
+    from pdtui.robots import check_robot, file_stem, trust_module
 
+    if (robot is None) == (env is None):
+        raise click.UsageError("expected either ROBOT or --env ID")
+    name = str(robot or env)
+    trust_module(name)
+    check_robot(name)
     with progress_bar_or_none("dissecting", quiet=as_json) as advance:
         result = dissect_to_map(
-            robot,
-            policy or robot,
-            output or Path("maps") / f"{robot}-dissected.toml",
+            name,
+            policy or name,
+            output or Path("maps") / f"{file_stem(name)}-dissected.toml",
             choices=choices,
             overwrite=overwrite,
             preset=preset,
@@ -145,8 +158,9 @@ def dissect(
 def convert(file: Path, output: Path, robot: str | None, choices: PolicyChoices) -> None:
     """Write somebody else's policy FILE as safetensors that state everything."""
     from pdtui.policies.load import convert_policy
-    from pdtui.robots import make_robot
+    from pdtui.robots import make_robot, trust_module
 
+    trust_module(robot or "")
     spaces = None if robot is None else Spaces.of_world(make_robot(robot))
     spec = convert_policy(file, output, choices, spaces)
     layers = " ".join(str(width) for width in spec.layers)

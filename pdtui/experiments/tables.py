@@ -60,8 +60,9 @@ def tracking_table(result: Tracking) -> Table:
 def walking_table(result: Walking) -> Table:
     """The policy alone."""
     table = _table(f"the policy alone, {_seeds(result.seeds)}, {result.steps} steps each", "measure", "value")
-    table.add_row("mean speed (m/s)", f"{result.mean_speed:.2f}")
-    table.add_row("net speed (m/s)", f"{result.net_speed:.2f}")
+    for name, speed in (("mean speed (m/s)", result.mean_speed), ("net speed (m/s)", result.net_speed)):
+        if speed is not None:
+            table.add_row(name, f"{speed:.2f}")
     table.add_row("return", f"{result.mean_return:.0f} ± {result.std_return:.0f}")
     table.add_row("episodes without a fall", f"{result.finished}/{len(result.seeds)}")
     return table

@@ -21,16 +21,17 @@ class Walking:
     Attributes:
         seeds: of the episodes.
         steps: control steps an episode.
-        mean_speed: mean of |v| over all steps, m/s.
-        net_speed: mean over episodes of the distance between start and end, over the time, m/s.
+        mean_speed: mean of |v| over all steps, m/s; None for a robot without the attribute ``speed``.
+        net_speed: mean over episodes of the distance between start and end, over the time, m/s; None for a
+            robot without a place.
         mean_return, std_return: of the episodes' sums of reward.
         finished: episodes without a fall.
     """
 
     seeds: tuple[int, ...]
     steps: int
-    mean_speed: float
-    net_speed: float
+    mean_speed: float | None
+    net_speed: float | None
     mean_return: float
     std_return: float
     finished: int
@@ -49,21 +50,23 @@ def evaluate_walking(
         PdtuiError: robot, policy or map cannot be had.
     """
     built = build_loop(order)
-    column = built.robot.attribute_index("speed")
+    names = [attribute.name for attribute in built.robot.attributes]
+    column = names.index("speed") if "speed" in names else None
     speeds, net_speeds, returns, finished = [], [], [], 0
     for done, seed in enumerate(seeds, start=1):
         loop = ControlLoop(built.robot, built.policy, built.map, seed)
         total, ended = 0.0, ""
-        start = loop.robot.read_poses()[0, :2]
+        start = loop.robot.read_poses()[:1, :2]
         for _ in range(steps):
             record = loop.advance()
             total += record.reward
-            speeds.append(float(record.attributes[column]))
+            if column is not None:
+                speeds.append(float(record.attributes[column]))
             ended = record.ended
             if ended:
                 break
         seconds = loop.step * loop.robot.control_dt
-        net_speeds.append(float(np.linalg.norm(record.poses[0, :2] - start)) / seconds)
+        net_speeds += (np.linalg.norm(record.poses[:1, :2] - start, axis=1) / seconds).tolist()
         returns.append(total)
         finished += not ended
         if progress is not None:
@@ -71,8 +74,8 @@ def evaluate_walking(
     return Walking(
         tuple(seeds),
         steps,
-        float(np.mean(speeds)),
-        float(np.mean(net_speeds)),
+        float(np.mean(speeds)) if speeds else None,
+        float(np.mean(net_speeds)) if net_speeds else None,
         float(np.mean(returns)),
         float(np.std(returns)),
         finished,

@@ -1,4 +1,4 @@
-"""Does a policy fit a world? Asked once, where the two meet."""
+"""Does a policy fit a world? Asked where the two meet, also of one that came from no file."""
 
 from __future__ import annotations
 

@@ -67,6 +67,8 @@ def _robot(info: DriveInfo) -> rrb.Vertical:
             timeline_columns=[TIME], text_log_columns=[TextLogColumnKind.LogLevel, TextLogColumnKind.Body]
         ),
     )
+    if not info.links:
+        return rrb.Vertical(keys)
     return rrb.Vertical(robot, rrb.Horizontal(above, keys), row_shares=[3, 2])
 
 

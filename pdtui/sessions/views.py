@@ -114,6 +114,8 @@ class Views:
         shapes = self._shapes.columns(poses)
         if shapes:
             self._send(ROBOT, steps, shapes)
+        if not poses.shape[1]:
+            return
         positions = np.zeros((len(steps), 1, 3), np.float32)
         positions[:, 0, :2] = poses[:, 0, :2]
         # A picture's y axis points down, and only in a picture does the viewer fit the path to the frame.

@@ -38,7 +38,8 @@ class Observer:
             self._episode = record.episode
         row = self._rows[record.behaviors[-1].name] if record.behaviors else -1
         self._history.append(record.attributes)
-        self._path.append((float(record.poses[0, 0]), float(record.poses[0, 1]), float(row)))
+        if len(record.poses):
+            self._path.append((float(record.poses[0, 0]), float(record.poses[0, 1]), float(row)))
         del self._history[:-_ROWS_KEPT], self._path[:-_ROWS_KEPT]
         self._involvement += any(event.key for event in record.events)
         for event in record.events:

@@ -60,7 +60,8 @@ class Snapshot:
         attributes: present values, shape (J,).
         poses: body poses, shape (B, 7).
         history: attributes of the steps since the last snapshot, shape (n, J).
-        path: x, y in m, and the row in the map of the latest active behavior (−1 for none), shape (n, 3).
+        path: x, y in m, and the row in the map of the latest active behavior (−1 for none), shape (n, 3);
+            empty for a robot without poses.
         restarted: whether an episode began, or a rewind happened, since the last snapshot: the old path ends.
         paused: whether the pacer waits.
         speed: speed factor that was asked for.

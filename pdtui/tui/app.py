@@ -99,6 +99,10 @@ class DriveApp(App[str]):
         for number in _ENDING_SIGNALS:
             loop.add_signal_handler(number, self._end, number)
 
+    def watch_briefing(self, briefing: Briefing | None) -> None:
+        """A world without a body needs no room for one."""
+        self.screen_stack[0].set_class(briefing is not None and not briefing.links, "-bodiless")
+
     def on_unmount(self) -> None:
         """Give the signals back."""
         loop = asyncio.get_running_loop()

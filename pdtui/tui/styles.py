@@ -43,6 +43,14 @@ Panel { width: 1fr; height: 1fr; color: $foreground; }
 .-tall #attributes { height: 18; }
 .-tall #heat { height: 6; }
 
+/* Nothing to draw: the attributes take the room. */
+.-bodiless #left { display: none; }
+.-bodiless #right { width: 1fr; }
+.-bodiless #attributes { height: 1fr; }
+.-full.-bodiless #left { display: block; width: 46; }
+.-bodiless #robot, .-bodiless #path { display: none; }
+.-bodiless #below { height: 1fr; }
+
 HelpScreen { align: center middle; background: $background 60%; }
 #help {
     width: 76;

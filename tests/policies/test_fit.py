@@ -1,49 +1,42 @@
-"""Policies that do not fit their robot: both shapes are named."""
+"""Policies in memory that do not fit their robot: both shapes are named."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 import torch
+from torch import nn
 
 from pdtui.dissection.workers import Crew
 from pdtui.errors import PolicyError
-from pdtui.policies.files import save_network
+from pdtui.policies.decoders import categorical
 from pdtui.policies.fit import check_fit
-from pdtui.policies.load import load_policy
-from pdtui.policies.network import NetworkSpec, PolicyNetwork
+from pdtui.policies.runtime import Policy
 from pdtui.robots import make_robot
 
 
-def _weights(folder: Path, robot: str, observations: int, actions: int) -> Path:
+def _policy(observations: int, outputs: int, *, chooses: bool = False) -> Policy:
     torch.manual_seed(1)
-    bound = (1.0,) * actions
-    low = (-1.0,) * actions
-    spec = NetworkSpec(robot, observations, (4,), "tanh", actions, "mean", low, bound)
-    path = folder / f"{observations}-{actions}.safetensors"
-    save_network(path, PolicyNetwork(spec))
-    return path
+    network = nn.Sequential(nn.Linear(observations, 4), nn.Tanh(), nn.Linear(4, outputs))
+    options = {"decode": categorical} if chooses else {}
+    return Policy(network, observations, name="mine", **options)
 
 
-def test_another_observation_is_named_with_what_the_robot_has(tmp_path: Path) -> None:
-    path = _weights(tmp_path, "Hopper-v5", 12, 3)
+def test_another_observation_is_named_with_what_the_robot_has() -> None:
     expected = (
-        r"policy '12-3' takes observations of shape \(12,\); robot 'Hopper-v5' has observations of shape "
+        r"policy 'mine' takes observations of shape \(12,\); robot 'Hopper-v5' has observations of shape "
         r"\(11,\) and actions of shape \(3,\)"
     )
     with pytest.raises(PolicyError, match=expected):
-        Crew("Hopper-v5", path)
+        Crew("Hopper-v5", _policy(12, 3))
 
 
-def test_another_action_is_named_with_what_the_robot_takes(tmp_path: Path) -> None:
-    policy = load_policy(_weights(tmp_path, "Hopper-v5", 11, 2))
+def test_another_action_is_named_with_what_the_robot_takes() -> None:
     with pytest.raises(PolicyError, match=r"gives actions of shape \(2,\).*actions of shape \(3,\)"):
-        check_fit(policy, make_robot("Hopper-v5"), "Hopper-v5")
+        check_fit(_policy(11, 2), make_robot("Hopper-v5"), "Hopper-v5")
 
 
-def test_a_choice_is_one_number(tmp_path: Path) -> None:
+def test_a_choice_is_one_number() -> None:
     robot = make_robot("CartPole-v1")
-    check_fit(load_policy(_weights(tmp_path, "CartPole-v1", 4, 1)), robot, "CartPole-v1")
+    check_fit(_policy(4, 2, chooses=True), robot, "CartPole-v1")
     with pytest.raises(PolicyError, match=r"gives actions of shape \(2,\).*actions of shape \(1,\)"):
-        check_fit(load_policy(_weights(tmp_path, "CartPole-v1", 4, 2)), robot, "CartPole-v1")
+        check_fit(_policy(4, 2), robot, "CartPole-v1")

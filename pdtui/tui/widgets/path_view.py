@@ -7,7 +7,7 @@ from math import atan2, ceil, log2, pi
 import numpy as np
 from textual.strip import Strip
 
-from pdtui.robots.geometry import rotate
+from pdtui.robots.geometry import root_body, rotate
 from pdtui.teleop.snapshot import Snapshot
 from pdtui.tui.camera import Floats, round_length
 from pdtui.tui.canvas import Canvas
@@ -32,8 +32,8 @@ class PathView(Panel):
 
     def remember(self, snapshot: Snapshot) -> None:
         self.trail.extend(snapshot.path, restarted=snapshot.restarted)
-        if self.briefing is not None:
-            root = snapshot.poses[self.briefing.links[0].body]
+        if self.briefing is not None and len(snapshot.poses):
+            root = snapshot.poses[root_body(self.briefing.links)]
             ahead = rotate(root[3:], np.array([1.0, 0.0, 0.0]))
             self._here = root[:2]
             self._heading = atan2(float(ahead[1]), float(ahead[0]))

@@ -9,7 +9,7 @@ from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
-from pdtui.robots.geometry import capsule_ends, place_links, rotate
+from pdtui.robots.geometry import capsule_ends, place_links, root_body, rotate
 from pdtui.tui.camera import Camera, Floats, round_length
 from pdtui.tui.canvas import Canvas
 from pdtui.tui.panel import Panel
@@ -41,7 +41,7 @@ class RobotView(Panel):
     def paint(self, width: int, height: int) -> list[Strip]:
         if self.briefing is None:
             return self._loading(width, height)
-        if self.snapshot is None:
+        if self.snapshot is None or not self.briefing.links:
             return []
         canvas = Canvas(width, height)
         placed = place_links(self.briefing.links, self.snapshot.poses)
@@ -49,7 +49,7 @@ class RobotView(Panel):
         if not np.isfinite(ends).all():
             canvas.text(1, height // 2, "the robot's pose is not finite", _LABEL)
             return canvas.strips(self._styles())
-        root = self.snapshot.poses[self.briefing.links[0].body]
+        root = self.snapshot.poses[root_body(self.briefing.links)]
         camera = self._camera(canvas, root, ends)
         self._draw_ground(canvas, camera, root)
         self._draw_shadow(canvas, camera, ends)
