@@ -8,7 +8,7 @@ from torch import nn
 
 from pdtui.dissection.workers import Crew
 from pdtui.errors import PolicyError
-from pdtui.policies.decoders import categorical
+from pdtui.policies.decoders import categorical, mean_action
 from pdtui.policies.fit import check_fit
 from pdtui.policies.runtime import Policy
 from pdtui.robots import make_robot
@@ -17,8 +17,7 @@ from pdtui.robots import make_robot
 def _policy(observations: int, outputs: int, *, chooses: bool = False) -> Policy:
     torch.manual_seed(1)
     network = nn.Sequential(nn.Linear(observations, 4), nn.Tanh(), nn.Linear(4, outputs))
-    options = {"decode": categorical} if chooses else {}
-    return Policy(network, observations, name="mine", **options)
+    return Policy(network, observations, decode=categorical if chooses else mean_action, name="mine")
 
 
 def test_another_observation_is_named_with_what_the_robot_has() -> None:
