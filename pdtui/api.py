@@ -15,8 +15,10 @@ from pdtui.errors import SessionError
 from pdtui.policies import load
 from pdtui.policies.choices import NO_CHOICES, PolicyChoices, Spaces
 from pdtui.policies.decoders import Decoder
+from pdtui.policies.files import file_hash
 from pdtui.policies.modules import policy_of_module
 from pdtui.policies.runtime import Policy
+from pdtui.policies.torchscript import is_torchscript, read_torchscript
 from pdtui.robots import make_robot
 from pdtui.robots.base import Robot
 from pdtui.sessions.recorder import SessionRecorder
@@ -74,15 +76,20 @@ def load_policy(
     (16,)
 
     Args:
-        policy: a weights file, the name of a shipped policy, or a `torch.nn.Module`, which is copied.
+        policy: a weights file, the name of a shipped policy, a `torch.nn.Module`, which is copied, or a
+            TorchScript file, which is read as data (see `pdtui.policies.torchscript`).
         robot: that it is for; gives the bounds of actions that somebody else's file may lack.
         choices: what somebody else's file leaves open; see `pdtui.policies.importers`.
-        observations, hidden, decode, batched, initial_state, name: of a live network; see
+        observations, hidden, decode, batched, initial_state, name: of a live or TorchScript network; see
             `pdtui.policies.modules.policy_of_module`.
 
     Raises:
         PdtuiError: it cannot be had, or is for another robot.
     """
+    sha256 = ""
+    if not isinstance(policy, nn.Module) and is_torchscript(Path(policy)):
+        name, sha256 = name or Path(policy).stem, file_hash(Path(policy))
+        policy = read_torchscript(Path(policy))
     world = make_robot(robot) if isinstance(robot, str) else robot
     if not isinstance(policy, nn.Module):
         if world is None:
@@ -98,6 +105,7 @@ def load_policy(
         batched=batched,
         initial_state=initial_state,
         name=name,
+        sha256=sha256,
     )
 
 

@@ -61,6 +61,7 @@ class Spaces:
         actions: length of the action; of a discrete action, 1.
         low, high: bounds of each action; empty where there are none, or where actions are discrete.
         choices: number of discrete actions; 0 where actions are continuous.
+        shape: of the observation.
     """
 
     owner: str
@@ -69,6 +70,7 @@ class Spaces:
     low: tuple[float, ...] = ()
     high: tuple[float, ...] = ()
     choices: int = 0
+    shape: tuple[int, ...] = ()
 
     @classmethod
     def of(cls, owner: str, observation_space: Any, action_space: Any) -> Spaces:
@@ -79,16 +81,17 @@ class Spaces:
         """
         if observation_space.shape is None:
             raise PolicyError(f"{owner}: expected observations of one shape, found {observation_space}")
-        observations = math.prod(observation_space.shape)
+        shape = tuple(int(size) for size in observation_space.shape)
+        observations = math.prod(shape)
         if hasattr(action_space, "start") and hasattr(action_space, "n"):
-            return cls(owner, observations, 1, choices=int(action_space.n))
+            return cls(owner, observations, 1, choices=int(action_space.n), shape=shape)
         actions = math.prod(action_space.shape or ())
         if not hasattr(action_space, "low"):
-            return cls(owner, observations, actions)
+            return cls(owner, observations, actions, shape=shape)
         low, high = action_space.low.reshape(-1).tolist(), action_space.high.reshape(-1).tolist()
         if not all(map(math.isfinite, (*low, *high))):
-            return cls(owner, observations, actions)
-        return cls(owner, observations, actions, tuple(low), tuple(high))
+            return cls(owner, observations, actions, shape=shape)
+        return cls(owner, observations, actions, tuple(low), tuple(high), shape=shape)
 
     @classmethod
     def of_world(cls, world: Any) -> Spaces:

@@ -16,6 +16,8 @@ from pdtui.policies.files import file_hash, find_weights, is_own_format, load_ne
 from pdtui.policies.importers import import_network
 from pdtui.policies.network import NetworkSpec, PolicyNetwork
 from pdtui.policies.runtime import Policy
+from pdtui.policies.scripted import scripted_policy
+from pdtui.policies.torchscript import is_torchscript
 
 
 def load_policy(
@@ -44,6 +46,8 @@ def load_policy(
             in need of a choice.
     """
     path = find_weights(str(name), folders)
+    if is_torchscript(path):
+        return scripted_policy(path, spaces, choices)
     network, digest = load_any_network(path, choices, spaces, folders)
     spec = network.spec
     if robot is not None and spec.robot not in ("", robot):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
-from hashlib import sha256
 from typing import Any
 
 import torch
@@ -17,7 +17,7 @@ from pdtui.policies.runtime import Policy
 
 def module_hash(module: nn.Module) -> str:
     """SHA-256 of a network's structure (as it prints itself) and of its weights and buffers, hexadecimal."""
-    digest = sha256(str(module).encode())
+    digest = hashlib.sha256(str(module).encode())
     for name, tensor in sorted(module.state_dict().items()):
         array = tensor.detach().cpu().contiguous()
         digest.update(f"{name} {array.dtype} {tuple(array.shape)}".encode())
@@ -36,6 +36,7 @@ def policy_of_module(
     batched: bool = False,
     initial_state: Any = None,
     name: str = "",
+    sha256: str = "",
 ) -> Policy:
     """A policy that acts with the network as it is now; later changes of the weights do not reach it.
 
@@ -50,6 +51,7 @@ def policy_of_module(
         hidden, batched, initial_state: as for `Policy`.
         decode: turns the output into an action, instead of what the action space says.
         name: for messages and maps; by default that of the module's class.
+        sha256: of the file that it came from; by default `module_hash`.
 
     Raises:
         PolicyError: the shape of the observation is not known, or as for `Policy`.
@@ -69,5 +71,5 @@ def policy_of_module(
         batched=batched,
         initial_state=initial_state,
         name=owner,
-        sha256=module_hash(module),
+        sha256=sha256 or module_hash(module),
     )

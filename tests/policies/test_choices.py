@@ -26,9 +26,9 @@ def test_a_choice_is_one_of_the_known() -> None:
 def test_spaces_are_read_from_gymnasium_s() -> None:
     seen = spaces.Box(-np.inf, np.inf, (2, 3))
     bounded = Spaces.of("w", seen, spaces.Box(np.array([-1, -2], np.float32), np.array([3, 4], np.float32)))
-    assert bounded == Spaces("w", 6, 2, (-1.0, -2.0), (3.0, 4.0))
-    assert Spaces.of("w", seen, spaces.Box(-np.inf, np.inf, (2,))) == Spaces("w", 6, 2)
-    assert Spaces.of("w", seen, spaces.Discrete(4)) == Spaces("w", 6, 1, choices=4)
+    assert bounded == Spaces("w", 6, 2, (-1.0, -2.0), (3.0, 4.0), shape=(2, 3))
+    assert Spaces.of("w", seen, spaces.Box(-np.inf, np.inf, (2,))) == Spaces("w", 6, 2, shape=(2, 3))
+    assert Spaces.of("w", seen, spaces.Discrete(4)) == Spaces("w", 6, 1, choices=4, shape=(2, 3))
     with pytest.raises(PolicyError, match="expected observations of one shape"):
         Spaces.of("w", spaces.Dict(a=seen), spaces.Discrete(4))
     with pytest.raises(

@@ -78,7 +78,9 @@ def _from_zip(content: bytes, source: str, choices: PolicyChoices) -> Found:
     if names and all(name.endswith(".npy") for name in names):
         return _from_tensors(flatten(from_npz(archive)), source)
     if any(name.endswith("/constants.pkl") for name in names):
-        raise PolicyError(f"{source}: TorchScript, which this function does not read: its code would run")
+        raise PolicyError(
+            f"{source}: TorchScript, which states a computation and is no set of weights; load it as a policy"
+        )
     if any(name.endswith("/data.pkl") for name in names):
         return _from_tensors(flatten(from_torch(content, source)), source)
     raise PolicyError(f"{source}: a zip that holds no policy: its entries are {archive.listing()}")
