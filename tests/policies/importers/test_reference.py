@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -98,28 +97,36 @@ def test_the_a1_is_a_plain_chain_with_statistics(reference: Reference, observati
 
 @pytest.mark.slow
 def test_the_authors_brake_brakes(reference: Reference) -> None:
-    """Unit 0:156 at −20 stops their Ant (20 seeds); it observes 84 zeros where contact forces would be."""
+    """Unit 0:156 at −20 stops their Ant from 5 m/s (20 seeds); it observes 84 zeros as contact forces.
+
+    Braked at full speed, some rear up beyond the height at which an episode ends; the simulation goes on
+    here, because the claim is about where the brake leads, and counts them.
+    """
     policy = load_policy(reference("ant.npz"), choices=PolicyChoices("tanh"), spaces=ANT)
     robot = make_robot("ant")
     speed = robot.attribute_index("speed")
 
-    def mean_speed(seed: int, stimulation: Stimulation) -> float:
+    def run(seed: int, stimulation: Stimulation) -> tuple[float, bool]:
+        """Mean speed of the last 100 of 300 steps, stimulated from the 100th on; whether it fell."""
         observation, _ = robot.reset(seed=seed)
         speeds: list[float] = []
-        for step in count():
-            if step == 400:
-                return float(np.mean(speeds[-200:]))
+        fallen = False
+        for step in range(300):
             padded = np.concatenate([observation, np.zeros(84)])
             acted = policy.act(padded, stimulation if step >= 100 else NO_STIMULATION)
             observation, _, fell, _, _ = robot.step(acted.action)
-            speeds.append(robot.read_attributes()[speed])
-            if fell:
-                break
-        return float(np.mean(speeds[-20:]))
+            fallen = fallen or fell
+            speeds.append(float(robot.read_attributes()[speed]))
+        return float(np.mean(speeds[-100:])), fallen
 
-    brake = Stimulation((156,), (-20.0,))
-    free = [mean_speed(seed, NO_STIMULATION) for seed in range(20)]
-    braked = [mean_speed(seed, brake) for seed in range(20)]
-    print(f"unperturbed {np.mean(free):.2f} m/s, braked {np.mean(braked):.3f} m/s, worst {max(braked):.3f}")
-    assert np.mean(free) > 4.5
-    assert np.mean(braked) < 0.3
+    free = [run(seed, NO_STIMULATION) for seed in range(20)]
+    braked = [run(seed, Stimulation((156,), (-20.0,))) for seed in range(20)]
+    print(
+        f"unperturbed {np.mean([s for s, _ in free]):.2f} m/s, {sum(f for _, f in free)} falls; "
+        f"braked {np.mean([s for s, _ in braked]):.3f} m/s, at most {max(s for s, _ in braked):.3f}, "
+        f"{sum(f for _, f in braked)} falls"
+    )
+    assert np.mean([s for s, _ in free]) > 4.5
+    assert not any(fell for _, fell in free)
+    assert max(s for s, _ in braked) < 0.3
+    assert sum(fell for _, fell in braked) <= 7
