@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
-import re
 import tomllib
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from pdtui.errors import MapError
 from pdtui.policies.choices import ACTIVATION_NAMES, SQUASH_NAMES, PolicyChoices
 from pdtui.policies.units import ADDRESS
+from pdtui.stimulation.fields import NUMBER, FieldTable
 from pdtui.stimulation.maps import (
     RESERVED_KEYS,
     SCHEMA,
@@ -25,63 +24,6 @@ from pdtui.stimulation.maps import (
 )
 
 _MAX_BYTES = 1_000_000
-_NUMBER = (int, float)
-
-
-class _Table:
-    """One table of the file, read field by field; what is left over at the end is an error."""
-
-    def __init__(self, source: str, text: str, where: str, data: Any, header: str, number: int) -> None:
-        self._source, self._text, self._where = source, text, where
-        self._header, self._number = header, number
-        if not isinstance(data, dict):
-            raise MapError(f"{source}: {where}: expected a table, found {_kind(data)}")
-        self._data = dict(data)
-
-    def take(self, name: str, kind: type | tuple[type, ...], default: Any = ...) -> Any:
-        if name not in self._data:
-            if default is ...:
-                raise self.error(name, "is missing")
-            return default
-        value = self._data.pop(name)
-        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-            raise self.error(name, f"expected {_name(kind)}, found {_kind(value)}")
-        if isinstance(value, float) and not math.isfinite(value):
-            raise self.error(name, "expected a finite number")
-        return value
-
-    def text(self, name: str, default: Any = ...) -> str:
-        value: str = self.take(name, str, default)
-        if not value.isprintable():
-            raise self.error(name, "expected printable text, found a control character")
-        return value
-
-    def choice(self, name: str, choices: tuple[str, ...], default: Any = ...) -> str:
-        value = self.text(name, default)
-        if value not in choices and value != default:
-            raise self.error(name, f"expected one of {', '.join(choices)}, found '{value}'")
-        return value
-
-    def table(self, name: str, default: Any = ...) -> _Table | None:
-        value = self.take(name, dict, default)
-        if value is None:
-            return None
-        return _Table(self._source, self._text, f"{self._where}, {name}", value, self._header, self._number)
-
-    def numbers(self, name: str, default: Any = ...) -> dict[str, float]:
-        data = self.take(name, dict, default)
-        for key, value in data.items():
-            if isinstance(value, bool) or not isinstance(value, _NUMBER) or not math.isfinite(value):
-                raise self.error(name, f"'{key}': expected a finite number, found {value!r}")
-        return {key: float(value) for key, value in data.items()}
-
-    def done(self) -> None:
-        for name in self._data:
-            raise self.error(name, "is not a field of this table")
-
-    def error(self, name: str, problem: str) -> MapError:
-        line = _line_of(self._text, self._header, self._number, name)
-        return MapError(f"{self._source}:{line}: {self._where}: field '{name}' {problem}")
 
 
 def load_map(path: Path) -> StimulationMap:
@@ -109,11 +51,11 @@ def parse_map(text: str, source: str) -> StimulationMap:
         data = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise MapError(f"{source}: not a TOML file: {error}") from error
-    top = _Table(source, text, "top level", data, "", 0)
+    top = FieldTable(source, text, "top level", data, "", 0)
     if (schema := top.take("schema", int)) != SCHEMA:
         raise top.error("schema", f"expected {SCHEMA}, found {schema}")
     robot = top.text("robot")
-    policy = _Table(source, text, "policy", top.take("policy", dict), "[policy]", 0)
+    policy = FieldTable(source, text, "policy", top.take("policy", dict), "[policy]", 0)
     name, sha256 = policy.text("name"), policy.text("sha256")
     choices = PolicyChoices(
         policy.choice("activation", ACTIVATION_NAMES, ""),
@@ -121,12 +63,12 @@ def parse_map(text: str, source: str) -> StimulationMap:
         policy.text("normaliser", ""),
     )
     policy.done()
-    keys = _Table(source, text, "keys", top.take("keys", dict, {"default": "space"}), "[keys]", 0)
+    keys = FieldTable(source, text, "keys", top.take("keys", dict, {"default": "space"}), "[keys]", 0)
     default_key = keys.text("default")
     keys.done()
     tables = {
         kind: [
-            _Table(source, text, f"{kind[:-1]} {number + 1}", entry, f"[[{kind}]]", number)
+            FieldTable(source, text, f"{kind[:-1]} {number + 1}", entry, f"[[{kind}]]", number)
             for number, entry in enumerate(top.take(kind, list, []))
         ]
         for kind in ("primitives", "behaviors")
@@ -149,16 +91,16 @@ def parse_map(text: str, source: str) -> StimulationMap:
     return StimulationMap(robot, name, sha256, default_key, primitives, behaviors, text, source, choices)
 
 
-def _primitive(table: _Table) -> Primitive:
+def _primitive(table: FieldTable) -> Primitive:
     unit = table.text("unit")
     if not ADDRESS.fullmatch(unit):
         raise table.error("unit", f"expected layer:index, such as 0:12, found '{unit}'")
-    discrepancy, value = table.take("discrepancy", _NUMBER, None), table.take("value", _NUMBER, None)
+    discrepancy, value = table.take("discrepancy", NUMBER, None), table.take("value", NUMBER, None)
     primitive = Primitive(
         name=table.text("name"),
         attribute=table.text("attribute"),
         unit=unit,
-        rho=float(table.take("rho", _NUMBER)),
+        rho=float(table.take("rho", NUMBER)),
         discrepancy=None if discrepancy is None else float(discrepancy),
         value=None if value is None else float(value),
         measured=_measured(table),
@@ -169,17 +111,17 @@ def _primitive(table: _Table) -> Primitive:
     return primitive
 
 
-def _measured(parent: _Table) -> Measured | None:
+def _measured(parent: FieldTable) -> Measured | None:
     table = parent.table("measured", None)
     if table is None:
         return None
-    effect, low, high = (float(table.take(name, _NUMBER)) for name in ("effect", "low", "high"))
+    effect, low, high = (float(table.take(name, NUMBER)) for name in ("effect", "low", "high"))
     measured = Measured(effect, low, high, table.take("falls", int, None), table.take("of", int, None))
     table.done()
     return measured
 
 
-def _behavior(table: _Table, primitives: dict[str, Primitive]) -> Behavior:
+def _behavior(table: FieldTable, primitives: dict[str, Primitive]) -> Behavior:
     name = table.text("name")
     magnitudes = table.numbers("magnitudes")
     for key in magnitudes:
@@ -188,7 +130,7 @@ def _behavior(table: _Table, primitives: dict[str, Primitive]) -> Behavior:
             raise table.error("magnitudes", f"'{key}': neither layer:index nor a primitive ({known})")
     if not magnitudes:
         raise table.error("magnitudes", "expected at least one unit")
-    period = table.take("period", _NUMBER, None)
+    period = table.take("period", NUMBER, None)
     if period is not None and period <= 0:
         raise table.error("period", f"expected more than 0 s, found {period}")
     together = table.take("together", list, [])
@@ -210,7 +152,7 @@ def _behavior(table: _Table, primitives: dict[str, Primitive]) -> Behavior:
         if not ADDRESS.fullmatch(key):
             raise table.error("base", f"'{key}': expected layer:index, such as 0:12")
     if pid_table is not None:
-        gains = {name: float(pid_table.take(name, _NUMBER)) for name in ("kp", "ki", "kd", "limit", "step")}
+        gains = {name: float(pid_table.take(name, NUMBER)) for name in ("kp", "ki", "kd", "limit", "step")}
         pid = Pid(attribute=pid_table.text("attribute"), **gains)
         if pid.limit <= 0:
             raise pid_table.error("limit", f"expected more than 0, found {pid.limit}")
@@ -243,29 +185,3 @@ def _check_keys(source: str, default_key: str, behaviors: dict[str, Behavior]) -
         if not key:
             raise MapError(f"{source}: {own}: the key is empty")
         owners[key] = own
-
-
-def _line_of(text: str, header: str, number: int, field: str) -> int:
-    """Line of a field in the n-th table with this header; of the header where the field is missing."""
-    lines = text.splitlines()
-    start = 0
-    if header:
-        starts = [row for row, line in enumerate(lines) if line.strip().startswith(header)]
-        start = starts[number] if number < len(starts) else 0
-    pattern = re.compile(rf"""(^|[{{,\s])["']?{re.escape(field)}["']?\s*=""")
-    for row in range(start, len(lines)):
-        inside = lines[row].strip().startswith(f"[{header.strip('[]')}.")
-        if row > start and re.match(r"\s*\[", lines[row]) and header and not inside:
-            break
-        if pattern.search(lines[row].split("#")[0]):
-            return row + 1
-    return start + 1
-
-
-def _name(kind: type | tuple[type, ...]) -> str:
-    names = {str: "text", int: "a whole number", dict: "a table", list: "a list", bool: "true or false"}
-    return "a number" if isinstance(kind, tuple) else names.get(kind, kind.__name__)
-
-
-def _kind(value: Any) -> str:
-    return "a number" if type(value) in _NUMBER else _name(type(value))

@@ -13,7 +13,7 @@ import pytest
 from pdtui.errors import RobotError
 from pdtui.robots import check_robot, file_stem, make_robot
 
-GUIDE = Path(__file__).parents[2] / "docs" / "worlds.md"
+GUIDE = Path(__file__).parents[2] / "pdtui" / "robots" / "README.md"
 MODULE = """\
 import pathlib
 import gymnasium
