@@ -115,6 +115,7 @@ def dissect(
     *,
     choices: PolicyChoices = NO_CHOICES,
     preset: str = "paper",
+    settings: Sequence[str] = (),
     episodes: int = 5,
     seed: int = 1000,
     budget_minutes: float | None = None,
@@ -141,7 +142,7 @@ def dissect(
     Args:
         robot: its name, or a `Robot`.
         policy: a weights file, a shipped name, a live network, or a `Policy`.
-        choices, preset, episodes, seed, budget_minutes, workers, effort, progress, journal: as for
+        choices, preset, settings, episodes, seed, budget_minutes, workers, effort, progress, journal: as for
             `pdtui.dissection.dissect.dissect`.
 
     Raises:
@@ -152,6 +153,7 @@ def dissect(
         load_policy(policy, robot) if isinstance(policy, nn.Module) else policy,
         choices=choices,
         preset=preset,
+        settings=settings,
         episodes=episodes,
         seed=seed,
         budget_minutes=budget_minutes,

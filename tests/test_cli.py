@@ -111,6 +111,11 @@ def test_bench_prints_all_parts(map_path: Path) -> None:
         (["drive", "ant", "--map", "MAP", "--headless", "--record", "FOLDER"], "pdtui: "),
         (["drive", "ant", "--map", "MAP", "--headless", "--record", "KEYS"], "keys.txt: exists already"),
         (["dissect", "ant", "-o", "KEYS"], "keys.txt: exists already; --overwrite replaces it"),
+        (
+            ["dissect", "ant", "--set", "window=kaiser", "-o", "OUT"],
+            "setting 'window': expected blackman|hann",
+        ),
+        (["dissect", "ant", "--set", "colour", "-o", "OUT"], "setting 'colour': expected NAME=VALUE"),
         (["replay", "no.rrd"], "pdtui: no.rrd"),
         (["replay", "KEYS"], "keys.txt"),
         (["dissect", "ant", "--policy", "no.safetensors", "-o", "OUT"], "pdtui: no policy 'no.safetensors'"),

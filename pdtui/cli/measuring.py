@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -93,6 +94,13 @@ def evaluate(
 @click.option("--policy", default="", help="Weights to dissect; default: the robot's shipped policy.")
 @choice_options
 @click.option("--preset", type=click.Choice(["paper", "authors"]), default="paper", show_default=True)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Change a choice of the preset, such as window=hann or length=32; a wrong name lists all.",
+)
 @click.option("--episodes", type=click.IntRange(1, 1000), default=5, show_default=True)
 @click.option("--seed", type=click.IntRange(1000, 2**31 - 1), default=1000, show_default=True)
 @click.option(
@@ -113,6 +121,7 @@ def dissect(
     policy: str,
     choices: PolicyChoices,
     preset: str,
+    settings: tuple[str, ...],
     episodes: int,
     seed: int,
     output: Path | None,
@@ -141,6 +150,7 @@ def dissect(
             choices=choices,
             overwrite=overwrite,
             preset=preset,
+            settings=settings,
             episodes=episodes,
             seed=seed,
             workers=cores(workers),
@@ -225,6 +235,26 @@ def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bo
     with progress_bar_or_none("measuring", quiet=as_json) as advance:
         result = benchmark.bench_loop(order, steps=steps, progress=advance)
     show_result(asdict(result), as_json, lambda: tables.bench_table(result))
+
+
+@bench.command("dissect")
+@click.argument("robot", default="ant")
+@click.option("--policy", default="", help="Weights to record; default: the robot's shipped policy.")
+@click.option("--episodes", type=click.IntRange(1, 100), default=5, show_default=True)
+@click.option("--steps", type=click.IntRange(64), default=1000, show_default=True)
+@click.option("--units", type=click.IntRange(1), default=512, show_default=True)
+@click.option("--attributes", type=click.IntRange(1), default=20, show_default=True)
+@click.option("--rounds", type=click.IntRange(1), default=7, show_default=True)
+@click.option("--memory-units", type=click.IntRange(1), default=100_000, show_default=True)
+@click.option("--probes", type=click.IntRange(2), default=240, show_default=True, help="A round.")
+@json_option
+def bench_dissect_command(robot: str, policy: str, as_json: bool, **sizes: Any) -> None:
+    """Matching against a loop over librosa.stft, its growth and memory, and probing on two workers."""
+    from pdtui.experiments import bench_dissect, tables
+
+    with progress_bar_or_none("measuring", quiet=as_json) as advance:
+        result = bench_dissect.bench_dissect(robot, policy or robot, bench_dissect.Sizes(**sizes), advance)
+    show_result(asdict(result), as_json, lambda: tables.dissect_table(result))
 
 
 @bench.command("screen")

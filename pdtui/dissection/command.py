@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,6 +46,7 @@ def dissect_to_map(
     choices: PolicyChoices = NO_CHOICES,
     overwrite: bool,
     preset: str,
+    settings: Sequence[str] = (),
     episodes: int,
     seed: int,
     workers: int,
@@ -73,6 +74,7 @@ def dissect_to_map(
         policy,
         choices=choices,
         preset=preset,
+        settings=settings,
         episodes=episodes,
         seed=seed,
         workers=workers,

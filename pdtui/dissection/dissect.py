@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from pdtui.dissection.monitor import Progress, Start, collect_starts, monitor
 from pdtui.dissection.phase import correlate
 from pdtui.dissection.probe import Prober
 from pdtui.dissection.searches import Clock, Searches
-from pdtui.dissection.spectrum import find_preset
+from pdtui.dissection.settings import find_preset
 from pdtui.dissection.steer import movable, steer
 from pdtui.dissection.workers import Crew
 from pdtui.policies.choices import NO_CHOICES, PolicyChoices
@@ -37,6 +37,7 @@ def dissect(
     *,
     choices: PolicyChoices = NO_CHOICES,
     preset: str = "paper",
+    settings: Sequence[str] = (),
     episodes: int = 5,
     seed: int = 1000,
     budget_minutes: float | None = None,
@@ -55,6 +56,7 @@ def dissect(
         policy: weights file, name of a shipped policy, or a policy.
         choices: what the weights file leaves open.
         preset: ``paper`` or ``authors``.
+        settings: choices of the preset to change, ``NAME=VALUE`` each; see `pdtui.dissection.settings`.
         episodes: monitored (the paper: 5).
         seed: of everything.
         budget_minutes: the searches end, with the best so far, when this is over; screening always completes.
@@ -66,7 +68,7 @@ def dissect(
     Raises:
         PdtuiError: an unknown robot, policy or preset, or a policy that falls too often to be dissected.
     """
-    spectrum, plan, began = find_preset(preset), effort or Effort(), time.monotonic()
+    spectrum, plan, began = find_preset(preset, settings), effort or Effort(), time.monotonic()
 
     def stage(name: str) -> Progress | None:
         return None if progress is None else lambda done, of: progress(name, done, of)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.dissection.matching import usable
 from pdtui.dissection.monitor import Episode
-from pdtui.dissection.spectrum import Preset, spectrogram, transform
+from pdtui.dissection.series import BLOCK, attribute_series, over_blocks, unit_series, usable
+from pdtui.dissection.spectrum import Complexes, Preset, spectrogram, transform
 from pdtui.robots.types import Attribute, Floats
 
 DISAGREE = 0.1
@@ -35,6 +35,10 @@ class Phase:
     plain: Floats
     circular: Floats
 
+    def rho(self, preset: Preset) -> Floats:
+        """The one that the preset goes by, shape (J, U)."""
+        return self.plain if preset.phase_mean == "plain" else self.circular
+
     @property
     def disagree(self) -> NDArray[np.bool_]:
         """Pairs whose two correlations differ by more than `DISAGREE`, shape (J, U)."""
@@ -46,7 +50,9 @@ def correlation(phase: Floats) -> Floats:
     return 1.0 - np.abs(2.0 * phase) / np.pi
 
 
-def correlate(episodes: Sequence[Episode], attributes: Sequence[Attribute], preset: Preset) -> Phase:
+def correlate(
+    episodes: Sequence[Episode], attributes: Sequence[Attribute], preset: Preset, *, block: int = BLOCK
+) -> Phase:
     """Sign and strength with which units go along with attributes.
 
     The predominant frequency ``ω* = argmax_ω Σ_d SG(d, ω | s)`` sums over the windows of all episodes. The
@@ -56,28 +62,44 @@ def correlate(episodes: Sequence[Episode], attributes: Sequence[Attribute], pres
         episodes: unstimulated roll-outs, at least one of a window's length (`match` says so where none is).
         attributes: of the robot; their scales apply.
         preset: of the spectrum.
+        block: units at a time.
     """
     used = usable(episodes, preset)
-    units = [transform(episode.activations, preset) for episode in used]
-    targets = [transform(episode.scaled(attributes), preset) for episode in used]
-    energy = np.sum([spectrogram(target, preset).sum(axis=1) for target in targets], axis=0)
+    with np.errstate(invalid="ignore", over="ignore"):  # matching names what is not finite
+        targets = [transform(series, preset) for series in attribute_series(used, attributes, preset)]
+        energy = np.sum([spectrogram(target, preset).sum(axis=1) for target in targets], axis=0)
     allowed = np.nan_to_num(energy[:, preset.phase_from_bin :], nan=-1.0)
     bins = np.argmax(allowed, axis=1) + preset.phase_from_bin
-    shape = (len(attributes), len(units[0]))
-    plain, circular = np.full(shape, np.nan), np.full(shape, np.nan)
-    for row, bin_ in enumerate(bins):
-        signal = np.concatenate([spectra[:, :, bin_] for spectra in units], axis=1)
-        target = np.concatenate([spectra[row, :, bin_] for spectra in targets])
-        product = signal * np.conj(target)
+    waves = np.concatenate([target[np.arange(len(bins)), :, bins] for target in targets], axis=1)
+
+    def compare(units: slice) -> tuple[Floats, Floats]:
+        spectra = [transform(series, preset)[:, :, bins] for series in unit_series(used, units, preset)]
+        return _correlate(np.concatenate(spectra, axis=1), waves)
+
+    units = used[0].activations.shape[1]
+    plain, circular = np.empty((len(attributes), units)), np.empty((len(attributes), units))
+    for part, (plain_part, circular_part) in over_blocks(compare, units, block):
+        plain[:, part], circular[:, part] = plain_part, circular_part
+    return Phase(bins, plain, circular)
+
+
+@np.errstate(invalid="ignore", over="ignore")
+def _correlate(units: Complexes, waves: Complexes) -> tuple[Floats, Floats]:
+    """Both ρ of B units, shape (B, D, J), and the attributes, shape (J, D); shape (J, B) each."""
+    plain = np.full((len(waves), len(units)), np.nan)
+    circular = plain.copy()
+    for row, wave in enumerate(waves):
+        product = units[:, :, row] * np.conj(wave)
         size = np.abs(product)
         heard = (size > _SILENT) & np.isfinite(size)
         difference = np.angle(product)
         # np.angle gives −π for a negative real with imaginary part −0; the wrap's interval is (−π, π].
         difference[difference == -np.pi] = np.pi
-        phasor = np.where(heard, np.exp(1j * difference), 0.0).sum(axis=1)
+        # The unit phasor of the difference, without taking an angle's sine and cosine back.
+        phasor = np.divide(product, size, out=np.zeros_like(product), where=heard).sum(axis=1)
         count = heard.sum(axis=1)
         known = count > 0
         mean = np.where(heard, difference, 0.0).sum(axis=1)[known] / count[known]
         plain[row, known] = correlation(mean)
         circular[row, known] = correlation(np.angle(phasor[known]))
-    return Phase(bins, plain, circular)
+    return plain, circular

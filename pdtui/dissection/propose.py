@@ -69,7 +69,7 @@ def propose(dissection: Dissection) -> str:
 
 def _header(dissection: Dissection, steered: set[str]) -> list[str]:
     lines = [
-        f"Proposed by dissecting {dissection.policy_hash[:12]}… with preset '{dissection.preset.name}' and "
+        f"Proposed by dissecting {dissection.policy_hash[:12]}… with preset '{dissection.preset}' and "
         f"seed {dissection.seed}: {dissection.rollouts} roll-outs.",
         "Effects are changes against the unperturbed roll-out, with 95 % intervals over starting states.",
     ]
@@ -107,7 +107,7 @@ def _primitives(dissection: Dissection) -> list[dict[str, Any]]:
         column = dissection.column(attribute)
         best = best_probed(column, dissection.screen, dissection.refined, dissection.seed)
         # Without a phase there is no ρ, and without ρ no magnitude c: such a unit is no primitive.
-        rho = dissection.phase.circular[column]
+        rho = dissection.phase.rho(dissection.preset)[column]
         known = [one for one in best if one.confirmed and np.isfinite(rho[one.unit])]
         if known:
             entries.append(_primitive(name, attribute, column, known[0], dissection))
@@ -121,7 +121,7 @@ def _primitive(
         "name": name,
         "attribute": attribute,
         "unit": format_unit(best.unit, dissection.layers),
-        "rho": round(float(dissection.phase.circular[column, best.unit]), 4),
+        "rho": round(float(dissection.phase.rho(dissection.preset)[column, best.unit]), 4),
     }
     discrepancy = float(dissection.matching.discrepancy[column, best.unit])
     if np.isfinite(discrepancy):

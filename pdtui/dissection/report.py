@@ -13,6 +13,7 @@ from pdtui.dissection.findings import Dissection
 from pdtui.dissection.summary import summarise
 
 _LISTED = 6
+_MATCHES = 3
 
 
 def render(dissection: Dissection) -> RenderableType:
@@ -37,24 +38,24 @@ def _table(title: str, *columns: str) -> Table:
 
 
 def _matching_table(summary: dict[str, Any]) -> Table:
-    title = f"Matching ({summary['preset']}): nearest units"
+    title = f"Matching ({' '.join([summary['preset'], *summary['settings_changed']])}): nearest units"
     table = _table(title, "attribute", "at Hz", "unit", "discrepancy", "mean level", "ρ", "ρ circular")
     for attribute in summary["attributes"]:
-        for number, one in enumerate(attribute["matches"]):
+        for number, one in enumerate(attribute["matches"][:_MATCHES]):
             label = attribute["name"] if number == 0 else ""
             frequency = f"{attribute['frequency']:.2f}" if number == 0 else ""
             circular = _show(one["rho_circular"], "+.2f") + (" !" if one["rho_disagree"] else "")
             table.add_row(
                 label,
                 frequency,
-                one["unit"],
+                one["unit"] + (" †" if one["flaw"] else ""),
                 _show(one["discrepancy"], ".3g"),
                 _show(one["level_share"], ".0%"),
                 _show(one["rho"], "+.2f"),
                 circular,
             )
         if not attribute["matches"]:
-            table.add_row(attribute["name"], "", "none", "", "", "", "")
+            table.add_row(attribute["name"], "–", "none", "–", "–", "–", "–")
     return table
 
 
@@ -166,11 +167,24 @@ def _remarks(summary: dict[str, Any]) -> list[str]:
     if unwrapped:
         lines.append(f"Unwrapped before the transform: {', '.join(unwrapped)}.")
     lines += [f"{one['name']}: {one['flaw']}." for one in attributes if one["flaw"]]
-    if any(match["rho_disagree"] for attribute in attributes for match in attribute["matches"]):
+    lines += _unit_remarks(summary)
+    if any(match["rho_disagree"] for one in attributes for match in one["matches"][:_MATCHES]):
         lines.append("! plain and circular mean of the phase disagree; the circular one is sound.")
     for seed, steps in summary["too_short"]:
         lines.append(f"Left out: the episode of seed {seed} has {steps} steps, less than one window.")
     return lines
+
+
+def _unit_remarks(summary: dict[str, Any]) -> list[str]:
+    """One line for each kind of flaw, with the units that have it."""
+    by_flaw: dict[str, list[str]] = {}
+    for unit, flaw in summary["unit_flaws"].items():
+        by_flaw.setdefault(flaw, []).append(unit)
+    return [
+        f"† {len(units)} of the units: {flaw} ({', '.join(units[:_LISTED])}"
+        + (", …)." if len(units) > _LISTED else ").")
+        for flaw, units in by_flaw.items()
+    ]
 
 
 def _probed_name(one: dict[str, Any] | None) -> str:

@@ -6,18 +6,27 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+import scipy.fft
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from pdtui.errors import PdtuiError
 from pdtui.robots.types import Floats
 
 Complexes = NDArray[np.complex128]
+Window = Literal["blackman", "hann", "hamming", "rectangular"]
+
+# Coefficients of the cosine terms; a constant fills as many bins from frequency 0 up.
+_COSINES: dict[Window, tuple[float, ...]] = {
+    "blackman": (0.42, -0.5, 0.08),
+    "hann": (0.5, -0.5),
+    "hamming": (0.54, -0.46),
+    "rectangular": (1.0,),
+}
 
 
 @dataclass(frozen=True)
 class Preset:
-    """Every choice that the spectrum leaves open.
+    """Every choice that the method leaves open; `pdtui.dissection.settings` lists what each may be.
 
     Windows are the periodic variant and lie wholly inside the series: window d starts at sample ``d·hop``
     and nothing is padded. The transform is divided by the window's sum, so that a constant c has |STFT| = c
@@ -28,30 +37,41 @@ class Preset:
         window: shape of the window.
         length: of the window, samples.
         hop: between windows, samples.
-        power: 2 for the spectrogram |STFT|², 1 for the magnitude |STFT|.
-        level_bins: how many bins, from frequency 0 up, a constant fills with this window: a Blackman window
-            has three cosine terms, a Hann window two. Matching reports how much of a distance lies in them.
-        phase_from_bin: lowest bin that may be the predominant frequency. The paper's argmax is over all, so
-            0: for an attribute that is mostly mean level the "phase" is then the sign of the unit's mean.
+        spectrogram: ``power`` |STFT|² (section 3.2), or ``magnitude`` |STFT| (the authors' released code).
+        scaling: of the series before the transform: ``observed``, attributes as the policy observes them;
+            ``raw``, in their physical units; ``standardised``, attributes and units less their mean, in parts
+            of their standard deviation over all episodes.
+        level: ``kept``, or ``removed``: a distance then leaves out the bins that a constant fills.
+        angles: ``unwrapped`` over time, or ``wrapped`` to (−π, π].
+        predominant: frequency at which phases are compared: the strongest of ``any``, as in the paper (for an
+            attribute that is mostly mean level it is 0, and the "phase" the sign of the unit's mean), or the
+            strongest ``moving`` one, above the bins that a constant fills.
+        phase_mean: which ρ the conclusions go by. Both are reported; ``plain`` is the paper's, but means
+            nothing for phases near ±π.
+        changed: what differs from the preset of this name, as ``NAME=VALUE``.
     """
 
     name: str
-    window: Literal["blackman", "hann"]
+    window: Window
     length: int
     hop: int
-    power: Literal[1, 2]
-    level_bins: int
-    phase_from_bin: int = 0
+    spectrogram: Literal["power", "magnitude"]
+    scaling: Literal["observed", "raw", "standardised"] = "observed"
+    level: Literal["kept", "removed"] = "kept"
+    angles: Literal["unwrapped", "wrapped"] = "unwrapped"
+    predominant: Literal["any", "moving"] = "any"
+    phase_mean: Literal["circular", "plain"] = "circular"
+    changed: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return " ".join((self.name, *self.changed))
 
     @property
     def weights(self) -> Floats:
         """The window divided by its sum, shape (length,)."""
         angle = 2 * np.pi * np.arange(self.length) / self.length
-        window: Floats
-        if self.window == "blackman":
-            window = 0.42 - 0.5 * np.cos(angle) + 0.08 * np.cos(2 * angle)
-        else:
-            window = 0.5 - 0.5 * np.cos(angle)
+        terms = [part * np.cos(k * angle) for k, part in enumerate(_COSINES[self.window])]
+        window: Floats = np.sum(terms, axis=0)
         window /= window.sum()
         return window
 
@@ -60,31 +80,30 @@ class Preset:
         """Number of frequencies, from 0 to half the sampling rate."""
         return self.length // 2 + 1
 
+    @property
+    def level_bins(self) -> int:
+        """How many bins, from frequency 0 up, a constant fills with this window."""
+        return len(_COSINES[self.window])
+
+    @property
+    def first_bin(self) -> int:
+        """Lowest bin that a distance counts."""
+        return self.level_bins if self.level == "removed" else 0
+
+    @property
+    def phase_from_bin(self) -> int:
+        """Lowest bin that may be the predominant frequency."""
+        return self.level_bins if self.predominant == "moving" or self.level == "removed" else 0
+
     def frequencies(self, dt: float) -> Floats:
         """Frequency of each bin in Hz, shape (F,), for samples `dt` seconds apart."""
         frequencies: Floats = np.asarray(np.fft.rfftfreq(self.length, dt), np.float64)
         return frequencies
 
 
-# Section 3.2 and appendix of the paper, and what its authors' released code computes.
-PRESETS: dict[str, Preset] = {
-    preset.name: preset
-    for preset in (
-        Preset("paper", "blackman", 64, 16, 2, level_bins=3),
-        Preset("authors", "hann", 32, 8, 1, level_bins=2),
-    )
-}
-
-
-def find_preset(name: str) -> Preset:
-    """A preset by its name.
-
-    Raises:
-        PdtuiError: there is none of that name.
-    """
-    if name not in PRESETS:
-        raise PdtuiError(f"unknown preset '{name}'; there are {', '.join(PRESETS)}")
-    return PRESETS[name]
+def windows_of(steps: int, preset: Preset) -> int:
+    """How many whole windows lie in a series of so many samples."""
+    return max(0, (steps - preset.length) // preset.hop + 1)
 
 
 def transform(series: NDArray[Any], preset: Preset) -> Complexes:
@@ -99,16 +118,17 @@ def transform(series: NDArray[Any], preset: Preset) -> Complexes:
     Returns:
         shape (N, D, F): D whole windows, none where T is shorter than a window.
     """
-    samples = np.asarray(series, np.float64)
-    if len(samples) < preset.length:
-        return np.empty((samples.shape[1], 0, preset.bins), np.complex128)
-    windows = sliding_window_view(samples, preset.length, axis=0)[:: preset.hop]
-    spectra: Complexes = np.fft.rfft(windows * preset.weights, axis=-1)
-    return spectra.transpose(1, 0, 2)
+    if len(series) < preset.length:
+        return np.empty((series.shape[1], 0, preset.bins), np.complex128)
+    # One series after the other: the transform then reads memory in order.
+    samples = np.ascontiguousarray(series.T, np.float64)
+    windows = sliding_window_view(samples, preset.length, axis=1)[:, :: preset.hop]
+    spectra: Complexes = scipy.fft.rfft(windows * preset.weights, axis=-1, overwrite_x=True)
+    return spectra
 
 
 def spectrogram(spectra: Complexes, preset: Preset) -> Floats:
-    """``SG = |STFT|²`` (preset ``paper``, section 3.2) or ``|STFT|`` (``authors``), shape (N, D, F)."""
-    magnitude = np.abs(spectra)
-    result: Floats = magnitude if preset.power == 1 else magnitude**2
-    return result
+    """``SG = |STFT|²`` (``power``, section 3.2) or ``|STFT|`` (``magnitude``), shape (N, D, F)."""
+    power: Floats = np.square(spectra.real)
+    power += np.square(spectra.imag)
+    return power if preset.spectrogram == "power" else np.sqrt(power, out=power)

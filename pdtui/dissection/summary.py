@@ -9,11 +9,12 @@ import numpy as np
 
 from pdtui.dissection.confirm import BEST, Confirmation, best_probed, confirm, hit_rate
 from pdtui.dissection.findings import Dissection
+from pdtui.dissection.settings import settings_of
 from pdtui.dissection.steer import Steered
 from pdtui.policies.units import Stimulation, format_unit
 
 
-def summarise(dissection: Dissection, matches: int = 3) -> dict[str, Any]:
+def summarise(dissection: Dissection, matches: int = 10) -> dict[str, Any]:
     """The findings as data that JSON can hold; numbers that do not exist are None.
 
     Args:
@@ -25,9 +26,15 @@ def summarise(dissection: Dissection, matches: int = 3) -> dict[str, Any]:
         "policy": dissection.policy,
         "sha256": dissection.policy_hash,
         "preset": dissection.preset.name,
+        "settings": settings_of(dissection.preset),
+        "settings_changed": list(dissection.preset.changed),
         "seed": dissection.seed,
         "episodes": list(dissection.matching.used),
         "too_short": [list(pair) for pair in dissection.matching.skipped],
+        "unit_flaws": {
+            format_unit(unit, dissection.layers): flaw
+            for unit, flaw in dissection.matching.unit_flaws.items()
+        },
         "attributes": [
             _attribute(dissection, column, matches) for column in range(len(dissection.attributes))
         ],
@@ -53,11 +60,15 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
         "name": attribute.name,
         "unit": attribute.unit,
         "flaw": matching.flaws.get(attribute.name),
-        "unwrapped": attribute.wraps,
-        "frequency": float(dissection.preset.frequencies(dissection.dt)[phase.bins[column]]),
+        "unwrapped": attribute.wraps and dissection.preset.angles == "unwrapped",
+        # Of an attribute that is left out there is no predominant frequency.
+        "frequency": float(dissection.preset.frequencies(dissection.dt)[phase.bins[column]])
+        if ranked.size
+        else None,
         "matches": [
             {
                 "unit": format_unit(int(unit), layers),
+                "flaw": matching.unit_flaws.get(int(unit)),
                 "discrepancy": _number(matching.discrepancy[column, unit]),
                 "level_share": _number(matching.level_share[column, unit]),
                 "rho": _number(phase.plain[column, unit]),
@@ -83,7 +94,7 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
 
 
 def _confirmation(dissection: Dissection, column: int, one: Confirmation) -> dict[str, Any]:
-    rho = float(dissection.phase.circular[column, one.unit])
+    rho = float(dissection.phase.rho(dissection.preset)[column, one.unit])
     return {
         "unit": format_unit(one.unit, dissection.layers),
         "value": one.value,

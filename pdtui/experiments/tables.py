@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from rich.console import Group
 from rich.table import Table
 
 from pdtui.experiments.bench import LoopBench
+from pdtui.experiments.bench_dissect import DissectBench
 from pdtui.experiments.bench_screen import ScreenBench
 from pdtui.experiments.evaluate import Evaluation
 from pdtui.experiments.tracking import Tracking
@@ -79,6 +81,38 @@ def bench_table(result: LoopBench) -> Table:
         f"forward pass with 3 stimulated units: {result.forward_us:.0f} µs"
     )
     return table
+
+
+def dissect_table(result: DissectBench) -> Group:
+    """Matching against the loop, its growth, its memory, and probing on two workers."""
+    speed = _table(result.recorded, "preset", "matching", "loop", "times as fast", "ranking", "ties")
+    for one in result.compared:
+        speed.add_row(
+            one.preset,
+            f"{one.ours_ms:.1f} ms",
+            f"{one.loop_ms:.0f} ms",
+            f"{one.ratio:.1f}",
+            "the same" if one.same_ranking else "DIFFERENT",
+            str(one.ties),
+        )
+    speed.caption = (
+        "loop: librosa.stft for each series, numpy.linalg.norm for each pair; largest difference of a "
+        f"discrepancy {max(one.largest_difference for one in result.compared):.0e} of the largest"
+    )
+    growth = _table("time of matching", "grows", *("size: ms",), "exponent")
+    for curve in result.curves:
+        points = "  ".join(f"{size}: {ms:.1f}" for size, ms in zip(curve.sizes, curve.ms, strict=True))
+        growth.add_row(curve.grows, points, f"{curve.exponent:.2f}")
+    rest = _table("memory and probing", "measure", "value")
+    rest.add_row(
+        f"{result.memory_units} units: peak memory, {result.memory_data_gb:.2f} GB of it data",
+        f"{result.memory_peak_gb:.2f} GB",
+    )
+    rest.add_row("their matching and correlating", f"{result.memory_seconds:.1f} s")
+    rest.add_row("probing, 1 worker", f"{result.probing_one:.0f} steps/s")
+    rest.add_row("probing, 2 workers", f"{result.probing_two:.0f} steps/s")
+    rest.add_row("2 workers / 1, median of rounds", f"{result.probing_ratio:.2f}")
+    return Group(speed, growth, rest)
 
 
 def screen_table(result: ScreenBench) -> Table:

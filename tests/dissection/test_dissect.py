@@ -21,6 +21,7 @@ from pdtui.dissection.imprint import ImprintSizes
 from pdtui.dissection.probe import Effects
 from pdtui.dissection.propose import propose
 from pdtui.dissection.report import render
+from pdtui.dissection.settings import PRESETS, find_preset, settings_of
 from pdtui.dissection.summary import summarise
 from pdtui.policies.files import file_hash
 from pdtui.policies.units import Stimulation
@@ -76,6 +77,43 @@ def test_summary_is_json_and_names_what_was_asked(dissection: Dissection, policy
     assert vx["name"] == "vx"
     best = dissection.matching.discrepancy[0].min()
     assert vx["matches"][0]["discrepancy"] == pytest.approx(best)
+
+
+def test_summary_holds_every_setting_and_the_whole_match(dissection: Dissection) -> None:
+    summary = summarise(dissection)
+    assert summary["settings"] == settings_of(PRESETS["paper"])
+    assert summary["settings_changed"] == []
+    keys = {"unit", "flaw", "discrepancy", "level_share", "rho", "rho_circular", "rho_disagree"}
+    for attribute in summary["attributes"]:
+        assert len(attribute["matches"]) == 10
+        assert all(one.keys() == keys for one in attribute["matches"])
+
+
+def test_a_silent_unit_and_a_broken_attribute_are_marked_rows(dissection: Dissection) -> None:
+    discrepancy = dissection.matching.discrepancy.copy()
+    discrepancy[0], discrepancy[1, 9] = np.nan, 0.0
+    matching = replace(
+        dissection.matching,
+        discrepancy=discrepancy,
+        flaws={"vx": "not finite in the episodes of seeds [1000]; left out"},
+        unit_flaws={9: "never fires"},
+    )
+    broken = replace(dissection, matching=matching, preset=find_preset("paper", ["hop=8"]))
+    summary = json.loads(json.dumps(summarise(broken), allow_nan=False))
+    assert summary["settings_changed"] == ["hop=8"]
+    assert summary["unit_flaws"] == {"1:1": "never fires"}
+    vx, vy = summary["attributes"][:2]
+    assert (vx["frequency"], vx["matches"]) == (None, [])
+    assert (vy["matches"][0]["unit"], vy["matches"][0]["flaw"]) == ("1:1", "never fires")
+    screen = StringIO()
+    Console(file=screen, width=220).print(render(broken))
+    for text in (
+        "Matching (paper hop=8)",
+        "1:1 †",
+        "vx: not finite in the episodes of seeds [1000]; left out.",
+        "† 1 of the units: never fires (1:1).",
+    ):
+        assert text in screen.getvalue()
 
 
 def test_report_shows_every_attribute_and_behavior(dissection: Dissection) -> None:

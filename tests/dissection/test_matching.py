@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
+from scipy.signal import ShortTimeFFT, get_window
 
 from pdtui.dissection.matching import match
 from pdtui.dissection.monitor import Episode
-from pdtui.dissection.spectrum import PRESETS, Preset, spectrogram, transform
+from pdtui.dissection.settings import PRESETS, find_preset
+from pdtui.dissection.spectrum import Preset, spectrogram, transform
 from pdtui.errors import PolicyError
 from pdtui.robots.types import Attribute
 
@@ -21,7 +25,8 @@ def episode(seed: int, steps: int, units: int = 6) -> Episode:
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=list(PRESETS))
 def test_discrepancy_is_the_mean_norm_of_the_difference(preset: Preset) -> None:
     episodes = [episode(1, 200), episode(2, 330)]
-    found = match(episodes, ATTRIBUTES, preset)
+    # Six units in blocks of four: the last block is not full.
+    found = match(episodes, ATTRIBUTES, preset, block=4)
     for row, attribute in enumerate(ATTRIBUTES):
         for unit in range(6):
             norms = []
@@ -80,3 +85,105 @@ def test_constant_and_broken_attributes_are_marked() -> None:
     assert np.isnan(found.discrepancy[1]).all()
     assert found.ranked(1).size == 0
     assert found.ranked(0).size == 6
+
+
+def by_scipy(one: Episode, attributes: Sequence[Attribute], preset: Preset) -> np.ndarray:
+    """Discrepancies of one episode, pair by pair, from another library's transform."""
+    first = -(-(preset.length // 2) // preset.hop)
+    whole = (one.steps - preset.length) // preset.hop + 1
+    taper = get_window(preset.window, preset.length)
+    frames = ShortTimeFFT(taper, preset.hop, fs=1.0, scale_to="magnitude", phase_shift=None)
+
+    def spectra(series: np.ndarray) -> np.ndarray:
+        magnitude = np.abs(frames.stft(series.astype(float), p0=first, p1=first + whole))
+        return magnitude**2 if preset.spectrogram == "power" else magnitude
+
+    scaled = [spectra(one.attributes[:, j] * attribute.scale) for j, attribute in enumerate(attributes)]
+    units = [spectra(series) for series in one.activations.T]
+    return np.array([[np.linalg.norm(z - s) for z in units] for s in scaled])
+
+
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=list(PRESETS))
+@pytest.mark.parametrize("block", [1, 7, 64])
+def test_the_ranking_is_that_of_a_loop_over_another_library(preset: Preset, block: int) -> None:
+    one = episode(11, 400, units=130)
+    found = match([one], ATTRIBUTES, preset, block=block)
+    expected = by_scipy(one, ATTRIBUTES, preset)
+    np.testing.assert_allclose(found.discrepancy, expected, rtol=1e-9)
+    for row in range(2):
+        np.testing.assert_array_equal(found.ranked(row), np.argsort(expected[row]))
+
+
+def test_a_near_copy_of_a_loud_attribute_keeps_its_digits() -> None:
+    rng = np.random.default_rng(12)
+    attribute = 1000.0 + rng.standard_normal((300, 1))
+    attribute = attribute.astype(np.float32).astype(np.float64)
+    activations = (attribute + np.array([0.0, 0.001, 0.002, 5.0])).astype(np.float32)
+    loud = (Attribute("loud", "m"),)
+    found = match([Episode(0, activations, attribute)], loud, PRESETS["authors"])
+    np.testing.assert_allclose(
+        found.discrepancy[0, 1:],
+        by_scipy(Episode(0, activations, attribute), loud, PRESETS["authors"])[0, 1:],
+        rtol=1e-8,
+    )
+    assert found.discrepancy[0, 0] == 0.0
+
+
+def test_units_that_never_fire_stand_still_or_break_are_marked() -> None:
+    one, other = episode(13, 100), episode(14, 100)
+    for each in (one, other):
+        each.activations[:, 1] = 0.0
+        each.activations[:, 2] = 0.75
+    one.activations[:, 3] = 0.0
+    other.activations[20, 4] = np.nan
+    found = match([one, other], ATTRIBUTES, PRESETS["paper"], block=4)
+    assert found.unit_flaws == {
+        1: "never fires",
+        2: "constant in every episode; only its level can match",
+        4: "not finite; left out",
+    }
+    assert np.isnan(found.discrepancy[:, 4]).all()
+    assert sorted(found.ranked(0).tolist()) == [0, 1, 2, 3, 5]
+
+
+@pytest.mark.parametrize("setting", ["level=removed", "scaling=standardised"])
+def test_what_is_constant_is_left_out_where_levels_do_not_count(setting: str) -> None:
+    one = episode(15, 100)
+    one.attributes[:, 0] = 3.0
+    one.activations[:, 2] = 0.75
+    found = match([one], ATTRIBUTES, find_preset("paper", [setting]))
+    assert found.flaws == {"speed": "constant in every episode, and levels do not count; left out"}
+    assert found.unit_flaws == {2: "constant in every episode, and levels do not count; left out"}
+    assert found.ranked(0).size == 0
+    assert sorted(found.ranked(1).tolist()) == [0, 1, 3, 4, 5]
+
+
+def test_a_level_that_is_removed_does_not_count() -> None:
+    one = episode(16, 200)
+    shifted = Episode(16, one.activations, one.attributes + 4.0)
+    preset = find_preset("paper", ["level=removed"])
+    found = match([shifted], ATTRIBUTES, preset)
+    np.testing.assert_allclose(found.discrepancy, match([one], ATTRIBUTES, preset).discrepancy, rtol=1e-9)
+    assert np.isnan(found.level_share).all()
+
+
+def test_scalings_say_how_attributes_and_units_are_compared() -> None:
+    one = episode(17, 200)
+    raw = match([one], ATTRIBUTES, find_preset("paper", ["scaling=raw"]))
+    by_hand = [Attribute(attribute.name, attribute.unit) for attribute in ATTRIBUTES]
+    np.testing.assert_array_equal(raw.discrepancy, match([one], by_hand, PRESETS["paper"]).discrepancy)
+    standard = match([one], ATTRIBUTES, find_preset("paper", ["scaling=standardised"]))
+    z = (one.activations - one.activations.mean(0, float)) / one.activations.std(0, dtype=float)
+    s = (one.attributes - one.attributes.mean(0)) / one.attributes.std(0)
+    expected = by_scipy(Episode(17, z, s), by_hand, PRESETS["paper"])
+    np.testing.assert_allclose(standard.discrepancy, expected, rtol=1e-6)
+
+
+def test_angles_can_stay_wrapped() -> None:
+    turning = np.linspace(0.0, 20.0, 200)[:, None]
+    wrapped = np.angle(np.exp(1j * turning))
+    units = episode(18, 200).activations
+    yaw = (Attribute("yaw", "rad", wraps=True),)
+    found = match([Episode(0, units, turning)], yaw, find_preset("paper", ["angles=wrapped"]))
+    expected = match([Episode(0, units, wrapped)], yaw, PRESETS["paper"])
+    np.testing.assert_allclose(found.discrepancy, expected.discrepancy, rtol=1e-9)

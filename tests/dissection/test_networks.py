@@ -10,7 +10,7 @@ import pytest
 from pdtui.dissection.matching import match
 from pdtui.dissection.monitor import Start, collect_starts, monitor
 from pdtui.dissection.rollout import roll_out
-from pdtui.dissection.spectrum import find_preset
+from pdtui.dissection.settings import find_preset
 from pdtui.policies.runtime import Policy
 from pdtui.policies.units import NO_STIMULATION, Stimulation, parse_unit
 from pdtui.robots.base import Robot

@@ -5,7 +5,8 @@ import pytest
 
 from pdtui.dissection.monitor import Episode
 from pdtui.dissection.phase import correlate, correlation
-from pdtui.dissection.spectrum import PRESETS, Preset
+from pdtui.dissection.settings import PRESETS, find_preset
+from pdtui.dissection.spectrum import Preset
 from pdtui.robots.types import Attribute
 
 SPEED = (Attribute("speed", "m/s"),)
@@ -58,3 +59,18 @@ def test_a_mean_level_is_the_predominant_frequency_of_an_attribute_that_has_one(
     found = correlate([Episode(0, activations, attribute[:, None])], SPEED, PRESETS["paper"])
     assert found.bins[0] == 0
     np.testing.assert_allclose(found.circular[0], [1.0, -1.0])
+
+
+def test_the_predominant_frequency_can_be_that_of_the_movement() -> None:
+    activations = np.column_stack([0.5 + wave(1.0), -0.5 + wave(0.0)]).astype(np.float32)
+    level = Episode(0, activations, (5.0 + wave(0.0))[:, None])
+    for setting in ("predominant=moving", "level=removed"):
+        found = correlate([level], SPEED, find_preset("paper", [setting]), block=1)
+        assert found.bins[0] == 8
+        np.testing.assert_allclose(found.circular[0], [1 - 2 / np.pi, 1.0], atol=1e-6)
+
+
+def test_the_preset_says_which_mean_counts() -> None:
+    found = correlate([episode(wave(np.pi - 0.2)), episode(wave(0.2 - np.pi))], SPEED, PRESETS["paper"])
+    assert found.rho(PRESETS["paper"])[0, 0] == found.circular[0, 0]
+    assert found.rho(find_preset("paper", ["phase_mean=plain"]))[0, 0] == found.plain[0, 0]

@@ -9,7 +9,7 @@ from pdtui.dissection.keys import Keys
 from pdtui.dissection.matching import match
 from pdtui.dissection.monitor import collect_starts, monitor
 from pdtui.dissection.probe import Prober
-from pdtui.dissection.spectrum import find_preset
+from pdtui.dissection.settings import find_preset
 from pdtui.dissection.steer import movable, steer
 from pdtui.dissection.workers import Crew
 from pdtui.robots.types import Attribute
