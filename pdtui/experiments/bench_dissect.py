@@ -86,13 +86,16 @@ class Curve:
         grows: which size.
         sizes: of it.
         ms: medians over rounds.
-        exponent: slope of log time over log size: 1 where time is proportional.
+        fixed_ms, each_ms: the straight line through them, of least relative error: ms = fixed + each · size.
+        deviation: largest distance from that line, in parts of it.
     """
 
     grows: str
     sizes: tuple[int, ...]
     ms: tuple[float, ...]
-    exponent: float
+    fixed_ms: float
+    each_ms: float
+    deviation: float
 
 
 @dataclass(frozen=True)
@@ -264,8 +267,10 @@ def growth(
         cases = [sized(*{**full, grows: one}.values()) for one in sizes]
         rounds = [[_seconds(case) for case in cases] for _ in range(plan.rounds)]
         times = np.median(rounds, axis=0) * 1e3
-        slope = float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
-        curves.append(Curve(grows, tuple(sizes), tuple(times.tolist()), slope))
+        each, fixed = np.polyfit(sizes, times, 1, w=1 / times)
+        line = fixed + each * np.array(sizes)
+        deviation = float(np.max(np.abs(times / line - 1)))
+        curves.append(Curve(grows, tuple(sizes), tuple(times.tolist()), float(fixed), float(each), deviation))
     return tuple(curves)
 
 

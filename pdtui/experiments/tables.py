@@ -99,10 +99,11 @@ def dissect_table(result: DissectBench) -> Group:
         "loop: librosa.stft for each series, numpy.linalg.norm for each pair; largest difference of a "
         f"discrepancy {max(one.largest_difference for one in result.compared):.0e} of the largest"
     )
-    growth = _table("time of matching", "grows", *("size: ms",), "exponent")
+    growth = _table("time of matching", "grows", "size: ms", "ms = fixed + each · size", "off by at most")
     for curve in result.curves:
         points = "  ".join(f"{size}: {ms:.1f}" for size, ms in zip(curve.sizes, curve.ms, strict=True))
-        growth.add_row(curve.grows, points, f"{curve.exponent:.2f}")
+        line = f"{curve.fixed_ms:.1f} + {curve.each_ms:.3g} · size"
+        growth.add_row(curve.grows, points, line, f"{curve.deviation:.0%}")
     rest = _table("memory and probing", "measure", "value")
     rest.add_row(
         f"{result.memory_units} units: peak memory, {result.memory_data_gb:.2f} GB of it data",
