@@ -108,6 +108,9 @@ def evaluate(
 )
 @click.option("--overwrite", is_flag=True, help="Replace a map that exists already.")
 @click.option(
+    "--start-from", metavar="MAP", help="Searches begin from this map's behaviors, too: a name or a file."
+)
+@click.option(
     "--budget",
     type=click.FloatRange(0, min_open=True),
     metavar="MINUTES",
@@ -127,6 +130,7 @@ def dissect(
     output: Path | None,
     overwrite: bool,
     budget: float | None,
+    start_from: str | None,
     workers: int | None,
     as_json: bool,
 ) -> None:
@@ -155,6 +159,7 @@ def dissect(
             seed=seed,
             workers=cores(workers),
             budget_minutes=budget,
+            start_from=start_from,
             progress=advance,
         )
     show_result(result.as_dict(), as_json, result.table)

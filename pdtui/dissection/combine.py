@@ -104,6 +104,9 @@ class Search:
         """
         sizes, source = self._sizes, self._candidates(sweeps)
         total = sizes.generations * len(sizes.most_units)
+        # Nothing stops more than wholly: a stop's score has an end, and the search must know it.
+        end = 1.0 / self._goal.enough if self._goal.aim.direction == "stop" else float("inf")
+        satisfied, safe = min(sizes.satisfied, 0.96 * end), min(sizes.safe, 0.92 * end)
         for round_, most in enumerate(sizes.most_units):
             first = self._atoms(sweeps) if round_ == 0 else []
             self._generation([*first, *pool.best(self._goal, self._column, sizes.children, most)])
@@ -112,11 +115,11 @@ class Search:
                 if progress is not None:
                     progress(round_ * sizes.generations + number, total)
                 best = self._elite[0][0]
-                if best >= sizes.satisfied or idle >= sizes.patience or deadline():
+                if best >= satisfied or idle >= sizes.patience or deadline():
                     break
                 self._generation([self._child(source, most) for _ in range(sizes.children)])
                 idle = 0 if self._elite[0][0] > best + 0.01 else idle + 1
-            if self._elite[0][0] >= sizes.safe:
+            if self._elite[0][0] >= safe:
                 break
         if progress is not None:
             progress(total, total)

@@ -17,7 +17,8 @@ from pdtui.dissection.report import render
 from pdtui.dissection.summary import summarise
 from pdtui.errors import MapError
 from pdtui.policies.choices import NO_CHOICES, PolicyChoices
-from pdtui.stimulation.mapfile import parse_map
+from pdtui.stimulation.library import find_map
+from pdtui.stimulation.mapfile import load_map, parse_map
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ def dissect_to_map(
     seed: int,
     workers: int,
     budget_minutes: float | None,
+    start_from: str | None = None,
     progress: Callable[..., None] | None = None,
 ) -> Dissected:
     """Dissect a policy and write the map that its measurements propose.
@@ -81,6 +83,7 @@ def dissect_to_map(
         budget_minutes=budget_minutes,
         progress=advance,
         journal=journal_of(output),
+        start_from=None if start_from is None else load_map(find_map(start_from)),
     )
     text = propose(dissection)
     stimulation_map = parse_map(text, str(output))

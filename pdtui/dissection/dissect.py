@@ -25,8 +25,10 @@ from pdtui.dissection.steer import movable, steer
 from pdtui.dissection.workers import Crew
 from pdtui.policies.choices import NO_CHOICES, PolicyChoices
 from pdtui.policies.runtime import Policy
+from pdtui.policies.units import Stimulation, parse_unit
 from pdtui.robots.base import Robot
 from pdtui.sessions.versions import environment_versions
+from pdtui.stimulation.maps import StimulationMap
 
 StageProgress = Callable[[str, int, int], None]
 
@@ -45,6 +47,7 @@ def dissect(
     effort: Effort | None = None,
     progress: StageProgress | None = None,
     journal: Path | None = None,
+    start_from: StimulationMap | None = None,
 ) -> Dissection:
     """Dissect a policy: monitor, match, probe, and search for behaviors.
 
@@ -64,6 +67,7 @@ def dissect(
         effort: how much to do.
         progress: called with (stage, done, of).
         journal: remembers roll-outs, so that a run that was interrupted goes on here; removed at the end.
+        start_from: a map whose fixed behaviors the searches begin from, too: they can only get better.
 
     Raises:
         PdtuiError: an unknown robot, policy or preset, or a policy that falls too often to be dissected.
@@ -74,10 +78,11 @@ def dissect(
         return None if progress is None else lambda done, of: progress(name, done, of)
 
     with Crew(robot, policy, workers, choices) as crew, ExitStack() as stack:
-        known = None
+        remembered = None
         if journal is not None:
-            known = stack.enter_context(Journal(journal, _identity(crew)))
-        world, network, prober = crew.robot, crew.policy, Prober(crew, known)
+            remembered = stack.enter_context(Journal(journal, _identity(crew)))
+        world, network, prober = crew.robot, crew.policy, Prober(crew, remembered)
+        known = _behaviors_of(start_from, network) if start_from is not None else ()
         recorded = monitor(world, network, range(seed, seed + episodes), plan.steps, stage("monitor"))
         matching = match(recorded, world.attributes, spectrum)
         phase = correlate(recorded, world.attributes, spectrum)
@@ -109,12 +114,12 @@ def dissect(
             starts.held_out,
             plan.refine_steps,
         )
-        searches = Searches(prober, world, plan, seed, Clock(began, budget_minutes), stage)
+        searches = Searches(prober, world, plan, seed, Clock(began, budget_minutes), stage, known)
         pool = searches.pool(starts)
         behaviors = searches.behaviors((screen, refined), pool, starts)
         holds = searches.holds(refined, pool, starts)
-        if known is not None:
-            known.remove()
+        if remembered is not None:
+            remembered.remove()
         return Dissection(
             robot=robot if isinstance(robot, str) else robot.name,
             policy=policy.name if isinstance(policy, Policy) else str(policy),
@@ -143,6 +148,22 @@ def dissect(
 def _identity(crew: Crew) -> str:
     """What a roll-out's outcome depends on besides its start and plan."""
     return json.dumps([crew.robot.name, crew.policy.sha256, environment_versions()])
+
+
+def _behaviors_of(stimulation_map: StimulationMap, policy: Policy) -> tuple[Stimulation, ...]:
+    """What the map's behaviors of fixed magnitude overwrite.
+
+    Raises:
+        MapError: a unit does not exist in the policy.
+    """
+    stimulation_map.check(stimulation_map.robot, policy.layers, policy.sha256, force=True)
+    return tuple(
+        Stimulation.of(
+            {parse_unit(unit, policy.layers): v for unit, v in stimulation_map.units_of(behavior).items()}
+        )
+        for behavior in stimulation_map.behaviors.values()
+        if behavior.pid is None
+    )
 
 
 def _starts(crew: Crew, plan: Effort, first_seed: int) -> list[tuple[Start, ...]]:

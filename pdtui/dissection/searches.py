@@ -16,6 +16,7 @@ from pdtui.dissection.imprint import imprints
 from pdtui.dissection.monitor import Progress, monitor
 from pdtui.dissection.pool import Pool, random_sets
 from pdtui.dissection.probe import Prober, Sweep
+from pdtui.policies.units import Stimulation
 from pdtui.robots.base import Robot
 
 _IMPRINT_SEEDS = 1000
@@ -48,6 +49,7 @@ class Searches:
         seed: of every random choice.
         clock: shares the time.
         stage: gives the progress callback of a stage, by its name.
+        known: sets of units from elsewhere, where searches begin too.
     """
 
     prober: Prober
@@ -56,6 +58,7 @@ class Searches:
     seed: int
     clock: Clock
     stage: Callable[[str], Progress | None]
+    known: Sequence[Stimulation] = ()
 
     def behaviors(self, sweeps: Sequence[Sweep], pool: Pool, starts: Starts) -> tuple[Found, ...]:
         """The best stimulation for each goal that the robot has the attribute for."""
@@ -74,6 +77,7 @@ class Searches:
         seeds = range(self.seed + _IMPRINT_SEEDS, self.seed + _IMPRINT_SEEDS + imprint.episodes)
         episodes = monitor(self.world, crew.policy, seeds, imprint.steps)
         plans = [
+            *self.known,
             *random_sets(crew.policy.units, sizes, self.seed),
             *imprints(episodes, self.world.attributes, crew.policy.layers, imprint, sizes.bounds.largest),
         ]
