@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from pdtui.dissection.combine import Found
+from pdtui.dissection.combine import Found, Starts
 from pdtui.dissection.confirm import rank_correlation
 from pdtui.dissection.dissect import dissect
 from pdtui.dissection.effort import Effort, Sizes
@@ -18,11 +18,15 @@ from pdtui.dissection.findings import Dissection
 from pdtui.dissection.goals import GOALS, gains, score
 from pdtui.dissection.hold import Held, HoldSizes
 from pdtui.dissection.imprint import ImprintSizes
-from pdtui.dissection.probe import Effects
+from pdtui.dissection.monitor import collect_starts
+from pdtui.dissection.probe import Effects, Prober
 from pdtui.dissection.propose import propose
 from pdtui.dissection.report import render
+from pdtui.dissection.searches import Clock, Searches
 from pdtui.dissection.settings import PRESETS, find_preset, settings_of
 from pdtui.dissection.summary import summarise
+from pdtui.dissection.workers import Crew
+from pdtui.errors import MapError
 from pdtui.policies.files import file_hash
 from pdtui.policies.units import Stimulation
 from pdtui.stimulation.mapfile import parse_map
@@ -210,3 +214,29 @@ def test_rank_correlation() -> None:
     # By hand, ranks 1 2 3 4 and 1.5 1.5 4 3: covariance 3.5, variances 5 and 4.5.
     assert rank_correlation(a, np.array([0.0, 0.0, 9.0, 5.0])) == pytest.approx(3.5 / np.sqrt(5 * 4.5))
     assert np.isnan(rank_correlation(a, np.zeros(4)))
+
+
+def test_searches_begin_from_a_maps_behaviors(policy_file: Path) -> None:
+    text = f"""
+schema = 1
+robot = "ant"
+policy = {{ name = "{policy_file}", sha256 = "{file_hash(policy_file)}" }}
+[[behaviors]]
+name = "lean"
+key = "l"
+magnitudes = {{ "0:3" = 9.5, "1:7" = -9.5 }}
+"""
+    known = Stimulation((3, 15), (9.5, -9.5))
+    effort = replace(SMALL, search=replace(SMALL.search, pool=1, atoms=0, children=8, promoted=8, elite=8))
+    with Crew("ant", policy_file, 1) as crew:
+        starts = collect_starts(crew.robot, crew.policy, 1200, 1, at=5, survive=20)
+        searches = Searches(
+            Prober(crew), crew.robot, effort, 1000, Clock(0.0, None), lambda _: None, (known,)
+        )
+        assert known in searches.pool(Starts(tuple(starts), (), ())).plans
+    beginning = parse_map(text, "mine")
+    found = dissect("ant", policy_file, episodes=1, workers=1, effort=effort, start_from=beginning)
+    alone = dissect("ant", policy_file, episodes=1, workers=1, effort=effort)
+    assert found.rollouts > alone.rollouts
+    with pytest.raises(MapError, match="unit 1:70 does not exist"):
+        dissect("ant", policy_file, effort=effort, start_from=parse_map(text.replace("1:7", "1:70"), "mine"))
