@@ -33,6 +33,10 @@ class SessionError(PdtuiError):
     """A recording cannot be written, read or replayed."""
 
 
+class PictureError(PdtuiError):
+    """A picture cannot be drawn or written."""
+
+
 class ScreenError(PdtuiError):
     """The terminal cannot show the screen."""
 

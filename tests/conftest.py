@@ -7,12 +7,15 @@ from pathlib import Path
 import pytest
 import torch
 
+from pdtui.dissection.dissect import dissect
+from pdtui.dissection.findings import Dissection
 from pdtui.policies.files import save_network
 from pdtui.policies.load import load_policy
 from pdtui.policies.network import NetworkSpec, PolicyNetwork
 from pdtui.policies.runtime import Policy
 from pdtui.stimulation.mapfile import load_map
 from pdtui.stimulation.maps import StimulationMap
+from tests.small_dissection import SMALL, small_network, write_policy
 
 MAP = """\
 schema = 1
@@ -97,3 +100,15 @@ def map_path(map_text: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def small_map(map_path: Path) -> StimulationMap:
     return load_map(map_path)
+
+
+@pytest.fixture(scope="session")
+def policy_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Weights of a policy small enough to be dissected in a test."""
+    return write_policy(tmp_path_factory.mktemp("policies") / "small.safetensors", small_network(7))
+
+
+@pytest.fixture(scope="session")
+def dissection(policy_file: Path) -> Dissection:
+    """What was found about it."""
+    return dissect("ant", policy_file, episodes=2, workers=2, effort=SMALL)

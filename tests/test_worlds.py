@@ -154,9 +154,13 @@ def test_dissect_takes_an_environment_and_its_map_drives(tmp_path: Path) -> None
     weights = tmp_path / "small.safetensors"
     result = run(
         "dissect", "--env", "Pendulum-v1", "--policy", weights, "-o", output, "--episodes", 1,
-        "--budget", 0.001, "--workers", 2, "--json",
+        "--budget", 0.001, "--workers", 2, "--json", "--figures", tmp_path / "figures",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
+    pictures = [Path(path) for path in json.loads(result.stdout)["pictures"]]
+    assert pictures[0] == tmp_path / "out.rrd"
+    assert pictures[1] == tmp_path / "figures" / "spectrograms.png"
+    assert all(path.stat().st_size > 1000 for path in pictures)
     assert load_map(output).robot == "Pendulum-v1"
     driven = run("drive", output, "--headless", "--steps", 20)
     assert "20 steps, 1 s simulated" in driven.output, driven.output

@@ -9,6 +9,7 @@ import click
 
 from pdtui import __version__
 from pdtui.cli.common import OneLineErrors
+from pdtui.cli.drawing import figure
 from pdtui.cli.driving import drive, pick_and_drive, replay
 from pdtui.cli.measuring import bench, convert, dissect, evaluate, train
 
@@ -25,5 +26,5 @@ def main(ctx: click.Context) -> None:
         pick_and_drive()
 
 
-for command in (drive, replay, evaluate, dissect, convert, train, bench):
+for command in (drive, replay, evaluate, dissect, figure, convert, train, bench):
     main.add_command(command)

@@ -106,7 +106,16 @@ def evaluate(
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="The map; default: maps/ROBOT-dissected.toml."
 )
-@click.option("--overwrite", is_flag=True, help="Replace a map that exists already.")
+@click.option(
+    "--report",
+    type=click.Path(path_type=Path),
+    metavar="FILE.rrd",
+    help="The report for the Rerun viewer; default: beside the map, under its name.",
+)
+@click.option(
+    "--figures", type=click.Path(path_type=Path), metavar="FOLDER", help="Draw figures as PNGs, too."
+)
+@click.option("--overwrite", is_flag=True, help="Replace map, report and figures that exist already.")
 @click.option(
     "--start-from", metavar="MAP", help="Searches begin from this map's behaviors, too: a name or a file."
 )
@@ -128,17 +137,20 @@ def dissect(
     episodes: int,
     seed: int,
     output: Path | None,
+    report: Path | None,
+    figures: Path | None,
     overwrite: bool,
     budget: float | None,
     start_from: str | None,
     workers: int | None,
     as_json: bool,
 ) -> None:
-    """Find the units that steer ROBOT: match, then probe, then write a map.
+    """Find the units that steer ROBOT: match, then probe, then write a map and a report.
 
     Interrupted, the same line goes on where it was.
     """
     from pdtui.dissection.command import dissect_to_map
+    from pdtui.pictures.wanted import Wanted
     from pdtui.robots import check_robot, file_stem, trust_module
 
     if (robot is None) == (env is None):
@@ -146,11 +158,14 @@ def dissect(
     name = str(robot or env)
     trust_module(name)
     check_robot(name)
+    output = output or Path("maps") / f"{file_stem(name)}-dissected.toml"
+    wanted = Wanted(report or output.with_suffix(".rrd"), figures, overwrite)
+    wanted.check()
     with progress_bar_or_none("dissecting", quiet=as_json) as advance:
         result = dissect_to_map(
             name,
             policy or name,
-            output or Path("maps") / f"{file_stem(name)}-dissected.toml",
+            output,
             choices=choices,
             overwrite=overwrite,
             preset=preset,
@@ -162,7 +177,10 @@ def dissect(
             start_from=start_from,
             progress=advance,
         )
-    show_result(result.as_dict(), as_json, result.table)
+    written = [str(path) for path in wanted.draw(result.dissection)]
+    show_result({**result.as_dict(), "pictures": written}, as_json, result.table)
+    if not as_json:
+        click.echo(f"wrote {', '.join(written)}")
 
 
 @click.command()

@@ -13,6 +13,7 @@ import numpy as np
 from pdtui.dissection.combine import Starts
 from pdtui.dissection.confirm import draw_controls, select_units
 from pdtui.dissection.effort import Effort
+from pdtui.dissection.excerpt import excerpt
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.journal import Journal
 from pdtui.dissection.matching import match
@@ -131,6 +132,7 @@ def dissect(
             seed=seed,
             matching=matching,
             phase=phase,
+            excerpt=excerpt(recorded, world.attributes, matching, spectrum),
             screen=screen,
             refined=refined,
             controls=controls,

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from pdtui.dissection.combine import Found
+from pdtui.dissection.excerpt import Excerpt
 from pdtui.dissection.hold import Held
 from pdtui.dissection.matching import Match
 from pdtui.dissection.phase import Phase
@@ -33,6 +36,7 @@ class Dissection:
         seed: everything random came from it.
         matching: discrepancies.
         phase: correlations.
+        excerpt: one monitored episode, of the units that match: what pictures show.
         screen: every unit, at a few values.
         refined: the best of them, the first matches and the controls, from other starts.
         controls: units drawn at random.
@@ -54,6 +58,7 @@ class Dissection:
     seed: int
     matching: Match
     phase: Phase
+    excerpt: Excerpt
     screen: Sweep
     refined: Sweep
     controls: tuple[int, ...]
@@ -81,6 +86,24 @@ class Dissection:
         """
         ranked = self.matching.ranked(self.column(attribute))[:count]
         return [format_unit(int(unit), self.layers) for unit in ranked]
+
+    def side_effects(self) -> dict[float, Floats]:
+        """What the refined units do to every attribute, in parts of each attribute's usual spread.
+
+        Returns:
+            for each sign of the largest output at which every unit was screened, a matrix of the shape
+            (refined units, J): means over the starts, of which one that left no number counts as no effect;
+            NaN for an attribute that never varies.
+        """
+        largest = max(map(abs, self.screen.values))
+        matrices = {}
+        for value in (-largest, largest):
+            if value in self.refined.values:
+                effects = self.refined.effects[:, self.refined.values.index(value)]
+                means = np.nan_to_num(effects).mean(axis=1)
+                blank = np.full_like(means, np.nan)
+                matrices[value] = np.divide(means, self.spread, out=blank, where=self.spread > 0)
+        return matrices
 
     def to_map(self) -> StimulationMap:
         """The map that the measurements propose; its `text` is what a map's file holds."""

@@ -19,15 +19,18 @@ _MATCHES = 3
 def render(dissection: Dissection) -> RenderableType:
     """The tables that `pdtui dissect` prints."""
     summary = summarise(dissection)
-    parts: list[RenderableType] = [
+    return Group(*tables(summary), *(Text(line) for line in remarks(summary)))
+
+
+def tables(summary: dict[str, Any]) -> list[Table]:
+    """The tables of a summary, for whoever shows them; every cell is a text."""
+    return [
         _matching_table(summary),
         _probing_table(summary),
         _steered_table(summary),
         _behavior_table(summary),
         _hold_table(summary),
     ]
-    parts += [Text(line) for line in _remarks(summary)]
-    return Group(*parts)
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -155,7 +158,8 @@ def _hold_table(summary: dict[str, Any]) -> Table:
     return table
 
 
-def _remarks(summary: dict[str, Any]) -> list[str]:
+def remarks(summary: dict[str, Any]) -> list[str]:
+    """What the tables of a summary leave to say, a line each."""
     attributes = summary["attributes"]
     hits = sum(attribute["hits"]["first"] for attribute in attributes)
     confirmed = sum(bool(one["first_match"] and one["first_match"]["confirmed"]) for one in attributes)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from pdtui.dissection.confirm import BEST, Confirmation, best_probed, confirm, hit_rate
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.settings import settings_of
@@ -128,16 +126,12 @@ def _steered(dissection: Dissection, one: Steered) -> dict[str, Any]:
 
 def _side_effects(dissection: Dissection) -> dict[str, Any]:
     """Refined units × attributes at the largest screened outputs, in parts of each attribute's spread."""
-    refined, spread = dissection.refined, dissection.spread
-    largest = max(dissection.screen.values, key=abs)
-    values = [value for value in (-abs(largest), abs(largest)) if value in refined.values]
-    matrices = {}
-    for value in values:
-        means = np.nan_to_num(refined.effects[:, refined.values.index(value)]).mean(axis=1)
-        parts = np.divide(means, spread, out=np.full_like(means, np.nan), where=spread > 0)
-        matrices[f"{value:g}"] = [[_number(cell) for cell in row] for row in parts]
+    matrices = {
+        f"{value:g}": [[_number(cell) for cell in row] for row in parts]
+        for value, parts in dissection.side_effects().items()
+    }
     return {
-        "units": [format_unit(unit, dissection.layers) for unit in refined.units],
+        "units": [format_unit(unit, dissection.layers) for unit in dissection.refined.units],
         "controls": [format_unit(unit, dissection.layers) for unit in dissection.controls],
         "attributes": [attribute.name for attribute in dissection.attributes],
         "by_value": matrices,

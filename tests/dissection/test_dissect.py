@@ -13,11 +13,9 @@ from rich.console import Console
 from pdtui.dissection.combine import Found, Starts
 from pdtui.dissection.confirm import rank_correlation
 from pdtui.dissection.dissect import dissect
-from pdtui.dissection.effort import Effort, Sizes
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.goals import GOALS, gains, score
-from pdtui.dissection.hold import Held, HoldSizes
-from pdtui.dissection.imprint import ImprintSizes
+from pdtui.dissection.hold import Held
 from pdtui.dissection.monitor import collect_starts
 from pdtui.dissection.probe import Effects, Prober
 from pdtui.dissection.propose import propose
@@ -31,32 +29,7 @@ from pdtui.policies.files import file_hash
 from pdtui.policies.units import Stimulation
 from pdtui.stimulation.mapfile import parse_map
 from pdtui.stimulation.maps import Measured, Pid
-
-SMALL = Effort(
-    steps=130,
-    screen_values=(-3.0, 3.0),
-    screen_starts=2,
-    screen_steps=16,
-    refine_keep=1,
-    refine_values=(-3.0, 0.0, 3.0),
-    refine_starts=2,
-    refine_steps=16,
-    search_starts=2,
-    selection_starts=2,
-    held_out_starts=2,
-    walk=20,
-    imprint=ImprintSizes(episodes=2, steps=10, bins=2, units=(3,), factors=(1.0,)),
-    search=Sizes(
-        pool=4, atoms=4, elite=3, children=3, promoted=2, most_units=(3,), generations=1, quick_starts=1,
-        quick_steps=12, full_starts=2, full_steps=16, finalists=2, final_steps=18,
-    ),
-    hold=HoldSizes(units=1, finalists=2, steps=12, final_steps=18),
-)  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def dissection(policy_file: Path) -> Dissection:
-    return dissect("ant", policy_file, episodes=2, workers=2, effort=SMALL)
+from tests.small_dissection import SMALL
 
 
 def test_every_unit_is_screened_and_every_goal_has_a_candidate(dissection: Dissection) -> None:

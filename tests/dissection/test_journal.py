@@ -13,7 +13,7 @@ from pdtui.dissection.rollout import Outcome
 from pdtui.dissection.workers import Crew
 from pdtui.errors import RobotError
 from pdtui.policies.units import Stimulation
-from tests.dissection.test_dissect import SMALL
+from tests.small_dissection import SMALL
 
 
 class InterruptedHereError(Exception):

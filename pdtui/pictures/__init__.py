@@ -1,0 +1,1 @@
+"""Pictures of what was found: a report for the Rerun viewer, figures for a page."""

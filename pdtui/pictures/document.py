@@ -1,0 +1,58 @@
+"""The tables of a dissection as a Markdown document."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.table import Table
+
+from pdtui.dissection.findings import Dissection
+from pdtui.dissection.report import remarks, tables
+from pdtui.dissection.summary import summarise
+from pdtui.sessions.versions import environment_versions
+
+
+def document(dissection: Dissection) -> str:
+    """Everything that the terminal prints about a dissection, and what it was made from."""
+    summary = summarise(dissection)
+    parts = [f"# Dissection of {summary['policy']} on {summary['robot']}", _origin(dissection, summary)]
+    parts += [_table(table) for table in tables(summary)]
+    parts += ["## Remarks", "\n".join(f"- {line}" for line in remarks(summary))]
+    return "\n\n".join(parts) + "\n"
+
+
+def _origin(dissection: Dissection, summary: dict[str, Any]) -> str:
+    preset, dt = dissection.preset, dissection.dt
+    versions = environment_versions()
+    episodes = ", ".join(str(seed) for seed in summary["episodes"])
+    rows = [
+        ("policy", f"{summary['policy']}, SHA-256 `{summary['sha256']}`"),
+        ("hidden layers", " · ".join(f"{width} units" for width in dissection.layers)),
+        ("seed", f"{summary['seed']}; episodes of seeds {episodes}, pictured: {dissection.excerpt.seed}"),
+        (
+            "spectrum",
+            f"preset `{preset}`: {preset.window.title()} window of {preset.length} steps, hop "
+            f"{preset.hop}; {dt:g} s a step",
+        ),
+        ("probed", f"{summary['rollouts']} roll-outs, {summary['control_steps']} control steps"),
+        ("versions", ", ".join(f"{name} {versions[name]}" for name in ("pdtui", "mujoco", "torch", "numpy"))),
+    ]
+    return _markdown(["", ""], rows)
+
+
+def _table(table: Table) -> str:
+    headers = [str(column.header) for column in table.columns]
+    columns = [[str(cell) for cell in column.cells] for column in table.columns]
+    return f"## {table.title}\n\n" + _markdown(headers, list(zip(*columns, strict=True)))
+
+
+def _markdown(headers: list[str], rows: Sequence[tuple[str, ...]]) -> str:
+    if not rows:
+        return "None."
+    lines = [headers, ["---"] * len(headers), *rows]
+    return "\n".join("| " + " | ".join(_escape(cell) for cell in line) + " |" for line in lines)
+
+
+def _escape(cell: str) -> str:
+    return cell.replace("|", "\\|").replace("*", "\\*").replace("\n", " ")

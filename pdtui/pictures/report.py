@@ -1,0 +1,183 @@
+"""The report of a dissection: a recording that opens laid out in the Rerun viewer."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+from numpy.typing import NDArray
+from rerun.recording_stream import is_enabled
+
+from pdtui.dissection.findings import Dissection
+from pdtui.dissection.summary import summarise
+from pdtui.errors import PictureError
+from pdtui.pictures.axes import Axes, Axis, Log
+from pdtui.pictures.charts import (
+    EffectCurve,
+    Spectrogram,
+    curves_of,
+    moments,
+    pair_of,
+    ranking_of,
+    side_effects_of,
+)
+from pdtui.pictures.document import document
+from pdtui.pictures.layout import SIDE_EFFECTS, SUMMARY, layout, matrix_size, part_of, value_part
+from pdtui.pictures.palette import GREEN, ORANGE, SKY, Color, diverging
+from pdtui.robots.types import Floats
+from pdtui.sessions.versions import environment_versions
+
+APP, TIME = "pdtui-dissection", "time"
+PROPERTY, VERSIONS = "dissection", "versions"
+
+
+def write_report(path: Path, dissection: Dissection) -> None:
+    """Write a dissection as a recording with its layout; an existing file is replaced once it is whole.
+
+    Besides pictures it holds what they were drawn from: every effect curve and ranking as numbers at its
+    entity, and what ``--json`` prints as the property ``dissection``.
+
+    Raises:
+        PictureError: the file cannot be written.
+    """
+    partial = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        recording = rr.RecordingStream(APP)
+        if not is_enabled(recording):
+            raise PictureError(f"{path}: cannot be written: the environment says RERUN=off")
+        recording.set_sinks(rr.FileSink(partial), default_blueprint=layout(dissection))
+        try:
+            _write(recording, dissection)
+        finally:
+            recording.disconnect()
+        partial.replace(path)
+    except OSError as error:
+        raise PictureError(f"{path}: cannot be written: {error.strerror}") from error
+    except RuntimeError as error:
+        raise PictureError(f"{path}: cannot be written: {error}") from error
+    finally:
+        with suppress(OSError):
+            partial.unlink()
+
+
+def _write(recording: rr.RecordingStream, dissection: Dissection) -> None:
+    def log(entity: str, part: Any) -> None:
+        rr.log(entity, part, static=True, recording=recording, strict=True)
+
+    recording.send_recording_name(f"Dissection of {dissection.policy} on {dissection.robot}")
+    recording.send_property(PROPERTY, rr.AnyValues(summary=json.dumps(summarise(dissection))))
+    versions: dict[str, Any] = dict(environment_versions())
+    recording.send_property(VERSIONS, rr.AnyValues(**versions))
+    log(SUMMARY, rr.TextDocument(document(dissection), media_type=rr.MediaType.MARKDOWN))
+    for column in range(len(dissection.attributes)):
+        _write_spectrograms(log, dissection, column)
+        _write_ranking(log, dissection, column)
+        _write_curves(log, dissection, column)
+        _write_episode(recording, log, dissection, column)
+    _write_matrices(log, dissection)
+
+
+def _write_spectrograms(log: Log, dissection: Dissection, column: int) -> None:
+    pair = pair_of(dissection, column)
+    if pair is None:
+        return
+    for part, shown in (("attribute", pair.of_attribute), ("unit", pair.of_unit)):
+        axes = _spectrogram_axes(part_of(dissection, column, f"spectrogram/{part}"), log, shown)
+        axes.heat_map(np.maximum(shown.decibels.T[::-1], pair.low), pair.low, pair.high)
+        axes.draw()
+
+
+def _spectrogram_axes(entity: str, log: Log, shown: Spectrogram) -> Axes:
+    # The first and last cell reach half a cell beyond their middle.
+    times, frequencies = (_edges(values) for values in (shown.times, shown.frequencies))
+    return Axes(entity, log, Axis.over("time (s)", times), Axis.over("frequency (Hz)", frequencies))
+
+
+def _edges(centers: Floats) -> Floats:
+    half = (centers[1] - centers[0]) / 2 if len(centers) > 1 else 0.5
+    return np.array([centers[0] - half, centers[-1] + half])
+
+
+def _write_ranking(log: Log, dissection: Dissection, column: int) -> None:
+    ranking = ranking_of(dissection, column)
+    count = len(ranking.labels)
+    if not count:
+        return
+    names = Axis.named("unit", ranking.labels[::-1])
+    x = Axis.over("discrepancy", np.array([0.0, *ranking.discrepancies]), margin=0.02)
+    axes = Axes(part_of(dissection, column, "discrepancies"), log, replace(x, low=0.0), names)
+    axes.draw()
+    colors = [ORANGE, *[SKY] * (count - 1)]
+    axes.level_bars("bars", count - 0.5 - np.arange(count, dtype=np.float64), ranking.discrepancies, colors)
+    numbers = rr.AnyValues(
+        unit=pa.array(ranking.labels),
+        discrepancy=pa.array(ranking.discrepancies),
+        mean_level=pa.array(ranking.level_shares),
+    )
+    log(f"{axes.entity}/bars", numbers)
+
+
+def _write_curves(log: Log, dissection: Dissection, column: int) -> None:
+    curves = curves_of(dissection, column)
+    if not curves:
+        return
+    attribute = dissection.attributes[column]
+    heights = np.concatenate(
+        [[0.0], *([curve.means, curve.lows, curve.highs] for curve in curves)], axis=None
+    )
+    values = np.concatenate([curve.values for curve in curves])
+    x = Axis.over("output v", values, margin=0.04)
+    y = Axis.over(f"change of {attribute.name} ({attribute.unit})", heights, margin=0.08)
+    axes = Axes(part_of(dissection, column, "effects"), log, x, y)
+    axes.draw()
+    axes.level(0.0)
+    for curve in curves:
+        _write_curve(log, axes, curve, ORANGE if curve.matched else GREEN)
+
+
+def _write_curve(log: Log, axes: Axes, curve: EffectCurve, color: Color) -> None:
+    name = rr.escape_entity_path_part(f"unit {curve.label}, {curve.role}")
+    known = np.isfinite(curve.means)
+    sure = np.isfinite(curve.lows)
+    axes.line(name, axes.place(curve.values[known], curve.means[known]), color)
+    axes.bars(name, curve.values[sure], curve.lows[sure], curve.highs[sure], color)
+    numbers = {
+        "output": curve.values,
+        "effect": curve.means,
+        "low": curve.lows,
+        "high": curve.highs,
+        "falls": curve.falls,
+    }
+    log(f"{axes.entity}/{name}", rr.AnyValues(**{key: pa.array(value) for key, value in numbers.items()}))
+
+
+def _write_episode(recording: rr.RecordingStream, log: Log, dissection: Dissection, column: int) -> None:
+    shown, attribute = dissection.excerpt, dissection.attributes[column]
+    series: dict[str, tuple[NDArray[np.floating], str, Color]] = {}
+    series["attribute"] = (shown.attributes[:, column], f"{attribute.name} ({attribute.unit})", SKY)
+    pair = pair_of(dissection, column)
+    if pair is not None:
+        series["unit"] = (shown.activations[:, shown.column(pair.unit)], f"unit {pair.label}", ORANGE)
+    times = rr.TimeColumn(TIME, duration=moments(shown, dissection.dt))
+    for part, (values, name, color) in series.items():
+        entity = part_of(dissection, column, f"episode/{part}")
+        log(entity, rr.SeriesLines(names=[name], colors=[color], widths=[1.5]))
+        rr.send_columns(entity, [times], rr.Scalars.columns(scalars=values), recording=recording, strict=True)
+
+
+def _write_matrices(log: Log, dissection: Dissection) -> None:
+    effects = side_effects_of(dissection)
+    for value, matrix in effects.by_value.items():
+        entity = f"{SIDE_EFFECTS}/{value_part(value)}"
+        columns, rows = Axis.named("unit", effects.units), Axis.named("attribute", effects.attributes[::-1])
+        axes = Axes(entity, log, columns, rows, *matrix_size(matrix.shape))
+        axes.picture(diverging(matrix.T, effects.limit))
+        axes.draw()
+        log(f"{entity}/values", rr.Tensor(matrix, dim_names=("unit", "attribute")))

@@ -1,0 +1,50 @@
+"""A dissection of a tiny policy, small enough that several rooms' tests may look at one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import torch
+
+from pdtui.dissection.effort import Effort, Sizes
+from pdtui.dissection.hold import HoldSizes
+from pdtui.dissection.imprint import ImprintSizes
+from pdtui.policies.files import save_network
+from pdtui.policies.network import NetworkSpec, PolicyNetwork
+
+SMALL = Effort(
+    steps=130,
+    screen_values=(-3.0, 3.0),
+    screen_starts=2,
+    screen_steps=16,
+    refine_keep=1,
+    refine_values=(-3.0, 0.0, 3.0),
+    refine_starts=2,
+    refine_steps=16,
+    search_starts=2,
+    selection_starts=2,
+    held_out_starts=2,
+    walk=20,
+    imprint=ImprintSizes(episodes=2, steps=10, bins=2, units=(3,), factors=(1.0,)),
+    search=Sizes(
+        pool=4, atoms=4, elite=3, children=3, promoted=2, most_units=(3,), generations=1, quick_starts=1,
+        quick_steps=12, full_starts=2, full_steps=16, finalists=2, final_steps=18,
+    ),
+    hold=HoldSizes(units=1, finalists=2, steps=12, final_steps=18),
+)  # fmt: skip
+
+
+def write_policy(path: Path, network: PolicyNetwork) -> Path:
+    save_network(path, network)
+    return path
+
+
+def small_network(seed: int) -> PolicyNetwork:
+    """Two layers of eight units with small random weights: an Ant that trembles and stays on its feet."""
+    torch.manual_seed(seed)
+    bounds = (-1.0,) * 8, (1.0,) * 8
+    network = PolicyNetwork(NetworkSpec("ant", 27, (8, 8), "tanh", 8, "mean", *bounds))
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.mul_(0.3)
+    return network
