@@ -1,25 +1,19 @@
-"""The chunks of a recording, gathered into columns whose types and lengths are known to be right."""
+"""Chunks of one entity, gathered into columns whose types and lengths are known to be right."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
-from rerun.chunk import Chunk, RrdReader
 
 from pdtui.errors import SessionError
-from pdtui.sessions.schema import APP, DRIVE, STEP, VIEWS
+from pdtui.sessions.schema import STEP
 
 Number = TypeVar("Number", bound=np.generic)
-_MAGIC = b"RRF2"
-_PROPERTIES = "/__properties/"
 
 
 class Rows:
@@ -118,90 +112,8 @@ class Rows:
         return steps
 
 
-class SessionFile:
-    """An .rrd of pdtui, read once from its beginning to its end.
-
-    Args:
-        path: the file.
-        only: components of the drive to keep; all if empty.
-        skip: components of the drive to leave out.
-
-    Raises:
-        SessionError: no such file, not a recording, another program's, or torn.
-    """
-
-    def __init__(self, path: Path, *, only: Sequence[str] = (), skip: Sequence[str] = ()) -> None:
-        _check_magic(path)
-        self._batches: dict[str, list[pa.RecordBatch]] = {}
-        self._properties: dict[str, dict[str, list[Any]]] = {}
-        with _reading(path):
-            reader = RrdReader(path)
-            stores = reader.recordings()
-            if not stores:
-                raise SessionError(f"{path}: holds no recording")
-            if stores[0].application_id != APP:
-                raise SessionError(
-                    f"{path}: expected a recording of {APP}, found one of '{stores[0].application_id[:60]}'"
-                )
-            for chunk in reader.stream():
-                self._take(chunk, only, skip)
-
-    def properties(self, name: str) -> dict[str, list[Any]]:
-        """Values of one group of properties, by name; empty if the file has none."""
-        return self._properties.get(name, {})
-
-    def rows(self, entity: str) -> Rows:
-        """All rows of an entity; none if the file has none."""
-        return Rows(entity, self._batches.get(entity, []))
-
-    def _take(self, chunk: Chunk, only: Sequence[str], skip: Sequence[str]) -> None:
-        entity = chunk.entity_path
-        if entity.startswith(_PROPERTIES):
-            batch = chunk.to_record_batch()
-            group = self._properties.setdefault(entity.removeprefix(_PROPERTIES), {})
-            for name in batch.schema.names:
-                column = batch.column(name)
-                if pa.types.is_list(column.type) and len(column) and column[-1].is_valid:
-                    group[name] = column[-1].as_py()
-        elif not chunk.is_static and not entity.startswith(VIEWS):
-            batch = chunk.to_record_batch()
-            if entity == DRIVE:
-                names = [name for name in batch.schema.names if name not in skip]
-                names = [name for name in names if not only or name in (STEP, *only)]
-                batch = batch.select(names)
-            self._batches.setdefault(entity, []).append(batch)
-
-
 def _unwrapped(column: pa.Array) -> pa.Array:
     """Lists of numbers, where the recorder wrote lists of one list each."""
     while pa.types.is_list(column.type.value_type):
         column = column.flatten()
     return column
-
-
-def _check_magic(path: Path) -> None:
-    try:
-        with path.open("rb") as handle:
-            magic = handle.read(len(_MAGIC))
-    except FileNotFoundError:
-        raise SessionError(f"{path}: no such file") from None
-    except OSError as error:
-        raise SessionError(f"{path}: cannot be read: {error.strerror}") from error
-    if magic != _MAGIC:
-        raise SessionError(f"{path}: expected a Rerun recording (.rrd), found another kind of file")
-
-
-@contextmanager
-def _reading(path: Path) -> Iterator[None]:
-    try:
-        with warnings.catch_warnings():
-            # A session that was killed has no footer; that is no news to its reader.
-            warnings.simplefilter("ignore")
-            yield
-    except (RuntimeError, ValueError, OSError, pa.ArrowException) as error:
-        if "exceeds file size" in str(error) or "too small" in str(error):
-            raise SessionError(
-                f"{path}: the file is torn: its last message is cut; "
-                "`rerun rrd optimize` can rescue what is before it"
-            ) from error
-        raise SessionError(f"{path}: cannot be read as a recording: {error}") from error

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,36 +13,26 @@ from numpy.typing import NDArray
 from pdtui.errors import SessionError
 from pdtui.policies.units import Stimulation
 from pdtui.robots.types import Floats
-from pdtui.sessions.chunks import Rows, SessionFile
-from pdtui.sessions.events import Event, EventKind
+from pdtui.sessions.chunks import Rows
+from pdtui.sessions.file import SessionFile
+from pdtui.sessions.heading import Heading, count_steps, heading_of
 from pdtui.sessions.properties import info_from_properties
-from pdtui.sessions.record import DriveInfo
 from pdtui.sessions.schema import (
     ACTIVE_FIELDS,
     DIGEST_EPISODE,
     DRIVE,
-    ENDINGS,
-    EVENTS,
     INFO,
-    OUTCOME,
     OVERWRITE_FIELDS,
     REWARD_COST_ACTION,
-    VERSIONS,
 )
 from pdtui.stimulation.latch import ActiveBehavior
 
 
-@dataclass(frozen=True)
-class Session:
-    """A recorded drive.
+@dataclass(frozen=True, kw_only=True)
+class Session(Heading):
+    """A recorded drive of S control steps, J attributes and A actions.
 
     Attributes:
-        path: the file.
-        info: what determines the run, besides its events.
-        versions: of machine and libraries that ran it.
-        created: date and time, ISO 8601.
-        events: in the order in which they were applied.
-        steps: number S of control steps.
         digests: of the simulator's state after each step, shape (S,), int64.
         attributes: after each step, shape (S, J).
         actions: shape (S, A), float32.
@@ -52,16 +41,8 @@ class Session:
         active: the behaviors of each step with their controllers, the one latched last at the end.
         stimulations: units and the outputs that overwrote them, for each step.
         natural: what those units would have put out, for each step.
-        endings: why an episode ended by itself, by the step with which it did.
-        outcome: how the drive ended; empty if the file has no end.
     """
 
-    path: Path
-    info: DriveInfo
-    versions: dict[str, str] = field(repr=False)
-    created: str
-    events: tuple[Event, ...] = field(repr=False)
-    steps: int
     digests: NDArray[np.int64] = field(repr=False)
     attributes: Floats = field(repr=False)
     actions: NDArray[np.float32] = field(repr=False)
@@ -71,8 +52,6 @@ class Session:
     active: tuple[tuple[ActiveBehavior, ...], ...] = field(repr=False)
     stimulations: tuple[Stimulation, ...] = field(repr=False)
     natural: tuple[tuple[float, ...], ...] = field(repr=False)
-    endings: dict[int, str] = field(repr=False)
-    outcome: str = ""
 
     @property
     def behaviors(self) -> tuple[tuple[str, ...], ...]:
@@ -90,22 +69,16 @@ def read_session(path: Path | str) -> Session:
     path = Path(path)
     file = SessionFile(path, skip=("activations",))
     try:
-        info, created = info_from_properties(file.properties(INFO))
-        drive = file.rows(DRIVE)
-        steps = _count_steps(drive)
+        heading = heading_of(file, path)
+        drive, info = file.rows(DRIVE), heading.info
         gains = drive.block(REWARD_COST_ACTION, np.float64)
-        if steps and gains.shape[1] < 2:
+        if heading.steps and gains.shape[1] < 2:
             raise SessionError(f"stream '{DRIVE}/{REWARD_COST_ACTION}': expected reward and cost first")
-        gains = gains if steps else np.empty((0, 2))
+        gains = gains if heading.steps else np.empty((0, 2))
         counters = drive.block(DIGEST_EPISODE, np.int64, 2)
         stimulations, natural = _stimulations(drive, sum(info.layers))
         return Session(
-            path=path,
-            info=info,
-            versions={name: str(values[0]) for name, values in file.properties(VERSIONS).items() if values},
-            created=created,
-            events=_events(file.rows(EVENTS)),
-            steps=steps,
+            **vars(heading),
             digests=counters[:, 0],
             attributes=drive.block("attributes", np.float64, len(info.attributes)),
             actions=gains[:, 2:].astype(np.float32),
@@ -115,8 +88,6 @@ def read_session(path: Path | str) -> Session:
             active=_active(drive),
             stimulations=stimulations,
             natural=natural,
-            endings=_endings(file.rows(ENDINGS)),
-            outcome=_outcome(file),
         )
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
@@ -133,35 +104,10 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
     try:
         info, _ = info_from_properties(file.properties(INFO))
         drive = file.rows(DRIVE)
-        _count_steps(drive)
+        count_steps(drive)
         return drive.block("activations", np.float32, sum(info.layers))
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
-
-
-def _count_steps(drive: Rows) -> int:
-    steps = drive.steps
-    wrong = np.flatnonzero(steps != np.arange(len(steps)))
-    if wrong.size:
-        raise SessionError(f"expected control step {wrong[0]}, found step {steps[wrong[0]]}")
-    return len(steps)
-
-
-def _events(found: Rows) -> tuple[Event, ...]:
-    if not len(found.steps):
-        return ()
-    order = np.argsort(found.numbers("number", np.int64), kind="stable")
-    if not np.array_equal(found.numbers("number", np.int64)[order], np.arange(len(order))):
-        raise SessionError("an event is missing")
-    kinds, names, keys = found.texts("kind"), found.texts("name"), found.texts("key")
-    values = found.numbers("value", np.float64)
-    events = []
-    for row in order:
-        kind = kinds[row]
-        if kind not in get_args(EventKind):
-            raise SessionError(f"unknown event '{kind[:40]}'; there are {', '.join(get_args(EventKind))}")
-        events.append(Event(int(found.steps[row]), kind, names[row], float(values[row]), keys[row]))
-    return tuple(events)
 
 
 def _active(drive: Rows) -> tuple[tuple[ActiveBehavior, ...], ...]:
@@ -193,14 +139,3 @@ def _stimulations(drive: Rows, units: int) -> tuple[tuple[Stimulation, ...], tup
         stimulations.append(Stimulation(tuple(int(unit) for unit in chosen), tuple(values)))
         natural.append(tuple(would))
     return tuple(stimulations), tuple(natural)
-
-
-def _endings(found: Rows) -> dict[int, str]:
-    if not len(found.steps):
-        return {}
-    return dict(zip(found.steps.tolist(), found.texts("TextLog:text"), strict=True))
-
-
-def _outcome(file: SessionFile) -> str:
-    values = file.properties(OUTCOME).get("outcome", [])
-    return values[0] if len(values) == 1 and isinstance(values[0], str) else ""

@@ -14,8 +14,9 @@ from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from pdtui.stimulation.maps import StimulationMap
+from pdtui.text import plain
 from pdtui.tui.palette import Palette, palette_of
-from pdtui.tui.text import key_name, plain
+from pdtui.tui.text import key_name
 
 _LATCHING = (
     "A key latches its behavior: it lasts until its period ends, or until the key of another behavior or the "

@@ -14,9 +14,10 @@ from textual.containers import Vertical
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
+from pdtui.text import plain
 from pdtui.tui.palette import THEME, Palette, palette_of
 from pdtui.tui.styles import PICKER
-from pdtui.tui.text import fit, plain
+from pdtui.tui.text import fit
 
 if TYPE_CHECKING:
     from pdtui.stimulation.library import ListedMap

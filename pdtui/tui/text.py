@@ -1,14 +1,13 @@
-"""Text on the screen: foreign text made harmless, numbers and keys made short."""
+"""Text on the screen: fitted into cells, numbers and keys made short."""
 
 from __future__ import annotations
-
-import unicodedata
-from functools import lru_cache
 
 from rich.cells import cell_len, set_cell_size
 from rich.segment import Segment
 from rich.style import Style
 from textual.strip import Strip
+
+from pdtui.text import plain
 
 _KEYS = {
     "up": "↑",
@@ -24,19 +23,6 @@ _KEYS = {
     "space": "space",
     "enter": "↵",
 }
-
-
-@lru_cache(maxsize=512)
-def plain(text: str) -> str:
-    """Text from a file without anything that a terminal would obey: control and formatting characters."""
-    return "".join(
-        " " if character in "\t\n" else "\N{REPLACEMENT CHARACTER}" if _obeyed(character) else character
-        for character in text
-    )
-
-
-def _obeyed(character: str) -> bool:
-    return unicodedata.category(character) in ("Cc", "Cf", "Cs", "Co", "Zl", "Zp")
 
 
 def fit(text: str, width: int) -> str:
@@ -74,17 +60,6 @@ def signed(value: float) -> str:
     """`number` with its sign always shown."""
     shown = number(value)
     return shown if shown.startswith("−") else f"+{shown}"
-
-
-def size_of(count: int) -> str:
-    """A file's size in words."""
-    if count < 1000:
-        return f"{count} B"
-    for unit in ("kB", "MB", "GB"):
-        if count < 999_950 or unit == "GB":
-            return f"{count / 1000:.1f} {unit}"
-        count //= 1000
-    raise AssertionError("the largest unit takes any size")
 
 
 def key_name(key: str) -> str:

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from pdtui.stimulation.latch import ActiveBehavior
+from pdtui.text import plain, size_of
 from pdtui.tui.camera import Camera, round_length
 from pdtui.tui.ownership import owners
 from pdtui.tui.sparkline import History, sparklines
-from pdtui.tui.text import fit, number, plain, signed, size_of, wrap_text
+from pdtui.tui.text import fit, number, signed, wrap_text
 from pdtui.tui.trail import MOST_POINTS, Trail
 from pdtui.tui.widgets.heat_strip import Grid, shares
 from tests.tui.recorded import drive_map

@@ -9,9 +9,10 @@ from rich.cells import cell_len
 from textual.strip import Strip
 
 from pdtui.teleop.snapshot import Snapshot
+from pdtui.text import plain
 from pdtui.tui.panel import Panel
 from pdtui.tui.sparkline import History, sparklines
-from pdtui.tui.text import Row, number, plain
+from pdtui.tui.text import Row, number
 
 _SECONDS = 12.0
 _ROWS_KEPT = 4096

@@ -8,8 +8,9 @@ from rich.cells import cell_len
 from rich.style import Style
 from textual.strip import Strip
 
+from pdtui.text import plain
 from pdtui.tui.panel import Panel
-from pdtui.tui.text import Row, key_name, number, plain, signed, wrap_text
+from pdtui.tui.text import Row, key_name, number, signed, wrap_text
 
 if TYPE_CHECKING:
     from pdtui.stimulation.latch import ActiveBehavior

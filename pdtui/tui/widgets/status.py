@@ -9,8 +9,9 @@ from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
+from pdtui.text import plain, size_of
 from pdtui.tui.panel import Panel
-from pdtui.tui.text import Row, number, plain, size_of
+from pdtui.tui.text import Row, number
 
 _NAME = 40
 Part = tuple[str, Style]

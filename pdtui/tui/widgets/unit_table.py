@@ -6,9 +6,10 @@ from rich.cells import cell_len
 from textual.strip import Strip
 
 from pdtui.policies.units import format_unit
+from pdtui.text import plain
 from pdtui.tui.ownership import owners
 from pdtui.tui.panel import Panel
-from pdtui.tui.text import Row, number, plain
+from pdtui.tui.text import Row, number
 
 _NUMBER = 8
 _ADDRESS = 8
