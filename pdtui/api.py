@@ -218,7 +218,11 @@ def drive(
 
 
 def replay(
-    session: str | Path, *, robot: Robot | None = None, policy: str | Path | nn.Module | Policy | None = None
+    session: str | Path,
+    *,
+    robot: Robot | None = None,
+    policy: str | Path | nn.Module | Policy | None = None,
+    **judging: Any,
 ) -> ReplayResult:
     """Run a session again and compare every step.
 
@@ -233,6 +237,7 @@ def replay(
         session: the file.
         robot: where the session's is not known by its name.
         policy: where the session's is not where its map says.
+        judging: `strict`, `tolerance`, `horizon`, `force`; see `pdtui.teleop.replay.replay_session`.
 
     Raises:
         PdtuiError: the session cannot be read, or robot or policy cannot be had.
@@ -240,4 +245,4 @@ def replay(
     if isinstance(policy, nn.Module):
         policy = load_policy(policy, robot)
     given = policy if isinstance(policy, Policy) else str(policy or "")
-    return replay_session(Path(session), policy=given, robot=robot)
+    return replay_session(Path(session), policy=given, robot=robot, **judging)

@@ -12,6 +12,7 @@ from pdtui.cli.common import OneLineErrors
 from pdtui.cli.drawing import figure
 from pdtui.cli.driving import drive, pick_and_drive, replay
 from pdtui.cli.measuring import bench, convert, dissect, evaluate, train
+from pdtui.cli.sessions import sessions
 
 
 @click.group(cls=OneLineErrors, invoke_without_command=True)
@@ -26,5 +27,5 @@ def main(ctx: click.Context) -> None:
         pick_and_drive()
 
 
-for command in (drive, replay, evaluate, dissect, figure, convert, train, bench):
+for command in (drive, replay, sessions, evaluate, dissect, figure, convert, train, bench):
     main.add_command(command)

@@ -14,6 +14,7 @@ import click
 
 from pdtui.errors import PdtuiError
 from pdtui.policies.choices import ACTIVATION_NAMES, NO_CHOICES, SQUASH_NAMES, PolicyChoices
+from pdtui.text import plain
 
 if TYPE_CHECKING:
     from pdtui.teleop.order import DriveOrder
@@ -26,7 +27,7 @@ class OneLineErrors(click.Group):
         try:
             return super().invoke(ctx)
         except PdtuiError as error:
-            click.echo(f"pdtui: {error}", err=True)
+            click.echo(f"pdtui: {plain(str(error))}", err=True)  # it may quote a file
             ctx.exit(1)
 
 
@@ -87,6 +88,30 @@ def policy_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return click.option("--policy", default="", help="Weights to use instead of the map's.")(
         choice_options(command)
     )
+
+
+def judging_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """``--tolerance`` and ``--strict``, given to the command as `judging`."""
+
+    @wraps(command)
+    def judged(*args: Any, tolerance: float | None, strict: bool, **others: Any) -> Any:
+        judging: dict[str, Any] = {"strict": strict}
+        if tolerance is not None:
+            judging["tolerance"] = tolerance
+        return command(*args, judging=judging, **others)
+
+    for option in (
+        click.option("--strict", is_flag=True, help="Accept nothing but the same bits, wherever this runs."),
+        click.option(
+            "--tolerance",
+            type=click.FloatRange(0),
+            metavar="SPREADS",
+            help="On another machine or other versions, attributes may be off by this many standard "
+            "deviations of the session in its first 2 s.  [default: 1e-06]",
+        ),
+    ):
+        judged = option(judged)
+    return judged
 
 
 def order_of_drive(

@@ -6,13 +6,21 @@ import sys
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from pdtui.cli.common import force_option, map_option, order_of_drive, policy_options, progress_bar_or_none
+from pdtui.cli.common import (
+    force_option,
+    judging_options,
+    map_option,
+    order_of_drive,
+    policy_options,
+    progress_bar_or_none,
+)
 from pdtui.errors import EventError, ScreenError, SessionError
 from pdtui.policies.choices import PolicyChoices
+from pdtui.text import plain
 
 if TYPE_CHECKING:
     from pdtui.teleop.order import DriveOrder
@@ -69,8 +77,9 @@ def drive(
 @click.argument("session", type=click.Path(path_type=Path))
 @click.option("--watch", is_flag=True, help="Show it on the screen.")
 @click.option("--policy", default="", help="The session's weights, where they are elsewhere now.")
-def replay(session: Path, watch: bool, policy: str) -> None:
-    """Run SESSION again and compare every step; exit with 1 at the first that differs."""
+@judging_options
+def replay(session: Path, watch: bool, policy: str, judging: dict[str, Any]) -> None:
+    """Run SESSION again and compare every step; exit with 1 if it does not repeat."""
     from pdtui.teleop.replay import order_of, replay_session
 
     if watch:
@@ -79,14 +88,14 @@ def replay(session: Path, watch: bool, policy: str) -> None:
         _show(order_of(read_session(session), str(session), policy), fps=12, watching=True)
         return
     with progress_bar_or_none("replaying") as advance:
-        result = replay_session(session, policy=policy, progress=advance)
-    if result.first_difference is None:
-        click.echo(f"identical: {result.steps} steps")
-        return
-    click.echo(f"differs: step {result.first_difference} of {session}: {result.detail}", err=True)
-    for line in result.environment:
-        click.echo(f"  {line}", err=True)
-    sys.exit(1)
+        result = replay_session(session, policy=policy, progress=advance, **judging)
+    click.echo(plain(result.verdict), err=not result.passed)
+    if not result.identical:
+        lines = [*(str(deviation) for deviation in result.deviations[:5]), *result.environment]
+        for line in lines:
+            click.echo(f"  {plain(line)}", err=True)
+    if not result.passed:
+        sys.exit(1)
 
 
 def _new_session(order: DriveOrder) -> Path:

@@ -29,6 +29,7 @@ class SessionFile:
         only: components of the drive to keep; all if empty.
         skip: components of the drive to leave out.
         torn: read up to the first chunk that cannot be read, instead of raising.
+        called: what errors call the file, where `path` is a copy.
 
     Attributes:
         recording_id: of the recording.
@@ -39,14 +40,21 @@ class SessionFile:
     """
 
     def __init__(
-        self, path: Path, *, only: Sequence[str] = (), skip: Sequence[str] = (), torn: bool = False
+        self,
+        path: Path,
+        *,
+        only: Sequence[str] = (),
+        skip: Sequence[str] = (),
+        torn: bool = False,
+        called: Path | None = None,
     ) -> None:
+        called = called or path
         self._batches: dict[str, list[pa.RecordBatch]] = {}
         self._properties: dict[str, dict[str, list[Any]]] = {}
         self.complete = True
-        self._reader, self.recording_id = _open(path)
+        self._reader, self.recording_id = _open(path, called)
         try:
-            for chunk in _chunks(self._reader, path):
+            for chunk in _chunks(self._reader, called):
                 self._take(chunk, only, skip)
         except SessionError:
             if not torn:
@@ -93,23 +101,23 @@ def readable_chunks(path: Path) -> Iterator[Chunk]:
     Raises:
         SessionError: no such file, not a recording, or another program's.
     """
-    reader, _ = _open(path)
+    reader, _ = _open(path, path)
     try:
         yield from _chunks(reader, path)
     except SessionError:
         return
 
 
-def _open(path: Path) -> tuple[RrdReader, str]:
-    _check_magic(path)
-    with _reading(path):
+def _open(path: Path, called: Path) -> tuple[RrdReader, str]:
+    _check_magic(path, called)
+    with _reading(called):
         reader = RrdReader(path)
         stores = reader.recordings()
     if not stores:
-        raise SessionError(f"{path}: holds no recording")
+        raise SessionError(f"{called}: holds no recording")
     if stores[0].application_id != APP:
         raise SessionError(
-            f"{path}: expected a recording of {APP}, found one of '{stores[0].application_id[:60]}'"
+            f"{called}: expected a recording of {APP}, found one of '{stores[0].application_id[:60]}'"
         )
     return reader, stores[0].recording_id
 
@@ -125,16 +133,16 @@ def _chunks(reader: RrdReader, path: Path) -> Iterator[Chunk]:
         yield chunk
 
 
-def _check_magic(path: Path) -> None:
+def _check_magic(path: Path, called: Path) -> None:
     try:
         with path.open("rb") as handle:
             magic = handle.read(len(_MAGIC))
     except FileNotFoundError:
-        raise SessionError(f"{path}: no such file") from None
+        raise SessionError(f"{called}: no such file") from None
     except OSError as error:
-        raise SessionError(f"{path}: cannot be read: {error.strerror}") from error
+        raise SessionError(f"{called}: cannot be read: {error.strerror}") from error
     if magic != _MAGIC:
-        raise SessionError(f"{path}: expected a Rerun recording (.rrd), found another kind of file")
+        raise SessionError(f"{called}: expected a Rerun recording (.rrd), found another kind of file")
 
 
 @contextmanager

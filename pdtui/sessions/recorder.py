@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, cast
 
-import pyarrow as pa
 import rerun as rr
-from rerun.recording_stream import is_enabled
 
 from pdtui.errors import SessionError
-from pdtui.sessions.blueprint import layout
 from pdtui.sessions.columns import Column, indexes
 from pdtui.sessions.properties import info_to_properties
 from pdtui.sessions.record import DriveInfo, StepRecord
 from pdtui.sessions.rows import drive_columns, ending_columns, event_columns
-from pdtui.sessions.schema import APP, DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
+from pdtui.sessions.schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
 from pdtui.sessions.versions import environment_versions
 from pdtui.sessions.views import Views
+from pdtui.sessions.writing import errors_named, open_recording, send_property
 
 _VIEW_ROWS = 32
 _SAFE_ROWS = 16
 """Batches up to this length are waited for; a wait costs 0.5 ms, on a busy machine more."""
-_ARROW_TYPES = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.utf8()}
 
 
 class SessionRecorder:
@@ -52,12 +49,7 @@ class SessionRecorder:
         self._rows: list[StepRecord] = []
         self._events = 0
         self._closed = False
-        with self._errors_named():
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._recording = rr.RecordingStream(APP)
-            if not is_enabled(self._recording):
-                raise SessionError(f"{self.path}: cannot be written: the environment says RERUN=off")
-            self._recording.set_sinks(rr.FileSink(self.path), default_blueprint=layout(info))
+        self._recording = open_recording(self.path, info)
         self._write_start()
         self._views = Views(info, self._send, self._log_static)
         self._send_off()
@@ -160,12 +152,8 @@ class SessionRecorder:
             rr.log(entity, archetype, static=True, recording=self._recording, strict=True)
 
     def _property(self, name: str, values: dict[str, Any]) -> None:
-        arrays = {}
-        for key, value in values.items():
-            items = value if isinstance(value, list) else [value]
-            arrays[key] = pa.array(items, _ARROW_TYPES[type(items[0])])
         with self._errors_named():
-            self._recording.send_property(name, rr.AnyValues(**arrays))
+            send_property(self._recording, name, values)
 
     def _send_off(self, *, wait: bool = True) -> None:
         """Hand everything to the operating system, where it outlives this process."""
@@ -175,11 +163,5 @@ class SessionRecorder:
             else:
                 self._recording.flush(timeout_sec=0.0)
 
-    @contextmanager
-    def _errors_named(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise SessionError(f"{self.path}: cannot be written: {error.strerror}") from error
-        except RuntimeError as error:
-            raise SessionError(f"{self.path}: cannot be written: {error}") from error
+    def _errors_named(self) -> AbstractContextManager[None]:
+        return errors_named(self.path)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import platform
+import sys
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -10,6 +12,8 @@ from pathlib import Path
 import numpy as np
 
 PACKAGES = ("pdtui", "mujoco", "gymnasium", "torch", "numpy", "simple-pid", "rerun-sdk")
+COMPUTES_NOTHING = ("system", "rerun-sdk")
+"""What may differ without any number of a run being computed in another way."""
 
 
 def environment_versions() -> dict[str, str]:
@@ -23,6 +27,7 @@ def environment_versions() -> dict[str, str]:
         "machine": platform.machine(),
         "cpu": _cpu_name(),
         "blas": _blas_name(),
+        "kernels": _kernels_name(),
     }
     for package in PACKAGES:
         try:
@@ -46,6 +51,13 @@ def differences(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
     ]
 
 
+def differences_that_compute(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
+    """Those of `differences` that can change a bit of a run."""
+    return differences(
+        *({name: value for name, value in one.items() if name not in COMPUTES_NOTHING} for one in (a, b))
+    )
+
+
 def _cpu_name() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
@@ -58,4 +70,12 @@ def _cpu_name() -> str:
 def _blas_name() -> str:
     config = np.show_config(mode="dicts")
     blas = config.get("Build Dependencies", {}).get("blas", {}) if isinstance(config, dict) else {}
-    return f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip()
+    name = f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip()
+    chosen = os.environ.get("OPENBLAS_CORETYPE")  # another processor's instructions sum in another order
+    return f"{name}, {chosen}" if chosen else name
+
+
+def _kernels_name() -> str:
+    """The instructions that torch computes with: they decide in which order a policy sums."""
+    torch = sys.modules.get("torch")  # nothing is computed by it where it is not loaded
+    return torch.backends.cpu.get_cpu_capability() if torch is not None else "none"

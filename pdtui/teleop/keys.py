@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from pdtui.errors import EventError
@@ -105,6 +106,14 @@ def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, li
     return presses
 
 
-def write_keystrokes(events: tuple[Event, ...]) -> str:
-    """The key presses among events as the text of a keystroke file."""
-    return "".join(f"{event.step} {event.key}\n" for event in events if event.key)
+def write_keystrokes(events: Iterable[Event]) -> str:
+    """The key presses among events as the text of a keystroke file.
+
+    Raises:
+        EventError: a key is no single word, so that the file would say something else.
+    """
+    pressed = [event for event in events if event.key]
+    for event in pressed:
+        if _LINE.fullmatch(f"{event.step} {event.key}") is None or "#" in event.key:
+            raise EventError(f"step {event.step}: {event.key[:40]!r} is no name of a key")
+    return "".join(f"{event.step} {event.key}\n" for event in pressed)

@@ -1,0 +1,137 @@
+"""The tables of `pdtui sessions`. Text from files goes into them as it is, with nothing to obey in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from pdtui.sessions.compare import Comparison, Deviation
+from pdtui.sessions.events import Event
+from pdtui.sessions.reader import Session
+from pdtui.sessions.summary import SessionSummary
+from pdtui.text import plain, size_of
+
+
+def _cell(text: object, style: str = "") -> Text:
+    return Text(plain(str(text)), style)
+
+
+def _table(*columns: str, left: Sequence[str] = ()) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for column in columns:
+        table.add_column(column, justify="left" if column in left else "right", overflow="fold")
+    return table
+
+
+def list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
+    """One row a file; a broken one says why, across the other columns."""
+    table = _table(
+        "session", "robot", "length", "keys", "size", "outcome", left=("session", "robot", "outcome")
+    )
+    for row in rows:
+        name, size = _cell(Path(row["path"]).relative_to(folder)), size_of(row["bytes"])
+        if row["broken"]:
+            table.add_row(name, "", "", "", size, _cell(f"broken: {row['broken']}", "red"))
+            continue
+        table.add_row(
+            name,
+            _cell(row["robot"]),
+            f"{row['seconds']:.1f} s",
+            str(row["keys"]),
+            size,
+            _cell(row["outcome"]) if row["outcome"] else _cell("cut off: no outcome", "yellow"),
+        )
+    return table
+
+
+def show_table(session: Session, summary: SessionSummary) -> Any:
+    """Who drove what, key by key, and what it came to."""
+    info = session.info
+    facts = Table(box=None, pad_edge=False, show_header=False)
+    for name, value in (
+        ("session", session.path),
+        ("robot", info.robot),
+        ("policy", f"{info.policy}, SHA-256 {info.policy_hash[:12]}…"),
+        ("layers", " ".join(map(str, info.layers))),
+        ("map", f"{len(info.map_text.splitlines())} lines, inside the session"),
+        ("seed", f"{info.seed}{', actions drawn at random' if info.stochastic else ''}"),
+        ("driven", session.created),
+        ("outcome", session.outcome or "none: the file was cut off"),
+        *session.versions.items(),
+    ):
+        facts.add_row(Text(plain(str(name)), "dim"), _cell(value))
+    figures = Table(box=None, pad_edge=False, show_header=False)
+    for name, value in (
+        ("length", f"{summary.steps} steps, {summary.seconds:g} s"),
+        ("episodes", f"{summary.episodes}, of which {summary.falls} ended by themselves"),
+        ("human involvement", f"{summary.involvement} steps with a key"),
+        ("stimulated", f"{summary.stimulated} steps"),
+        ("return", f"{summary.total_reward:.2f}"),
+        ("cost", f"{summary.total_cost:.2f}"),
+    ):
+        figures.add_row(Text(name, "dim"), value)
+    attributes = _table("attribute", "mean", "std", "unit", left=("attribute", "unit"))
+    for row in summary.attributes:
+        attributes.add_row(_cell(row.attribute), f"{row.mean:.3f}", f"{row.std:.3f}", _cell(row.unit))
+    return Group(facts, "", figures, "", attributes, "", _happened(session))
+
+
+def _happened(session: Session) -> Table:
+    """Events and endings in the order of their steps."""
+    table = _table("time", "step", "key", "what", left=("key", "what"))
+    rows = [(event.step, 0, event.key, _told(event)) for event in session.events]
+    rows += [(step, 1, "", f"episode ended: {reason}") for step, reason in session.endings.items()]
+    for step, _, key, what in sorted(rows, key=lambda row: row[:2]):
+        table.add_row(f"{step * session.info.dt:.2f} s", str(step), _cell(key), _cell(what))
+    return table
+
+
+def _told(event: Event) -> str:
+    return {
+        "behavior": event.name,
+        "default": "default",
+        "target": f"{event.name}: target {event.value:g}",
+        "factor": f"{event.name}: magnitudes × {event.value:g}",
+        "reset": "next episode",
+        "rewind": f"rewind to step {event.value:.0f}",
+    }[event.kind]
+
+
+def deviation_table(deviations: Sequence[Deviation]) -> Table:
+    """One row an attribute that differs."""
+    table = _table("attribute", "at first", "mean", "largest", "step", "unit", left=("attribute", "unit"))
+    for row in deviations:
+        table.add_row(
+            _cell(row.attribute),
+            f"{row.first:.3g}",
+            f"{row.mean:.3g}",
+            f"{row.largest:.3g}",
+            str(row.step),
+            _cell(row.unit),
+        )
+    return table
+
+
+def compare_table(result: Comparison) -> Any:
+    """The first step that differs, and how far attributes are apart after it."""
+    parts: list[Any] = [_cell(compare_line(result))]
+    if result.first_event:
+        parts.append(_cell(result.first_event))
+    if result.deviations:
+        parts += ["", deviation_table(result.deviations)]
+    if result.circumstances:
+        parts += ["", *(_cell(line, "dim") for line in result.circumstances)]
+    return Group(*parts)
+
+
+def compare_line(result: Comparison) -> str:
+    lengths = result.lengths
+    tail = "" if lengths[0] == lengths[1] else f"; they have {lengths[0]} and {lengths[1]} steps"
+    if result.first_difference is None:
+        return f"identical: {result.steps} steps{tail}"
+    return f"differ from step {result.first_difference} of {result.steps} on{tail}"

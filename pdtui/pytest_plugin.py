@@ -1,0 +1,103 @@
+"""Recorded drives as regression tests of a policy.
+
+The plugin comes with the package: pytest finds it by itself. Drive once, keep the session beside the tests,
+and every later run repeats the drive and compares it step by step.
+
+Example::
+
+    # test_walk.py
+    def test_my_policy_still_walks(pdtui_session):
+        pdtui_session("sessions/walk.rrd", policy="my_policy.safetensors")
+
+A test fails with the first step that differs and how far each attribute is off. On the machine and with
+the versions that recorded the session, every bit must be the same. Elsewhere, the attributes have to agree
+for the first seconds (see `pdtui.teleop.replay.TOLERANCE`); ``strict=True`` asks for the same bits there.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import pytest
+
+if TYPE_CHECKING:
+    from torch import nn
+
+    from pdtui.policies.runtime import Policy
+    from pdtui.robots.base import Robot
+    from pdtui.teleop.replay import ReplayResult
+
+_SHOWN = 8
+
+
+class SessionCheck(Protocol):
+    """What the fixture `pdtui_session` offers."""
+
+    def __call__(
+        self,
+        session: str | Path,
+        *,
+        policy: str | Path | nn.Module | Policy | None = None,
+        robot: Robot | None = None,
+        strict: bool = False,
+        **tolerance: float,
+    ) -> ReplayResult: ...
+
+
+@pytest.fixture
+def pdtui_session(request: pytest.FixtureRequest) -> SessionCheck:
+    """Repeat a recorded drive; the test fails with the first step that differs.
+
+    The value is called with
+
+    - the session: a path from the test's own folder, from pytest's root folder, or absolute;
+    - ``policy``: a weights file (found like the session), a shipped name, or a live network; by default the
+      session's own. Other weights than the session's are run and compared all the same;
+    - ``robot``: where the session's is not known by its name;
+    - ``strict``, ``tolerance``, ``horizon``: as for `pdtui.teleop.replay.replay_session`;
+
+    and returns the `ReplayResult` of a drive that repeats.
+    """
+    folders = (request.path.parent, request.config.rootpath)
+
+    def check(
+        session: str | Path,
+        *,
+        policy: str | Path | nn.Module | Policy | None = None,
+        robot: Robot | None = None,
+        strict: bool = False,
+        **tolerance: float,
+    ) -> ReplayResult:
+        # Only a test that asks for a drive pays for torch and the simulator.
+        from pdtui.api import replay
+        from pdtui.errors import PdtuiError
+
+        path = _find(session, folders)
+        if isinstance(policy, str | Path):
+            policy = _find(policy, folders)
+        try:
+            result = replay(path, robot=robot, policy=policy, strict=strict, force=True, **tolerance)
+        except PdtuiError as error:
+            pytest.fail(f"{path}: cannot be replayed: {error}", pytrace=False)
+        if not result.passed:
+            pytest.fail(_report(path, result), pytrace=False)
+        return result
+
+    return check
+
+
+def _find(name: str | Path, folders: tuple[Path, ...]) -> Path:
+    """The file of that name in the first folder that has it; the name itself where none has."""
+    return next((folder / name for folder in folders if (folder / name).exists()), Path(name))
+
+
+def _report(path: Path, result: Any) -> str:
+    lines = [f"{path}: {result.verdict}", *(f"  {line}" for line in result.deviations[:_SHOWN])]
+    more = len(result.deviations) - _SHOWN
+    if more > 0:
+        lines.append(f"  and {more} more attributes")
+    if result.stopped:
+        lines.append(f"  the replay stopped at {result.stopped}")
+    lines += [f"  {line}" for line in result.environment]
+    return "\n".join(lines)

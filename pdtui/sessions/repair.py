@@ -1,0 +1,129 @@
+"""Rescue what can be read of a session whose end is missing or cut."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow.compute as pc
+from rerun.chunk import Chunk
+
+from pdtui.errors import SessionError
+from pdtui.sessions.file import SessionFile, readable_chunks
+from pdtui.sessions.frames import without_torn_tail
+from pdtui.sessions.heading import Heading, read_heading
+from pdtui.sessions.properties import info_from_properties
+from pdtui.sessions.record import DriveInfo
+from pdtui.sessions.schema import DIGEST_EPISODE, DRIVE, INFO, OUTCOME, STEP
+from pdtui.sessions.writing import errors_named, open_recording, send_property
+
+_CHUNKS_A_FLUSH = 64
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is left of a session.
+
+    Attributes:
+        info: what determines the run.
+        steps: control steps from the first to the last before a gap, or before the first broken chunk.
+        outcome: how the drive ended; empty if the file does not say.
+        recording_id: that the viewer knows it by.
+        whole: nothing is missing: every chunk can be read, no step is missing, outcome and footer are there.
+    """
+
+    info: DriveInfo
+    steps: int
+    outcome: str
+    recording_id: str
+    whole: bool
+
+
+def examine(path: Path) -> Condition:
+    """Read as far as it goes and see what is there.
+
+    Raises:
+        SessionError: no session, or cut before everything that determines the run was written.
+    """
+    with without_torn_tail(path) as readable:
+        file = SessionFile(readable, only=(DIGEST_EPISODE,), torn=True, called=path)
+        finished = readable == path and file.complete and file.has_footer()
+    try:
+        info, _ = info_from_properties(file.properties(INFO))
+        steps = file.rows(DRIVE).steps
+    except SessionError as error:
+        raise SessionError(f"{path}: nothing can be rescued: {error}") from error
+    gaps = np.flatnonzero(steps != np.arange(len(steps)))
+    kept = int(gaps[0]) if gaps.size else len(steps)
+    said = file.properties(OUTCOME).get("outcome", [])
+    outcome = said[0] if len(said) == 1 and isinstance(said[0], str) else ""
+    whole = finished and not gaps.size and bool(outcome)
+    return Condition(info, kept, outcome, file.recording_id, whole)
+
+
+def repair_session(path: Path, output: Path) -> Heading:
+    """Write what can be read of a session as a whole one; never more than a few chunks are in memory.
+
+    Everything after the last step without a gap is left out. The outcome becomes ``repaired: cut at step N``,
+    unless the file still says how the drive ended. The output appears when it is whole, and not before.
+
+    Args:
+        path: the session.
+        output: the repaired one; it may be `path`, which is then replaced.
+
+    Raises:
+        SessionError: nothing can be rescued, or the output cannot be written.
+    """
+    condition = examine(path)
+    permissions = path.stat().st_mode & 0o777
+    target = output.resolve()  # what a link points to is replaced, not the link
+    with errors_named(output):
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".rrd")
+        os.close(handle)
+    beside = Path(name)
+    try:
+        with without_torn_tail(path) as readable:
+            _rewrite(readable, beside, condition)
+        repaired = read_heading(beside)
+        if repaired.steps != condition.steps:
+            raise SessionError(f"{path}: {condition.steps} steps were there, {repaired.steps} were rescued")
+        with errors_named(output):
+            beside.chmod(permissions)
+            beside.replace(target)
+    finally:
+        beside.unlink(missing_ok=True)
+    return read_heading(output)
+
+
+def _rewrite(path: Path, output: Path, condition: Condition) -> None:
+    recording = open_recording(output, condition.info, condition.recording_id)
+    try:
+        with errors_named(output):
+            for number, chunk in enumerate(_kept(path, condition.steps)):
+                recording.send_chunks(chunk)
+                if number % _CHUNKS_A_FLUSH == 0:
+                    recording.flush()
+            if not condition.outcome:
+                send_property(recording, OUTCOME, {"outcome": f"repaired: cut at step {condition.steps}"})
+            recording.flush()
+    finally:
+        recording.disconnect()
+
+
+def _kept(path: Path, steps: int) -> Iterator[Chunk]:
+    """Chunks without the rows of later steps: a batch's events and views may be there without its drive."""
+    for chunk in readable_chunks(path):
+        if STEP not in chunk.timeline_names:
+            yield chunk
+            continue
+        batch = chunk.to_record_batch()
+        early = pc.less(batch.column(STEP), steps)
+        count = pc.sum(early).as_py() or 0
+        if count == batch.num_rows:
+            yield chunk
+        elif count:
+            yield from Chunk.from_record_batch(batch.filter(early))

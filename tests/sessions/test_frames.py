@@ -1,0 +1,28 @@
+"""Where messages end: cuts are found at every byte."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pdtui.sessions.frames import whole_length, without_torn_tail
+from tests.sessions.conftest import Recorded
+
+
+def test_a_whole_file_is_not_copied(recorded: Recorded) -> None:
+    with without_torn_tail(recorded[0]) as readable:
+        assert readable == recorded[0]
+
+
+def test_a_cut_file_ends_with_its_last_whole_message(recorded: Recorded, tmp_path: Path) -> None:
+    data = recorded[0].read_bytes()
+    path, ends = tmp_path / "cut.rrd", set()
+    for size in (*range(0, len(data), len(data) // 50), len(data) - 33, len(data) - 1):
+        path.write_bytes(data[:size])
+        length = whole_length(path)
+        assert length <= size
+        ends.add(length)
+        with without_torn_tail(path) as readable:
+            assert readable.read_bytes() == data[:length]
+    assert len(ends) > 20
+    path.write_bytes(data + b"more")
+    assert whole_length(path) < len(data)
