@@ -174,7 +174,8 @@ def test_text_from_files_is_harmless(map_path: Path, tmp_path: Path) -> None:
     with SessionRecorder(tmp_path / "evil.rrd", loop.info) as recorder:
         recorder.write(loop.advance())
         recorder.close("\x1b[2J\x1b]0;owned\x07[bold]finished[/bold]")
-    for command in (["list", tmp_path], ["show", tmp_path / "evil.rrd"]):
+    commands: list[list[str | Path]] = [["list", tmp_path], ["show", tmp_path / "evil.rrd"]]
+    for command in commands:
         output = run("sessions", *command).output
         assert "\x1b" not in output
         assert "\x07" not in output

@@ -27,8 +27,9 @@ TOLERANCE = 1e-6
 Measured with the shipped Ant policy: 11 drives of 8 s and more, computed with AVX-512 and again as an older
 processor would (OPENBLAS_CORETYPE=Nehalem, ATEN_CPU_CAPABILITY=default). Two of them left other bits. In
 those, attributes stay within 1e-10 for 2 s and within 1e-6 for 3.6 s; then contacts amplify the last bits,
-and a drive may have nothing to do with its session after 6 s. A change that is meant is larger at once: weights changed by 1e-5 of
-themselves move an attribute by more than 1e-5 in the first two steps of each of 10 drives.
+and a drive may have nothing to do with its session after 6 s. A change that is meant is larger at once:
+weights changed by 1e-5 of themselves move an attribute by more than 1e-5 in the first two steps of each of 10
+drives.
 """
 
 HORIZON = 2.0
