@@ -23,6 +23,8 @@ _MARGIN = (60.0, 30.0, 34.0, 56.0)
 _TICK = 6.0
 _LETTER, _LINE = 6.5, 18.0
 """Size of a letter where the view is as large as the frame; a label hangs below its point."""
+_FILLED = 8
+"""Lines that fill a bar."""
 _INK, _FAINT = (160, 160, 160), (75, 75, 75)
 
 
@@ -161,10 +163,19 @@ class Axes:
         self._log(f"{self.entity}/axes/level_{value:g}", zero)
 
     def level_bars(self, name: str, y: Floats, lengths: Floats, colors: Sequence[Color]) -> None:
-        """Bars from 0 to the right, in cells of height 1."""
-        thick = 0.38 * self._height / (self._y.high - self._y.low)
-        strips = np.stack([self.place(np.zeros(len(y)), y), self.place(lengths, y)], axis=1)
-        self._log(f"{self.entity}/{name}", rr.LineStrips2D(list(strips), colors=colors, radii=thick))
+        """Bars from 0 to the right, in cells of height 1.
+
+        A box of the viewer is hollow and a thick line has round ends, which would lengthen a bar by its own
+        thickness: each bar is filled with thin lines instead.
+        """
+        cell = self._height / (self._y.high - self._y.low)
+        thin = 0.38 * cell / _FILLED
+        down = np.linspace(thin - 0.38 * cell, 0.38 * cell - thin, _FILLED)
+        bars = np.stack([self.place(np.zeros(len(y)), y), self.place(lengths, y)], axis=1)
+        strips = bars[:, None] + np.stack([np.zeros(_FILLED), down], axis=1)[:, None]
+        every = [color for color in colors for _ in range(_FILLED)]
+        lines = rr.LineStrips2D(list(strips.reshape(-1, 2, 2)), colors=every, radii=thin)
+        self._log(f"{self.entity}/{name}", lines)
 
     def heat_map(self, cells: Floats, low: float, high: float) -> None:
         """Values as colours, from top to bottom and left to right, shape (rows, columns)."""

@@ -55,8 +55,12 @@ def test_bars_are_the_discrepancies(dissection: Dissection, entities: Entities) 
         assert bars["unit"] == [format_unit(int(unit), dissection.layers) for unit in nearest]
         np.testing.assert_array_equal(bars["discrepancy"], dissection.matching.discrepancy[column, nearest])
         # Drawn lengths, from the ends of the strips, are in proportion.
-        strips = np.array(bars["LineStrips2D:strips"])
-        lengths = strips[:, 1, 0] - strips[:, 0, 0]
+        strips = np.array(bars["LineStrips2D:strips"]).reshape(len(nearest), -1, 2, 2)
+        lengths = strips[:, 0, 1, 0] - strips[:, 0, 0, 0]
+        assert (strips[:, :, 0, 0] == 0).all()
+        thickness = np.ptp(strips[..., 1], axis=(1, 2)) + 2 * bars["LineStrips2D:radii"][0]
+        assert lengths.min() >= 0
+        np.testing.assert_allclose(thickness, 0.76 * 240 / len(nearest), rtol=1e-5)
         np.testing.assert_allclose(
             lengths / lengths[-1], np.array(bars["discrepancy"]) / bars["discrepancy"][-1], rtol=1e-5
         )
