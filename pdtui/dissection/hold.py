@@ -169,7 +169,7 @@ class HoldSearch:
             base = _rounded((up + down) / 2)
             found += [
                 _Candidate(weights, base, self._pid(limit, gain, ki))
-                for limit in (1.0, 1.5)
+                for limit in (1.0, 1.5, 3.0)
                 for gain in (1.0, 2.0, 4.0)
                 for ki in self._integral
             ]

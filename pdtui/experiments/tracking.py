@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.errors import MapError
-from pdtui.experiments.evaluate import confidence_interval
+from pdtui.experiments.evaluate import STIMULATED_FROM, confidence_interval
 from pdtui.robots.geometry import wrap_angle
 from pdtui.sessions.events import Event
 from pdtui.teleop.drive import build_loop
@@ -67,6 +67,8 @@ def evaluate_tracking(
     progress: Callable[[int, int], None] | None = None,
 ) -> Tracking:
     """Set the targets one after the other, 100 control steps each, on every seed.
+
+    As with fixed behaviors, the policy walks for `STIMULATED_FROM` steps before it is touched.
 
     Raises:
         MapError: the map has no behavior of mode ``pid`` for the attribute.
@@ -130,6 +132,9 @@ def _follow(
     """|error| by target and step, NaN after a fall; an empty name leaves the policy alone."""
     loop = ControlLoop(built.robot, built.policy, built.map, seed)
     wraps = built.robot.attributes[column].wraps
+    for _ in range(STIMULATED_FROM):
+        if loop.advance().ended:
+            return np.full((len(targets), STEPS_EACH), np.nan), True
     errors = np.full((len(targets), STEPS_EACH), np.nan)
     for row, target in enumerate(targets):
         for column_step in range(STEPS_EACH):
