@@ -107,6 +107,9 @@ def evaluate(
     "-o", "--output", type=click.Path(path_type=Path), help="The map; default: maps/ROBOT-dissected.toml."
 )
 @click.option(
+    "--quick", is_flag=True, help="A first look, for about a minute: fewer probes, and hardly a search."
+)
+@click.option(
     "--report",
     type=click.Path(path_type=Path),
     metavar="FILE.rrd",
@@ -137,6 +140,7 @@ def dissect(
     episodes: int,
     seed: int,
     output: Path | None,
+    quick: bool,
     report: Path | None,
     figures: Path | None,
     overwrite: bool,
@@ -150,6 +154,7 @@ def dissect(
     Interrupted, the same line goes on where it was.
     """
     from pdtui.dissection.command import dissect_to_map
+    from pdtui.dissection.effort import QUICK
     from pdtui.pictures.wanted import Wanted
     from pdtui.robots import check_robot, file_stem, trust_module
 
@@ -175,6 +180,7 @@ def dissect(
             workers=cores(workers),
             budget_minutes=budget,
             start_from=start_from,
+            effort=QUICK if quick else None,
             progress=advance,
         )
     written = [str(path) for path in wanted.draw(result.dissection)]

@@ -153,7 +153,7 @@ class Search:
 
     @property
     def _sign(self) -> float:
-        return 1.0 if self._goal.aim.direction == "increase" else -1.0
+        return self._goal.aim.sign
 
     def _child(self, source: Candidates, most: int) -> Stimulation:
         """A changed or crossed elite that was not tried before."""

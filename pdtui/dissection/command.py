@@ -11,6 +11,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from pdtui.dissection.dissect import dissect
+from pdtui.dissection.effort import Effort
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.propose import propose
 from pdtui.dissection.report import render
@@ -53,6 +54,7 @@ def dissect_to_map(
     workers: int,
     budget_minutes: float | None,
     start_from: str | None = None,
+    effort: Effort | None = None,
     progress: Callable[..., None] | None = None,
 ) -> Dissected:
     """Dissect a policy and write the map that its measurements propose.
@@ -81,6 +83,7 @@ def dissect_to_map(
         seed=seed,
         workers=workers,
         budget_minutes=budget_minutes,
+        effort=effort,
         progress=advance,
         journal=journal_of(output),
         start_from=None if start_from is None else load_map(find_map(start_from)),

@@ -10,18 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
-from pdtui.dissection.combine import Starts
 from pdtui.dissection.confirm import draw_controls, select_units
 from pdtui.dissection.effort import Effort
 from pdtui.dissection.excerpt import excerpt
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.journal import Journal
 from pdtui.dissection.matching import match
-from pdtui.dissection.monitor import Progress, Start, collect_starts, monitor
+from pdtui.dissection.monitor import Progress, monitor
 from pdtui.dissection.phase import correlate
 from pdtui.dissection.probe import Prober
 from pdtui.dissection.searches import Clock, Searches
 from pdtui.dissection.settings import find_preset
+from pdtui.dissection.starts import gather
 from pdtui.dissection.steer import movable, steer
 from pdtui.dissection.workers import Crew
 from pdtui.policies.choices import NO_CHOICES, PolicyChoices
@@ -87,11 +87,12 @@ def dissect(
         recorded = monitor(world, network, range(seed, seed + episodes), plan.steps, stage("monitor"))
         matching = match(recorded, world.attributes, spectrum)
         phase = correlate(recorded, world.attributes, spectrum)
-        pools = _starts(crew, plan, seed + 100)
+        starts = gather(crew, plan, seed + 100)
+        plan = starts.plan
         screen = prober.sweep(
             range(network.units),
             plan.screen_values,
-            pools[0],
+            starts.screen,
             steps=plan.screen_steps,
             progress=stage("screen every unit"),
         )
@@ -100,25 +101,24 @@ def dissect(
         refined = prober.sweep(
             sorted({*chosen, *controls}),
             plan.refine_values,
-            pools[1],
+            starts.refine,
             steps=plan.refine_steps,
             progress=stage("refine the best"),
         )
-        starts = Starts(*pools[2:])
         spread = np.concatenate([episode.attributes for episode in recorded]).std(axis=0)
+        columns = movable(world.attributes, recorded)
         steered = steer(
             prober,
-            movable(world.attributes, spread),
+            columns,
             spread,
             screen,
             refined,
-            starts.held_out,
-            plan.refine_steps,
+            starts.searches.held_out,
+            plan,
+            stage("up and down"),
         )
         searches = Searches(prober, world, plan, seed, Clock(began, budget_minutes), stage, known)
-        pool = searches.pool(starts)
-        behaviors = searches.behaviors((screen, refined), pool, starts)
-        holds = searches.holds(refined, pool, starts)
+        behaviors, holds = searches.run(screen, refined, starts.searches)
         if remembered is not None:
             remembered.remove()
         return Dissection(
@@ -137,6 +137,7 @@ def dissect(
             refined=refined,
             controls=controls,
             spread=spread,
+            movable=tuple(columns),
             steered=steered,
             behaviors=behaviors,
             holds=holds,
@@ -144,6 +145,7 @@ def dissect(
             control_steps=crew.steps_run,
             minutes=(time.monotonic() - began) / 60,
             choices=choices,
+            shortened=starts.shortened,
         )
 
 
@@ -166,23 +168,3 @@ def _behaviors_of(stimulation_map: StimulationMap, policy: Policy) -> tuple[Stim
         for behavior in stimulation_map.behaviors.values()
         if behavior.pid is None
     )
-
-
-def _starts(crew: Crew, plan: Effort, first_seed: int) -> list[tuple[Start, ...]]:
-    """Snapshots for screening, refining, search, selection and held-out, from one walk each."""
-    counts = (
-        plan.screen_starts,
-        plan.refine_starts,
-        plan.search_starts,
-        plan.selection_starts,
-        plan.held_out_starts,
-    )
-    survive = max(plan.screen_steps, plan.refine_steps, plan.search.final_steps, plan.hold.final_steps)
-    everything = collect_starts(
-        crew.robot, crew.policy, first_seed, sum(counts), at=plan.walk, survive=survive
-    )
-    pools, taken = [], 0
-    for count in counts:
-        pools.append(tuple(everything[taken : taken + count]))
-        taken += count
-    return pools

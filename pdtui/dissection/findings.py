@@ -41,11 +41,13 @@ class Dissection:
         refined: the best of them, the first matches and the controls, from other starts.
         controls: units drawn at random.
         spread: standard deviation of every attribute over the monitored steps, shape (J,).
+        movable: columns of the attributes that up and down were looked for.
         steered: up and down for each attribute.
         behaviors: the best stimulation for each goal.
         holds: the best controllers.
         rollouts, control_steps, minutes: what it took.
         choices: what the weights file leaves open.
+        shortened: a sentence on roll-outs shorter than asked for, because the policy falls; or empty.
     """
 
     robot: str
@@ -63,6 +65,7 @@ class Dissection:
     refined: Sweep
     controls: tuple[int, ...]
     spread: Floats
+    movable: tuple[int, ...]
     steered: tuple[Steered, ...]
     behaviors: tuple[Found, ...]
     holds: tuple[Held, ...]
@@ -70,6 +73,7 @@ class Dissection:
     control_steps: int
     minutes: float
     choices: PolicyChoices = NO_CHOICES
+    shortened: str = ""
 
     def __repr__(self) -> str:
         return (

@@ -40,15 +40,27 @@ GOALS: tuple[Goal, ...] = (
     Goal("spin left", "a", "turns left on the spot, or nearly", Aim("yaw rate", "increase"), 0.5),
     Goal("spin right", "d", "turns right on the spot, or nearly", Aim("yaw rate", "decrease"), 0.5),
 )
+STANDING = 0.1
+"""m/s; whoever is slower stands already."""
 _QUANTILE = 0.2
 _FALL = 2.0
 _DOUBLING = 0.02
 
 
-def goals_for(attributes: Sequence[Attribute]) -> tuple[Goal, ...]:
-    """The goals whose attributes a robot has."""
-    names = {attribute.name for attribute in attributes}
-    return tuple(goal for goal in GOALS if goal.aim.attribute in names)
+def goals_for(attributes: Sequence[Attribute], unperturbed: Floats) -> tuple[Goal, ...]:
+    """The goals whose attributes a robot has; no stop for one that stands.
+
+    Args:
+        attributes: of the robot.
+        unperturbed: their means without stimulation, shape (K, J).
+    """
+    means = dict(zip((one.name for one in attributes), unperturbed.mean(axis=0).tolist(), strict=True))
+    return tuple(
+        goal
+        for goal in GOALS
+        if goal.aim.attribute in means
+        and (goal.aim.direction != "stop" or means[goal.aim.attribute] > STANDING)
+    )
 
 
 def gains(goal: Goal, column: int, result: Effects) -> Floats:
@@ -63,7 +75,7 @@ def gains(goal: Goal, column: int, result: Effects) -> Floats:
             np.abs(unperturbed), 1e-9
         )
     else:
-        gain = result.effects[..., column] * (1.0 if goal.aim.direction == "increase" else -1.0)
+        gain = result.effects[..., column] * goal.aim.sign
     lost: Floats = np.where(result.falls | ~np.isfinite(gain), np.minimum(np.nan_to_num(gain), 0.0), gain)
     return lost
 

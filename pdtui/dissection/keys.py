@@ -17,11 +17,15 @@ class Keys:
     def __init__(self, taken: set[str]) -> None:
         self._taken: set[str] = {*taken, *RESERVED_KEYS}
 
-    def take(self, name: str) -> str | None:
-        """A letter of the name if one is free, else any letter or digit; None when all are taken."""
-        allowed = string.ascii_lowercase + string.digits
-        for key in name.lower() + allowed:
-            if key in allowed and key not in self._taken:
-                self._taken.add(key)
-                return key
+    def take_pair(self, name: str) -> tuple[str, str] | None:
+        """Two keys that belong together: a capital, for more of something, and its small letter, for less.
+
+        A letter of the name if one is free, the first of its words before others, else any; None when all are
+        taken. A letter that is reserved is free in neither size.
+        """
+        initials = "".join(word[0] for word in name.split())
+        for letter in (initials + name).lower() + string.ascii_lowercase:
+            if letter in string.ascii_lowercase and not {letter, letter.upper()} & self._taken:
+                self._taken |= {letter, letter.upper()}
+                return letter.upper(), letter
         return None

@@ -140,6 +140,40 @@ def collect_starts(
     )
 
 
+def walk_lengths(
+    robot: Robot, policy: Policy, seeds: Sequence[int], most: int, *, enough: int = 0
+) -> list[int]:
+    """Control steps that unstimulated walks last, one a seed: at most `most`.
+
+    Args:
+        robot: the world; it is reset.
+        policy: acts.
+        seeds: of the walks.
+        most: where a walk is broken off.
+        enough: so many walks of that length end it; 0 walks them all.
+    """
+    lengths: list[int] = []
+    for seed in seeds:
+        lengths.append(_length(robot, policy, seed, most))
+        if enough and sum(length >= most for length in lengths) >= enough:
+            break
+    return lengths
+
+
+def _length(robot: Robot, policy: Policy, seed: int, most: int) -> int:
+    observation, _ = robot.reset(seed=seed)
+    policy.reset()
+    for step in range(most):
+        try:
+            observation, _, terminated, _, _ = robot.step(policy.act(observation).action)
+        except SimulationDiverged:
+            return step
+        if terminated:
+            # The state after the last step is a fall, so a walk that does without it is a step shorter.
+            return step
+    return most
+
+
 def _walk(robot: Robot, policy: Policy, seed: int, at: int, survive: int) -> Start | None:
     observation, _ = robot.reset(seed=seed)
     policy.reset()

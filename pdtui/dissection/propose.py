@@ -38,7 +38,8 @@ _LISTED = 6
 def propose(dissection: Dissection) -> str:
     """The map as TOML.
 
-    Primitives are the confirmed unit of the largest effect for each attribute that a behavior may use.
+    Primitives are the confirmed unit of the largest effect for each attribute that a behavior may use; for a
+    robot that has none of the usual ones, for each that it was dissected for.
     Behaviors that did not reach their goal on the held-out starts are left out, and a comment says how far
     they came.
     """
@@ -73,8 +74,9 @@ def _header(dissection: Dissection, steered: set[str]) -> list[str]:
         f"seed {dissection.seed}: {dissection.rollouts} roll-outs.",
         "Effects are changes against the unperturbed roll-out, with 95 % intervals over starting states.",
     ]
-    named = {attribute.name for attribute in dissection.attributes} & set(_PRIMITIVES)
-    missing = sorted(named - steered)
+    if dissection.shortened:
+        lines.append(dissection.shortened)
+    missing = [name for name in _nameable(dissection) if name not in steered]
     if missing:
         lines.append(f"No unit was confirmed for: {', '.join(missing)}.")
     for found in dissection.behaviors:
@@ -101,9 +103,7 @@ def _describe(stimulation: Stimulation, layers: tuple[int, ...]) -> str:
 
 def _primitives(dissection: Dissection) -> list[dict[str, Any]]:
     entries: list[dict[str, Any]] = []
-    for attribute, name in _PRIMITIVES.items():
-        if attribute not in {one.name for one in dissection.attributes}:
-            continue
+    for attribute, name in _nameable(dissection).items():
         column = dissection.column(attribute)
         best = best_probed(column, dissection.screen, dissection.refined, dissection.seed)
         # Without a phase there is no ρ, and without ρ no magnitude c: such a unit is no primitive.
@@ -112,6 +112,13 @@ def _primitives(dissection: Dissection) -> list[dict[str, Any]]:
         if known:
             entries.append(_primitive(name, attribute, column, known[0], dissection))
     return entries
+
+
+def _nameable(dissection: Dissection) -> dict[str, str]:
+    """Attributes that get a primitive, and its name."""
+    names = [attribute.name for attribute in dissection.attributes]
+    usual = {attribute: name for attribute, name in _PRIMITIVES.items() if attribute in names}
+    return usual or {names[column]: names[column] for column in dissection.movable}
 
 
 def _primitive(
@@ -150,14 +157,17 @@ def _behavior(found: Found, dissection: Dissection, names: dict[str, tuple[str, 
 
 
 def _steered(dissection: Dissection, taken: set[str]) -> list[dict[str, Any]]:
-    """Up and down for every attribute that no goal aims at, as long as there are keys."""
-    aimed = {(one.goal.aim.attribute, one.goal.aim.direction) for one in dissection.behaviors}
-    keys, entries = Keys(taken), []
+    """Up and down for every attribute that no goal moves that way already, as long as there are keys."""
+    aimed = {(one.goal.aim.attribute, one.goal.aim.sign) for one in dissection.behaviors if one.reached}
+    keys, pairs, entries = Keys(taken), dict[str, tuple[str, str] | None](), []
     for one in dissection.steered:
         name = dissection.attributes[one.column].name
-        direction = "increase" if one.sign > 0 else "decrease"
-        key = keys.take(name) if (name, direction) not in aimed else None
-        if key is None:
+        if (name, one.sign) in aimed:
+            continue
+        if name not in pairs:
+            pairs[name] = keys.take_pair(name)
+        pair = pairs[name]
+        if pair is None:
             continue
         says = f"{'raises' if one.sign > 0 else 'lowers'} {name}"
         if one.alone is not None:
@@ -165,10 +175,10 @@ def _steered(dissection: Dissection, taken: set[str]) -> list[dict[str, Any]]:
         entries.append(
             {
                 "name": f"{name} {'up' if one.sign > 0 else 'down'}",
-                "key": key,
+                "key": pair[0 if one.sign > 0 else 1],
                 "says": says,
                 "magnitudes": outputs_table(_addresses(one.stimulation, dissection.layers)),
-                "aim": inline({"attribute": name, "direction": direction}),
+                "aim": inline({"attribute": name, "direction": "raise" if one.sign > 0 else "lower"}),
                 "measured": measured_table(one.measured),
             }
         )

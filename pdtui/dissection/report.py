@@ -24,13 +24,12 @@ def render(dissection: Dissection) -> RenderableType:
 
 def tables(summary: dict[str, Any]) -> list[Table]:
     """The tables of a summary, for whoever shows them; every cell is a text."""
-    return [
-        _matching_table(summary),
-        _probing_table(summary),
-        _steered_table(summary),
-        _behavior_table(summary),
-        _hold_table(summary),
-    ]
+    found = [_matching_table(summary), _probing_table(summary), _steered_table(summary)]
+    if summary["behaviors"]:
+        found.append(_behavior_table(summary))
+    if summary["holds"]:
+        found.append(_hold_table(summary))
+    return found
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -167,6 +166,8 @@ def remarks(summary: dict[str, Any]) -> list[str]:
         f"Matching alone: the first match is a hit for {hits} of {len(attributes)} attributes and confirmed "
         f"by probing for {confirmed}. {summary['rollouts']} roll-outs, {summary['minutes']:.1f} min.",
     ]
+    if summary["shortened"]:
+        lines.append(summary["shortened"])
     unwrapped = [attribute["name"] for attribute in attributes if attribute["unwrapped"]]
     if unwrapped:
         lines.append(f"Unwrapped before the transform: {', '.join(unwrapped)}.")

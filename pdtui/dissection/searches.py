@@ -10,7 +10,7 @@ import numpy as np
 
 from pdtui.dissection.combine import Found, Search, Starts
 from pdtui.dissection.effort import Effort
-from pdtui.dissection.goals import goals_for
+from pdtui.dissection.goals import STANDING, Goal, goals_for
 from pdtui.dissection.hold import Aimed, Held, HoldSearch
 from pdtui.dissection.imprint import imprints
 from pdtui.dissection.monitor import Progress, monitor
@@ -60,9 +60,21 @@ class Searches:
     stage: Callable[[str], Progress | None]
     known: Sequence[Stimulation] = ()
 
-    def behaviors(self, sweeps: Sequence[Sweep], pool: Pool, starts: Starts) -> tuple[Found, ...]:
-        """The best stimulation for each goal that the robot has the attribute for."""
-        goals = goals_for(self.world.attributes)
+    def run(
+        self, screen: Sweep, refined: Sweep, starts: Starts
+    ) -> tuple[tuple[Found, ...], tuple[Held, ...]]:
+        """A behavior for each goal, and a controller for each attribute, that means anything here."""
+        goals, targets = goals_for(self.world.attributes, refined.unperturbed), self._targets(refined)
+        if not goals and not targets:
+            return (), ()
+        pool = self.pool(starts)
+        return self._behaviors(goals, (screen, refined), pool, starts), self._holds(
+            targets, refined, pool, starts
+        )
+
+    def _behaviors(
+        self, goals: Sequence[Goal], sweeps: Sequence[Sweep], pool: Pool, starts: Starts
+    ) -> tuple[Found, ...]:
         found = []
         for number, goal in enumerate(goals):
             column = self.world.attribute_index(goal.aim.attribute)
@@ -84,20 +96,22 @@ class Searches:
         few = starts.search[: sizes.quick_starts]
         return Pool(self.prober, plans, few, sizes.quick_steps, self.stage("sets of units"))
 
-    def holds(self, sweep: Sweep, pool: Pool, starts: Starts) -> tuple[Held, ...]:
-        """The best controllers for heading and speed, where the robot has them and the time is not up."""
-        usual = 0.0
+    def _targets(self, sweep: Sweep) -> list[Aimed]:
+        """Heading and speed, where the robot has them; a robot that stands has no speed to hold."""
         names = [attribute.name for attribute in self.world.attributes]
+        wanted = [Aimed("yaw", (-0.8, -0.4, 0.4, 0.8), True)] if "yaw" in names else []
         if "speed" in names:
             usual = float(np.mean(sweep.unperturbed[:, names.index("speed")]))
-        asked = (
-            Aimed("yaw", (-0.8, -0.4, 0.4, 0.8), True),
-            Aimed("speed", (0.4 * usual, 0.7 * usual), False),
-        )
-        wanted = [target for target in asked if target.attribute in names]
+            if usual > STANDING:
+                wanted.append(Aimed("speed", (0.4 * usual, 0.7 * usual), False))
+        return wanted
+
+    def _holds(self, targets: Sequence[Aimed], sweep: Sweep, pool: Pool, starts: Starts) -> tuple[Held, ...]:
+        """The best controllers, as long as the time is not up."""
         held = []
-        for number, target in enumerate(wanted):
-            column, deadline = names.index(target.attribute), self.clock.share(len(wanted) - number)
+        for number, target in enumerate(targets):
+            column = self.world.attribute_index(target.attribute)
+            deadline = self.clock.share(len(targets) - number)
             search, held_out = starts.search[:4], (*starts.selection[:6], *starts.held_out[:6])
             searcher = HoldSearch(self.prober, target, self.plan.hold)
             opposites = pool.opposites(column, self.plan.hold.pairs)

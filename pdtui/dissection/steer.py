@@ -8,14 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.dissection.confirm import exceeds_random
-from pdtui.dissection.monitor import Start
+from pdtui.dissection.effort import Effort
+from pdtui.dissection.monitor import Episode, Progress, Start
 from pdtui.dissection.probe import Effects, Prober, Sweep, bootstrap_interval
 from pdtui.policies.units import Stimulation
 from pdtui.robots.types import Attribute, Floats
 from pdtui.stimulation.maps import Measured
 
 _KEPT = 0.7
-_TRIED = 6
+_SAME = 0.99
 
 
 @dataclass(frozen=True)
@@ -41,16 +42,45 @@ class Steered:
     alone: float | None = None
 
 
-def movable(attributes: Sequence[Attribute], spread: Floats) -> list[int]:
-    """Columns that behaviors are proposed for: what the body does, and what varies at all.
+def movable(attributes: Sequence[Attribute], episodes: Sequence[Episode]) -> list[int]:
+    """Columns that behaviors are proposed for: what the body does, where it varies at all.
 
-    A torque is left out: it is what the policy commands, not what the robot does with it.
+    Left out are a torque, which is what the policy commands; the reward, which is what the world says of it;
+    what only runs on, such as a position along the way, since it is somewhere else whatever one does; and
+    what shows the same as an earlier column (the speed of a robot that only goes forward).
+
+    Args:
+        attributes: of the robot.
+        episodes: unstimulated.
     """
-    return [
-        column
-        for column, attribute in enumerate(attributes)
-        if attribute.unit != "N m" and np.isfinite(spread[column]) and spread[column] > 0
-    ]
+    values = np.concatenate([episode.attributes for episode in episodes])
+    kept: list[int] = []
+    for column, attribute in enumerate(attributes):
+        series = values[:, column]
+        if attribute.unit == "N m" or attribute.name == "reward":
+            continue
+        if not np.isfinite(series).all() or np.ptp(series) == 0:
+            continue
+        if not attribute.wraps and all(_runs_on(episode.attributes[:, column]) for episode in episodes):
+            continue
+        if any(abs(np.corrcoef(series, values[:, other])[0, 1]) > _SAME for other in kept):
+            continue
+        kept.append(column)
+    return kept
+
+
+def _runs_on(series: Floats) -> bool:
+    """Whether most of what changes is progress, the same way and about as fast in both halves."""
+    half = len(series) // 2
+    if half < 2:
+        return False
+    progress, changed = [], []
+    for part in (series[:half], series[half : 2 * half]):
+        progress.append(float(part[-1] - part[0]))
+        changed.append(float(np.abs(np.diff(part)).sum()))
+    first, second = progress
+    steady = first * second > 0 and 0.5 < second / first < 2.0
+    return steady and all(abs(made) > 0.5 * all_ for made, all_ in zip(progress, changed, strict=True))
 
 
 def steer(
@@ -60,9 +90,13 @@ def steer(
     screen: Sweep,
     refined: Sweep,
     starts: Sequence[Start],
-    steps: int,
+    plan: Effort,
+    progress: Progress | None = None,
 ) -> tuple[Steered, ...]:
     """Up and down for each attribute that a confirmed unit moves.
+
+    Effects are means over the last two thirds of roll-outs that are much longer than those of the sweeps: a
+    unit that only shifts the phase of the gait moves an attribute for half a step, and then not at all.
 
     Args:
         prober: measures.
@@ -70,30 +104,40 @@ def steer(
         spread: usual standard deviation of every attribute, shape (J,).
         screen: every unit.
         refined: the units to choose from.
-        starts: that neither sweep saw. The first half decides whether a second unit is worth it, the other
-            half gives the figures.
-        steps: control steps of each roll-out.
+        starts: that neither sweep saw. The first half decides between units, the other half gives the
+            figures.
+        plan: how much to try, and how long.
+        progress: called with (directions done, directions).
     """
     found = []
-    half = len(starts) // 2
-    for column in columns:
-        for sign in (1, -1):
-            single = _best_single(column, sign, screen, refined)
-            if single is None:
-                continue
-            plans = [single, *_cancelling(single, column, sign, columns, spread, refined)]
-            tried = prober.probe(plans, starts[:half], steps=steps)
-            best = _choose(tried, column, sign, columns, spread)
-            chosen = [plans[best]] if best == 0 else [plans[best], single]
-            held = prober.probe(chosen, starts[half:], steps=steps)
-            one = _describe(held, chosen, column, sign, columns, spread)
+    half, steps = len(starts) // 2, plan.steer_steps
+    asked = [(column, sign) for column in columns for sign in (1, -1)]
+
+    def probe(plans: Sequence[Stimulation], some: Sequence[Start]) -> Effects:
+        return prober.probe(plans, some, steps=steps, measure_from=steps // 3)
+
+    for done, (column, sign) in enumerate(asked, start=1):
+        singles = _singles(column, sign, screen, refined, plan.steer_singles)
+        lasting = _lasting(probe(singles, starts[:half]), column, sign) if singles else None
+        if lasting is not None:
+            single = singles[lasting]
+            pairs = _cancelling(single, column, sign, columns, spread, refined)[: plan.steer_pairs]
+            plans = [single, *pairs]
+            best = _choose(probe(plans, starts[:half]), column, sign, columns, spread) if pairs else 0
+            chosen = [single] if best == 0 else [plans[best], single]
+            one = _describe(probe(chosen, starts[half:]), chosen, column, sign, columns, spread)
             if one is not None:
                 found.append(one)
+        if progress is not None:
+            progress(done, len(asked))
     return tuple(found)
 
 
-def _best_single(column: int, sign: int, screen: Sweep, refined: Sweep) -> Stimulation | None:
-    """The unit and output that move the attribute that way most surely, inside the unit's safe range."""
+def _singles(column: int, sign: int, screen: Sweep, refined: Sweep, count: int) -> list[Stimulation]:
+    """The units, each at its best output, that move the attribute that way most surely.
+
+    Only inside the units' safe ranges, and only those that move it more than units drawn at random.
+    """
     robust = refined.robust(column, float(sign)).copy()
     for row, unit in enumerate(refined.units):
         alive = refined.survived(unit)
@@ -102,10 +146,19 @@ def _best_single(column: int, sign: int, screen: Sweep, refined: Sweep) -> Stimu
             effect = float(np.nanmean(refined.effects[row, dose, :, column])) if sure else 0.0
             if not sure or not exceeds_random(effect, value, column, screen):
                 robust[row, dose] = 0.0
-    row, dose = (int(index) for index in np.unravel_index(int(np.argmax(robust)), robust.shape))
-    if robust[row, dose] <= 0:
-        return None
-    return Stimulation((refined.units[row],), (refined.values[dose],))
+    furthest = robust.max(axis=1)
+    rows = [int(row) for row in np.argsort(-furthest, kind="stable")[:count] if furthest[row] > 0]
+    return [
+        Stimulation((refined.units[row],), (refined.values[int(np.argmax(robust[row]))],)) for row in rows
+    ]
+
+
+def _lasting(result: Effects, column: int, sign: int) -> int | None:
+    """The plan that moved the attribute that way from every start without a fall, and most surely."""
+    weakest = np.where(np.isfinite(result.effects[..., column]), sign * result.effects[..., column], -np.inf)
+    sure = np.where(result.falls.any(axis=1), -np.inf, weakest.min(axis=1))
+    best = int(np.argmax(sure))
+    return best if sure[best] > 0 else None
 
 
 def _cancelling(
@@ -125,7 +178,7 @@ def _cancelling(
     allowed[row] = False
     ranked = np.argsort(np.where(allowed, side, np.inf), axis=None, kind="stable")[: int(allowed.sum())]
     plans = []
-    for index in ranked[:_TRIED]:
+    for index in ranked:
         other, value = (int(number) for number in np.unravel_index(int(index), side.shape))
         values = {single.units[0]: single.values[0], refined.units[other]: refined.values[value]}
         plans.append(Stimulation.of(dict(sorted(values.items()))))

@@ -36,6 +36,8 @@ def summarise(dissection: Dissection, matches: int = 10) -> dict[str, Any]:
         "attributes": [
             _attribute(dissection, column, matches) for column in range(len(dissection.attributes))
         ],
+        "shortened": dissection.shortened,
+        "movable": [dissection.attributes[column].name for column in dissection.movable],
         "steered": [_steered(dissection, one) for one in dissection.steered],
         "side_effects": _side_effects(dissection),
         "behaviors": [_behavior(dissection, number) for number in range(len(dissection.behaviors))],

@@ -39,8 +39,9 @@ class BehaviorResult:
         low, high: 95 % interval of `effect` (Student's t over seeds).
         value: mean of the attribute with the behavior.
         default: mean of the attribute without it.
-        right_sign: seeds on which the robot stayed up and moved as wanted: the attribute itself has the
-            wanted sign and so has the difference; for ``stop``, it is under a fifth of the default's.
+        right_sign: seeds on which the robot stayed up and moved as wanted: the difference has the wanted
+            sign and, unless the aim is ``raise`` or ``lower``, so has the attribute itself; for ``stop``, it
+            is under a fifth of the default's.
         falls: seeds on which the robot fell with the behavior.
         default_falls: seeds on which it fell without.
     """
@@ -162,11 +163,14 @@ def _summarise(
     default = np.array([runs["", seed].mean[column] for seed in seeds])
     fell = np.array([runs[behavior.name, seed].fell for seed in seeds])
     effect = with_it - default
+    sign = behavior.aim.sign
     if behavior.aim.direction == "stop":
         right = np.abs(with_it) < 0.2 * np.abs(default)
         wanted = "near 0"
+    elif behavior.aim.direction in ("raise", "lower"):
+        right = effect * sign > 0
+        wanted = "more" if sign > 0 else "less"
     else:
-        sign = 1.0 if behavior.aim.direction == "increase" else -1.0
         right = (with_it * sign > 0) & (effect * sign > 0)
         wanted = "> 0" if sign > 0 else "< 0"
     low, high = confidence_interval(effect)

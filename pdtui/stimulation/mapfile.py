@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import cast
+from typing import cast, get_args
 
 from pdtui.errors import MapError
 from pdtui.policies.choices import ACTIVATION_NAMES, SQUASH_NAMES, PolicyChoices
@@ -139,7 +139,7 @@ def _behavior(table: FieldTable, primitives: dict[str, Primitive]) -> Behavior:
     mode = cast(Mode, table.choice("mode", ("fixed", "pid"), "fixed"))
     aim_table, aim = table.table("aim", None), None
     if aim_table is not None:
-        direction = cast(Direction, aim_table.choice("direction", ("increase", "decrease", "stop")))
+        direction = cast(Direction, aim_table.choice("direction", get_args(Direction)))
         aim = Aim(aim_table.text("attribute"), direction)
         aim_table.done()
     pid_table, pid = table.table("pid", None), None

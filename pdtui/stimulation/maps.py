@@ -29,7 +29,7 @@ RESERVED_KEYS: dict[str, str] = {
 }
 
 Mode = Literal["fixed", "pid"]
-Direction = Literal["increase", "decrease", "stop"]
+Direction = Literal["increase", "decrease", "raise", "lower", "stop"]
 
 
 @dataclass(frozen=True)
@@ -75,10 +75,22 @@ class Primitive:
 
 @dataclass(frozen=True)
 class Aim:
-    """What a behavior is meant to do, which `pdtui evaluate` measures."""
+    """What a behavior is meant to do, which `pdtui evaluate` measures.
+
+    Attributes:
+        attribute: its name.
+        direction: ``increase`` and ``decrease`` want the attribute itself above and below 0 (a drift to +y, a
+            turn to the left); ``raise`` and ``lower`` want it above and below what it is without the behavior
+            (a height, a joint's angle); ``stop`` wants it near 0.
+    """
 
     attribute: str
     direction: Direction
+
+    @property
+    def sign(self) -> float:
+        """1 where more of the attribute is wanted, −1 where less of it is."""
+        return 1.0 if self.direction in ("increase", "raise") else -1.0
 
 
 @dataclass(frozen=True)

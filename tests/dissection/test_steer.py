@@ -1,13 +1,15 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pdtui.dissection.confirm import select_units
+from pdtui.dissection.effort import QUICK
 from pdtui.dissection.keys import Keys
 from pdtui.dissection.matching import match
-from pdtui.dissection.monitor import collect_starts, monitor
+from pdtui.dissection.monitor import Episode, collect_starts, monitor
 from pdtui.dissection.probe import Prober
 from pdtui.dissection.settings import find_preset
 from pdtui.dissection.steer import movable, steer
@@ -24,12 +26,14 @@ def test_the_unit_that_is_wired_to_a_motor_moves_the_body_both_ways(wired_file: 
         spread = np.concatenate([episode.attributes for episode in episodes]).std(axis=0)
         starts = collect_starts(crew.robot, crew.policy, 1100, 8, at=10, survive=20)
         screen = prober.sweep(range(crew.policy.units), (-4.0, 4.0), starts[:2], steps=16)
-        columns = range(len(crew.robot.attributes))
+        everything = range(len(crew.robot.attributes))
         chosen = select_units(
-            screen, match(episodes, crew.robot.attributes, find_preset("paper")), columns, 1
+            screen, match(episodes, crew.robot.attributes, find_preset("paper")), everything, 1
         )
         refined = prober.sweep(chosen, (-4.0, 0.0, 4.0), starts[2:4], steps=16)
-        found = steer(prober, movable(crew.robot.attributes, spread), spread, screen, refined, starts[4:], 16)
+        plan = replace(QUICK, steer_steps=18, steer_singles=3, steer_pairs=3)
+        columns = movable(crew.robot.attributes, episodes)
+        found = steer(prober, columns, spread, screen, refined, starts[4:], plan)
         assert found
         assert WIRED_MOTOR >= 0
         for one in found:
@@ -37,20 +41,36 @@ def test_the_unit_that_is_wired_to_a_motor_moves_the_body_both_ways(wired_file: 
             assert crew.policy.layers[0] + WIRED_UNIT in one.stimulation.units
             assert one.sign * one.measured.low > 0
             assert one.sign * one.measured.high > 0
-            again = prober.probe([one.stimulation], starts[6:], steps=16)
+            again = prober.probe([one.stimulation], starts[6:], steps=18, measure_from=6)
             assert np.isclose(one.measured.effect, again.effects[0, :, one.column].mean())
 
 
-def test_what_does_not_vary_and_torques_are_not_steered() -> None:
-    attributes = [Attribute("vx", "m/s"), Attribute("knee", "N m"), Attribute("height", "m")]
-    assert movable(attributes, np.array([1.0, 1.0, 0.0])) == [0]
+def test_only_what_the_body_does_and_can_do_otherwise_is_steered() -> None:
+    time = np.arange(200) / 20
+    gait, noise = np.sin(7 * time), np.random.default_rng(1).normal(size=time.size)
+    series = {
+        "vx": 2.0 + 0.3 * gait,
+        "knee": noise,
+        "height": np.full(time.size, 0.7),
+        "x": 2.0 * time + 0.1 * gait,
+        "speed": np.abs(2.0 + 0.3 * gait),
+        "reward": 1.0 + noise,
+        "yaw": 3.0 * time,
+        "pitch": np.exp(-time) + 0.001 * noise,
+    }
+    units = {"knee": "N m", "yaw": "rad"}
+    attributes = [Attribute(name, units.get(name, "m/s"), wraps=name == "yaw") for name in series]
+    episode = Episode(0, np.zeros((200, 1), np.float32), np.stack(list(series.values()), axis=1), "")
+    assert [attributes[column].name for column in movable(attributes, [episode])] == ["vx", "yaw", "pitch"]
 
 
-def test_keys_are_handed_out_once_and_never_reserved_ones() -> None:
-    keys = Keys({"x"})
-    taken = [keys.take("pitch") for _ in range(40)]
-    given = [key for key in taken if key is not None]
-    assert given[0] == "i"
+def test_keys_come_in_pairs_once_each_and_never_reserved_ones() -> None:
+    keys = Keys({"x", "h"})
+    assert keys.take_pair("thigh angle") == ("T", "t")
+    assert keys.take_pair("height") == ("E", "e")
+    taken = [keys.take_pair("leg angle") for _ in range(40)]
+    given = [key for pair in taken if pair is not None for key in pair]
+    assert given[:4] == ["L", "l", "A", "a"]
     assert len(given) == len(set(given))
-    assert not {*given} & {*RESERVED_KEYS, "x"}
+    assert not {key.lower() for key in given} & {*RESERVED_KEYS, "x", "h", "t", "e"}
     assert taken[-1] is None

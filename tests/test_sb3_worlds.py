@@ -1,0 +1,62 @@
+"""Policies that Stable-Baselines3 trained, end to end: dissect, evaluate on unseen seeds, drive, replay."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from pdtui.cli import main
+from pdtui.sessions.reader import read_session
+from pdtui.stimulation.mapfile import load_map
+
+FIXTURES = Path(__file__).parent / "fixtures"
+WORLDS = {"Pendulum-v1": "sb3-pendulum", "Hopper-v5": "sb3-hopper", "HalfCheetah-v5": "sb3-halfcheetah"}
+
+
+def run(*arguments: str | Path | int) -> str:
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def strict(text: str) -> Any:
+    def refuse(name: str) -> NoReturn:
+        raise AssertionError(f"{name} is no JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+@pytest.mark.parametrize("env", WORLDS)
+def test_a_policy_is_dissected_measured_driven_and_replayed(env: str, tmp_path: Path) -> None:
+    path, session, keys = tmp_path / "x.toml", tmp_path / "s.rrd", tmp_path / "keys.txt"
+    statistics = FIXTURES / f"{WORLDS[env]}-normaliser.npz"
+    normaliser = statistics if statistics.exists() else "none"
+    policy = FIXTURES / f"{WORLDS[env]}.zip"
+    found = strict(
+        run("dissect", "--env", env, "--policy", policy, "--normaliser", normaliser, "--quick",
+            "--budget", "0.001", "--workers", 2, "-o", path, "--json")
+    )  # fmt: skip
+    assert "reward" not in found["movable"]
+    stimulation_map = load_map(path)
+    assert stimulation_map.robot == env
+    behaviors = list(stimulation_map.behaviors.values())
+    assert stimulation_map.primitives or behaviors
+
+    measured = strict(run("evaluate", path, "--seeds", "100-104", "--workers", 2, "--json"))["behaviors"]
+    aimed = {one.name: one.aim for one in behaviors if one.aim is not None}
+    assert [one["behavior"] for one in measured] == list(aimed)
+    if env == "Hopper-v5":
+        assert measured, "a hopper's leg is easily moved"
+    signs = [np.sign(one["effect"]) == aimed[one["behavior"]].sign for one in measured]
+    assert sum(signs) >= 0.5 * len(signs), measured
+
+    pressed = [one.key for one in behaviors][:3]
+    keys.write_text("".join(f"{20 * number + 10} {key}\n" for number, key in enumerate(pressed)))
+    run("drive", path, "--headless", "--keys", keys, "--steps", 100, "--record", session)
+    assert run("replay", session) == "identical: 100 steps\n"
+    assert [event.key for event in read_session(session).events] == pressed
