@@ -35,10 +35,10 @@ def strict(text: str) -> Any:
 def test_a_policy_is_dissected_measured_driven_and_replayed(env: str, tmp_path: Path) -> None:
     path, session, keys = tmp_path / "x.toml", tmp_path / "s.rrd", tmp_path / "keys.txt"
     statistics = FIXTURES / f"{WORLDS[env]}-normaliser.npz"
-    normaliser = statistics if statistics.exists() else "none"
+    normaliser = ["--normaliser", statistics] if statistics.exists() else []
     policy = FIXTURES / f"{WORLDS[env]}.zip"
     found = strict(
-        run("dissect", "--env", env, "--policy", policy, "--normaliser", normaliser, "--quick",
+        run("dissect", "--env", env, "--policy", policy, *normaliser, "--quick",
             "--budget", "0.001", "--workers", 2, "-o", path, "--json")
     )  # fmt: skip
     assert "reward" not in found["movable"]

@@ -45,12 +45,26 @@ def import_sb3(archive: Archive, choices: PolicyChoices) -> Found:
     source, data = archive.source, _data(archive)
     tensors = flatten(from_torch(archive.read("policy.pth"), f"{source}: policy.pth"))
     _check_flat(tensors, data, source)
-    if data.get("_last_original_obs") is not None and not choices.normaliser:
+    if _normalised(data) and not choices.normaliser:
         raise PolicyError(
             f"{source}: trained behind VecNormalize, whose statistics are another file: give them with "
             f"--normaliser FILE, or --normaliser {NO_NORMALISER} if it normalised rewards only"
         )
     return _Reader(source, data, tensors).found()
+
+
+def _normalised(data: dict[str, Any]) -> bool:
+    """Whether the model was trained behind VecNormalize, as far as the readable part of the file shows.
+
+    PPO and A2C keep an observation of before the normalisation only there. The off-policy algorithms keep
+    one in any case; it is stored in double precision there and the normalised one is not, so that texts of
+    different length tell. In a world that observes in single precision nothing tells.
+    """
+    own, seen = data.get("_last_original_obs"), data.get("_last_obs")
+    if not isinstance(own, dict) or "buffer_size" not in data:
+        return own is not None
+    texts = [part.get(":serialized:", "") if isinstance(part, dict) else "" for part in (own, seen)]
+    return len(texts[0]) != len(texts[1])
 
 
 class _Reader:

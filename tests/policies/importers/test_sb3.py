@@ -87,6 +87,19 @@ def test_drawn_actions_follow_the_model_s_distribution(tmp_path: Path) -> None:
     assert ours.std() == pytest.approx(theirs.std(), rel=0.1)
 
 
+@pytest.mark.parametrize("algorithm", ["SAC", "TD3"])
+def test_a_trained_off_policy_model_needs_no_statistics_that_it_never_had(
+    algorithm: str, tmp_path: Path, observations: Draw
+) -> None:
+    model = getattr(sb3, algorithm)("MlpPolicy", "Pendulum-v1", learning_starts=20, seed=1, device="cpu")
+    model.learn(30)
+    model.save(tmp_path / "model.zip")
+    policy = load_policy(tmp_path / "model.zip")
+    for observation in observations(3)[:5]:
+        expected, _ = model.predict(observation, deterministic=True)
+        np.testing.assert_allclose(policy.act(observation).action, expected, atol=1e-5)
+
+
 def normalised(tmp_path: Path) -> tuple[Any, Any, Path]:
     from stable_baselines3.common.env_util import make_vec_env
     from stable_baselines3.common.vec_env import VecNormalize
