@@ -114,8 +114,7 @@ def episode_curves(
         rho = correlate(recorded, world.attributes, spectrum).rho(spectrum)
         shown = next(episode for episode in recorded if episode.seed == matching.used[0])
         if not attributes:
-            spread = np.concatenate([episode.attributes for episode in recorded]).std(axis=0)
-            columns = movable(world.attributes, spread)[:_FEW]
+            columns = movable(world.attributes, recorded)[:_FEW]
         best = [matching.ranked(column) for column in columns]
         if not columns or (not units and any(not ranked.size for ranked in best)):
             flaws = "; ".join(f"{name}: {flaw}" for name, flaw in matching.flaws.items())
