@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import tomllib
 from dataclasses import replace
+from functools import partial
 from io import StringIO
 from pathlib import Path
 
@@ -208,8 +209,8 @@ magnitudes = {{ "0:3" = 9.5, "1:7" = -9.5 }}
         )
         assert known in searches.pool(Starts(tuple(starts), (), ())).plans
     beginning = parse_map(text, "mine")
-    found = dissect("ant", policy_file, episodes=1, workers=1, effort=effort, start_from=beginning)
-    alone = dissect("ant", policy_file, episodes=1, workers=1, effort=effort)
+    quick = partial(dissect, "ant", policy_file, episodes=1, workers=1, effort=effort, budget_minutes=0.0)
+    found, alone = quick(start_from=beginning), quick()
     assert found.rollouts > alone.rollouts
     with pytest.raises(MapError, match="unit 1:70 does not exist"):
         dissect("ant", policy_file, effort=effort, start_from=parse_map(text.replace("1:7", "1:70"), "mine"))

@@ -7,12 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from pdtui.dissection.monitor import collect_starts
+from pdtui.dissection.probe import Prober
+from pdtui.dissection.workers import Crew
 from pdtui.policies.choices import PolicyChoices, Spaces
 from pdtui.policies.load import load_policy
 from pdtui.policies.units import NO_STIMULATION, Stimulation
 from pdtui.robots import make_robot
+from pdtui.robots.ant import Ant
+from pdtui.robots.types import Floats
 
 Reference = Callable[[str], Path]
 Draw = Callable[[int], NDArray[np.float32]]
@@ -130,3 +136,36 @@ def test_the_authors_brake_brakes(reference: Reference) -> None:
     assert not any(fell for _, fell in free)
     assert max(s for s, _ in braked) < 0.3
     assert sum(fell for _, fell in braked) <= 7
+
+
+class _PaddedAnt(Ant):
+    """The Ant as their policy observes it: with 84 zeros for contact forces."""
+
+    def __init__(self) -> None:
+        super().__init__(forward="x")
+        self.observation_space = Box(-np.inf, np.inf, (111,), np.float64)
+
+    def observe(self) -> Floats:
+        return np.concatenate([super().observe(), np.zeros(84)])
+
+
+@pytest.mark.slow
+def test_probing_sees_the_authors_brake_and_how_common_brakes_are(reference: Reference) -> None:
+    """Probed like any unit, 0:156 brakes from every start; at such outputs many do, so it is not rare."""
+    policy = load_policy(reference("ant.npz"), choices=PolicyChoices("tanh"), spaces=ANT)
+    others = np.random.default_rng(0).choice(512, 63, replace=False).tolist()
+    units = sorted({156, *others})
+    with Crew(_PaddedAnt(), policy, 1) as crew:
+        speed = crew.robot.attribute_index("speed")
+        starts = collect_starts(crew.robot, policy, 1102, 4, at=100, survive=100)
+        sweep = Prober(crew).sweep(units, (-20.0, -8.0), starts, steps=80)
+    change = np.nan_to_num(sweep.effects[..., speed])
+    row = units.index(156)
+    brakes = np.asarray(np.all(change < -0.5 * sweep.unperturbed[:, speed], axis=2))
+    print(
+        f"0:156 at −8: {change[row, 1].round(2)} m/s of {sweep.unperturbed[:, speed].round(2)}; "
+        f"of {len(units)} units, {brakes[:, 1].sum()} take half of it at −8 and {brakes[:, 0].sum()} at −20"
+    )
+    assert brakes[row, 1]
+    assert not sweep.falls[row, 1].any()
+    assert sweep.robust(speed, -1.0)[row, 1] > 2.0
