@@ -97,9 +97,12 @@ class Candidates:
     def _tidy(self, values: Mapping[int, float]) -> Stimulation:
         """Units in order, values of three digits: what a map says is then exactly what was measured."""
         limit = self._bounds.largest
-        return Stimulation.of(
-            {u: float(f"{np.clip(v, -limit, limit):.3g}") for u, v in sorted(values.items())}
-        )
+        return Stimulation.of({u: three_digits(np.clip(v, -limit, limit)) for u, v in sorted(values.items())})
+
+
+def three_digits(value: float) -> float:
+    """The value that a map's text says, which is then exactly what is measured."""
+    return float(f"{value:.3g}")
 
 
 def _as_dict(stimulation: Stimulation) -> dict[int, float]:

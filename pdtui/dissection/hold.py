@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pdtui.dissection.candidates import three_digits
 from pdtui.dissection.monitor import Start
 from pdtui.dissection.probe import Prober, Sweep
 from pdtui.dissection.rollout import Hold
@@ -181,9 +182,9 @@ class HoldSearch:
 
     def _pid(self, limit: float, gain: float, ki: float) -> Pid:
         """A gain of 1 puts out 1 at the errors that the controller will meet."""
-        kp = float(f"{gain / self._aimed.spread:.3g}")
+        kp = three_digits(gain / self._aimed.spread)
         step = float(f"{self._aimed.spread / 4:.1g}")
-        return Pid(self._aimed.attribute, kp, float(f"{kp * ki:.3g}"), 0.0, limit, step)
+        return Pid(self._aimed.attribute, kp, three_digits(kp * ki), 0.0, limit, step)
 
     def _cost(self, candidates: Sequence[_Candidate], starts: Sequence[Start], steps: int) -> Floats:
         errors, falls = self._measure(candidates, starts, steps)
@@ -218,5 +219,4 @@ def _steerers(sweep: Sweep, column: int) -> list[tuple[int, float]]:
 
 
 def _rounded(values: Floats) -> tuple[float, ...]:
-    """Three digits, as a map's text says them."""
-    return tuple(float(f"{value:.3g}") for value in values.tolist())
+    return tuple(three_digits(value) for value in values.tolist())

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.dissection.candidates import three_digits
 from pdtui.dissection.monitor import Episode
 from pdtui.policies.units import Stimulation
 from pdtui.robots.geometry import wrap_angle
@@ -76,7 +77,7 @@ def imprints(
                     chosen = np.sort(order[:count])
                     for factor in sizes.factors:
                         outputs = np.clip(mean + factor * (row - mean), -largest, largest)[chosen]
-                        rounded = [float(f"{v:.3g}") for v in outputs.tolist()]
+                        rounded = [three_digits(v) for v in outputs.tolist()]
                         plans[Stimulation(tuple(chosen.tolist()), tuple(rounded))] = None
     return tuple(plans)
 

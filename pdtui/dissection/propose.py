@@ -95,7 +95,7 @@ def _header(dissection: Dissection, steered: set[str]) -> list[str]:
 
 
 def _describe(stimulation: Stimulation, layers: tuple[int, ...]) -> str:
-    addresses = _addresses(stimulation, layers)
+    addresses = stimulation.by_address(layers)
     if len(addresses) > _LISTED:
         return f"{len(addresses)} units"
     return ", ".join(f"{unit} = {value:g}" for unit, value in addresses.items())
@@ -177,17 +177,12 @@ def _steered(dissection: Dissection, taken: set[str]) -> list[dict[str, Any]]:
                 "name": f"{name} {'up' if one.sign > 0 else 'down'}",
                 "key": pair[0 if one.sign > 0 else 1],
                 "says": says,
-                "magnitudes": outputs_table(_addresses(one.stimulation, dissection.layers)),
+                "magnitudes": outputs_table(one.stimulation.by_address(dissection.layers)),
                 "aim": inline({"attribute": name, "direction": "raise" if one.sign > 0 else "lower"}),
                 "measured": measured_table(one.measured),
             }
         )
     return entries
-
-
-def _addresses(stimulation: Stimulation, layers: tuple[int, ...]) -> dict[str, float]:
-    pairs = zip(stimulation.units, stimulation.values, strict=True)
-    return {format_unit(unit, layers): value for unit, value in pairs}
 
 
 def _hold(held: Held, dissection: Dissection) -> dict[str, Any]:
@@ -201,8 +196,8 @@ def _hold(held: Held, dissection: Dissection) -> dict[str, Any]:
         "key": key,
         "says": says,
         "mode": "pid",
-        "magnitudes": outputs_table(_addresses(held.weights, layers)),
-        "base": outputs_table(_addresses(base, layers)),
+        "magnitudes": outputs_table(held.weights.by_address(layers)),
+        "base": outputs_table(base.by_address(layers)),
         "pid": inline({"attribute": pid.attribute} | {k: float(f"{v:.4g}") for k, v in gains.items()}),
     }
     return {field: value for field, value in entry.items() if field != "base" or held.base}

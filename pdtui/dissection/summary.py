@@ -9,7 +9,7 @@ from pdtui.dissection.confirm import BEST, Confirmation, best_probed, confirm, h
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.settings import settings_of
 from pdtui.dissection.steer import Steered
-from pdtui.policies.units import Stimulation, format_unit
+from pdtui.policies.units import format_unit
 
 
 def summarise(dissection: Dissection, matches: int = 10) -> dict[str, Any]:
@@ -114,7 +114,7 @@ def _steered(dissection: Dissection, one: Steered) -> dict[str, Any]:
     return {
         "attribute": dissection.attributes[one.column].name,
         "direction": "up" if one.sign > 0 else "down",
-        "units": _units(dissection, one.stimulation),
+        "units": one.stimulation.by_address(dissection.layers),
         "effect": _number(one.measured.effect),
         "low": _number(one.measured.low),
         "high": _number(one.measured.high),
@@ -147,7 +147,7 @@ def _behavior(dissection: Dissection, number: int) -> dict[str, Any]:
         "attribute": found.goal.aim.attribute,
         "direction": found.goal.aim.direction,
         "enough": found.goal.enough,
-        "units": _units(dissection, found.stimulation),
+        "units": found.stimulation.by_address(dissection.layers),
         "reached": found.reached,
         "effect": _number(found.change.effect),
         "gain": _number(found.gain.effect),
@@ -167,7 +167,7 @@ def _hold(dissection: Dissection, number: int) -> dict[str, Any]:
     held = dissection.holds[number]
     return {
         "attribute": held.pid.attribute,
-        "units": _units(dissection, held.weights),
+        "units": held.weights.by_address(dissection.layers),
         "kp": held.pid.kp,
         "ki": held.pid.ki,
         "kd": held.pid.kd,
@@ -179,11 +179,6 @@ def _hold(dissection: Dissection, number: int) -> dict[str, Any]:
         "targets": list(held.targets),
         "relative": held.relative,
     }
-
-
-def _units(dissection: Dissection, stimulation: Stimulation) -> dict[str, float]:
-    pairs = zip(stimulation.units, stimulation.values, strict=True)
-    return {format_unit(unit, dissection.layers): value for unit, value in pairs}
 
 
 def _number(value: Any) -> float | None:

@@ -122,5 +122,10 @@ class Stimulation:
         """From a mapping of flat index to v."""
         return cls(tuple(values), tuple(values.values()))
 
+    def by_address(self, layers: Sequence[int]) -> dict[str, float]:
+        """Outputs v by the addresses of their units."""
+        pairs = zip(self.units, self.values, strict=True)
+        return {format_unit(unit, layers): value for unit, value in pairs}
+
 
 NO_STIMULATION = Stimulation()
