@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from pdtui.policies.network import NetworkSpec, PolicyNetwork
 from pdtui.policies.runtime import Policy
 from pdtui.stimulation.mapfile import load_map
 from pdtui.stimulation.maps import StimulationMap
+from tests.real_viewer import RealViewer, real_viewer
 from tests.small_dissection import SMALL, small_network, write_policy
 
 MAP = """\
@@ -59,6 +61,13 @@ mode = "pid"
 magnitudes = {{ "0:5" = 1.0 }}
 pid = {{ attribute = "yaw", kp = 2.0, ki = 0.1, kd = 0.05, limit = 3.0, step = 0.1 }}
 """
+
+
+@pytest.fixture(scope="session")
+def viewer() -> Iterator[RealViewer]:
+    """The Rerun viewer, without a window."""
+    with real_viewer() as started:
+        yield started
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ def viewer_command(path: Path, *, web: bool = False) -> list[str]:
     Raises:
         SessionError: the viewer is not installed, or there is no display for its window.
     """
-    viewer = _find_viewer()
+    viewer = find_viewer()
     if not web and not _has_display():
         raise SessionError(
             "no display for the viewer's window (neither DISPLAY nor WAYLAND_DISPLAY is set); "
@@ -32,7 +32,7 @@ def viewer_command(path: Path, *, web: bool = False) -> list[str]:
     return [*command, "--serve-web"] if web else command
 
 
-def _find_viewer() -> str:
+def find_viewer() -> str:
     """Beside this interpreter first: that viewer has the version that wrote the files."""
     beside = shutil.which("rerun", path=str(Path(sys.executable).parent))
     found = beside or shutil.which("rerun")

@@ -17,6 +17,7 @@ from pdtui.pictures.report import write_report
 from pdtui.policies.units import format_unit, parse_unit
 from pdtui.sessions.reader import read_session
 from tests.pictures.recordings import read_entities, read_origins
+from tests.real_viewer import RealViewer, is_blank
 
 Entities = dict[str, dict[str, list[Any]]]
 
@@ -64,6 +65,11 @@ def test_bars_are_the_discrepancies(dissection: Dissection, entities: Entities) 
         np.testing.assert_allclose(
             lengths / lengths[-1], np.array(bars["discrepancy"]) / bars["discrepancy"][-1], rtol=1e-5
         )
+
+
+def test_the_viewer_opens_it_without_a_complaint(viewer: RealViewer, report: Path) -> None:
+    viewer.show(report)
+    assert not is_blank(viewer.picture("dissection"))
 
 
 def test_curves_are_the_refined_effects_with_their_intervals(
