@@ -85,7 +85,7 @@ class Rows:
                 raise SessionError(
                     f"stream '{self._entity}/{name}': expected {width} × {wanted} a row, found {column.type}"
                 )
-            blocks.append(values.to_numpy(zero_copy_only=False).reshape(len(column), -1))
+            blocks.append(values.to_numpy(zero_copy_only=False).reshape(len(column), width or 0))
         gathered = np.concatenate(blocks) if blocks else np.empty((0, width or 0), kind)
         return gathered[self._order].astype(kind, copy=False)
 
@@ -108,6 +108,8 @@ class Rows:
     def _step_column(self, batch: pa.RecordBatch) -> NDArray[np.int64]:
         if STEP not in batch.schema.names or batch.schema.field(STEP).type != pa.int64():
             raise SessionError(f"entity '{self._entity}': expected a timeline '{STEP}'")
+        if batch.column(STEP).null_count:
+            raise SessionError(f"entity '{self._entity}': expected rows that say their step")
         steps: NDArray[np.int64] = batch.column(STEP).to_numpy(zero_copy_only=False)
         return steps
 

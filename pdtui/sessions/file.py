@@ -1,65 +1,66 @@
-"""An .rrd file as a stream of chunks; whatever is wrong with it becomes a `SessionError`."""
+"""An .rrd file as a stream of chunks; what is wrong with it becomes a `SessionError` that names the byte."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import os
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, TypeVar
 
 import pyarrow as pa
-from rerun.chunk import Chunk, RrdReader
 
 from pdtui.errors import SessionError
+from pdtui.reading import open_regular
 from pdtui.sessions.chunks import Rows
+from pdtui.sessions.frames import CHUNK, LAST, RESCUE, STORE, Frame, check_end, check_start, frames
+from pdtui.sessions.messages import MAX_MESSAGE, Chunk, Store, read_chunk, read_store
 from pdtui.sessions.schema import APP, DRIVE, STEP, VIEWS
 
-_MAGIC = b"RRF2"
+MAX_KEPT = 4 << 30
+"""Bytes of rows that are kept in memory: an hour at 50 Hz with 512 units has 0.6 GB."""
+
+T = TypeVar("T")
 _PROPERTIES = "/__properties/"
-_TORN = ("exceeds file size", "too small", "byte payload, above")
-_UNREADABLE = (RuntimeError, ValueError, OSError, pa.ArrowException)
+_PROPERTY_TYPES = (pa.utf8(), pa.int64(), pa.float64(), pa.bool_())
+_MAX_STORES = 16
+_DAMAGED = (ValueError, OverflowError, EOFError, OSError, MemoryError, pa.ArrowException)
 
 
 class SessionFile:
     """An .rrd of pdtui, read once from its beginning to its end.
 
+    Every message is decoded and checked, also those that are not kept.
+
     Args:
         path: the file.
         only: components of the drive to keep; all if empty.
         skip: components of the drive to leave out.
-        torn: read up to the first chunk that cannot be read, instead of raising.
-        called: what errors call the file, where `path` is a copy.
+        torn: read up to the first message that cannot be read, instead of raising.
 
     Attributes:
         recording_id: of the recording.
-        complete: whether every chunk could be read.
+        complete: whether every message could be read.
+        finished: whether it is complete and ends as a finished one does, with an index of its chunks.
 
     Raises:
         SessionError: no such file, not a recording, another program's, or torn.
     """
 
     def __init__(
-        self,
-        path: Path,
-        *,
-        only: Sequence[str] = (),
-        skip: Sequence[str] = (),
-        torn: bool = False,
-        called: Path | None = None,
+        self, path: Path, *, only: Sequence[str] = (), skip: Sequence[str] = (), torn: bool = False
     ) -> None:
-        called = called or path
         self._batches: dict[str, list[pa.RecordBatch]] = {}
         self._properties: dict[str, dict[str, list[Any]]] = {}
-        self.complete = True
-        self._reader, self.recording_id = _open(path, called)
+        self._kept = 0
+        stream = Stream(path)
         try:
-            for chunk in _chunks(self._reader, called):
-                self._take(chunk, only, skip)
+            for chunk in stream:
+                self._take(path, chunk, only, skip)
         except SessionError:
-            if not torn:
+            if not torn or stream.store is None:
                 raise
-            self.complete = False
+        self.recording_id = stream.found().recording_id
+        self.complete, self.finished = stream.complete, stream.finished
 
     def properties(self, name: str) -> dict[str, list[Any]]:
         """Values of one group of properties, by name; empty if the file has none."""
@@ -69,93 +70,111 @@ class SessionFile:
         """All rows of an entity; none if the file has none."""
         return Rows(entity, self._batches.get(entity, []))
 
-    def has_footer(self) -> bool:
-        """Whether the file ends as a finished one does, with an index of its chunks."""
-        try:
-            self._reader.store()
-        except _UNREADABLE:
-            return False
-        return True
-
-    def _take(self, chunk: Chunk, only: Sequence[str], skip: Sequence[str]) -> None:
-        entity = chunk.entity_path
+    def _take(self, path: Path, chunk: Chunk, only: Sequence[str], skip: Sequence[str]) -> None:
+        entity, batch = chunk.entity, chunk.batch
         if entity.startswith(_PROPERTIES):
-            batch = chunk.to_record_batch()
             group = self._properties.setdefault(entity.removeprefix(_PROPERTIES), {})
-            for name in batch.schema.names:
-                column = batch.column(name)
-                if pa.types.is_list(column.type) and len(column) and column[-1].is_valid:
+            for name, column in zip(batch.schema.names, batch.columns, strict=True):
+                known = pa.types.is_list(column.type) and column.type.value_type in _PROPERTY_TYPES
+                if known and len(column) and column[-1].is_valid:
                     group[name] = column[-1].as_py()
-        elif not chunk.is_static and not entity.startswith(VIEWS):
-            batch = chunk.to_record_batch()
+        elif chunk.timelines and not entity.startswith(VIEWS):
             if entity == DRIVE:
                 names = [name for name in batch.schema.names if name not in skip]
-                names = [name for name in names if not only or name in (STEP, *only)]
-                batch = batch.select(names)
+                batch = batch.select([name for name in names if not only or name in (STEP, *only)])
+            self._kept += batch.nbytes
+            if self._kept > MAX_KEPT:
+                raise SessionError(f"{path}: expected at most {MAX_KEPT >> 20} MiB of rows, there are more")
             self._batches.setdefault(entity, []).append(batch)
 
 
-def readable_chunks(path: Path) -> Iterator[Chunk]:
-    """The chunks of a recording up to the first that cannot be read; never more than a few are in memory.
+class Stream:
+    """The chunks of a recording in the order of the file; never more than one is in memory.
+
+    Attributes:
+        store: of the recording, once its announcement was read.
+        complete: whether every message was read.
+        finished: whether the index at the file's end was, too.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._stores: list[Store] = []
+        self.store: Store | None = None
+        self.complete = self.finished = False
+
+    def __iter__(self) -> Iterator[Chunk]:
+        """Read from the beginning.
+
+        Raises:
+            SessionError: no such file, not a recording, another program's, or torn: raised after the chunks
+                before the damage were given. The message names file and byte.
+        """
+        try:
+            with open_regular(self._path) as file:
+                yield from self._chunks(file)
+        except FileNotFoundError:
+            raise SessionError(f"{self._path}: no such file") from None
+        except OSError as error:
+            raise SessionError(f"{self._path}: cannot be read: {error.strerror}") from error
+        except SessionError as error:
+            raise SessionError(f"{self._path}: {error}") from error
+        self.found()
+        self.complete = True
+
+    def found(self) -> Store:
+        """The store of the recording.
+
+        Raises:
+            SessionError: the file announces none.
+        """
+        if self.store is None:
+            raise SessionError(f"{self._path}: holds no recording")
+        return self.store
+
+    def _chunks(self, file: BinaryIO) -> Iterator[Chunk]:
+        check_start(file)
+        for frame in frames(file, os.fstat(file.fileno()).st_size):
+            if frame.kind == LAST:
+                check_end(file, frame)
+                self.finished = True
+            elif frame.kind == STORE:
+                self._announced(_decoded(file, frame, read_store))
+            elif frame.kind == CHUNK:
+                store, chunk = _decoded(file, frame, read_chunk)
+                if store not in self._stores:
+                    raise SessionError(
+                        f"byte {frame.start}: rows of a recording that the file does not announce"
+                    )
+                if store == self.store:
+                    yield chunk
+
+    def _announced(self, store: Store) -> None:
+        if store in self._stores:
+            return
+        if len(self._stores) == _MAX_STORES:
+            raise SessionError(f"expected at most {_MAX_STORES} recordings and layouts, there are more")
+        if store.application_id != APP:
+            raise SessionError(f"expected a recording of {APP}, found one of '{store.application_id[:60]}'")
+        self._stores.append(store)
+        if self.store is None and store.drive:
+            self.store = store
+
+
+def _decoded(file: BinaryIO, frame: Frame, read: Callable[[memoryview], T]) -> T:
+    """What a message says.
 
     Raises:
-        SessionError: no such file, not a recording, or another program's.
+        SessionError: it is damaged or too large.
     """
-    reader, _ = _open(path, path)
+    if frame.length > MAX_MESSAGE:
+        raise SessionError(f"byte {frame.start}: expected a message of at most {MAX_MESSAGE >> 20} MiB")
+    file.seek(frame.start)
+    payload = file.read(frame.length)
+    if len(payload) < frame.length:
+        raise SessionError("the file became shorter while it was read")
     try:
-        yield from _chunks(reader, path)
-    except SessionError:
-        return
-
-
-def _open(path: Path, called: Path) -> tuple[RrdReader, str]:
-    _check_magic(path, called)
-    with _reading(called):
-        reader = RrdReader(path)
-        stores = reader.recordings()
-    if not stores:
-        raise SessionError(f"{called}: holds no recording")
-    if stores[0].application_id != APP:
-        raise SessionError(
-            f"{called}: expected a recording of {APP}, found one of '{stores[0].application_id[:60]}'"
-        )
-    return reader, stores[0].recording_id
-
-
-def _chunks(reader: RrdReader, path: Path) -> Iterator[Chunk]:
-    with _reading(path):
-        stream = iter(reader.stream())
-    while True:
-        with _reading(path):
-            chunk = next(stream, None)
-        if chunk is None:
-            return
-        yield chunk
-
-
-def _check_magic(path: Path, called: Path) -> None:
-    try:
-        with path.open("rb") as handle:
-            magic = handle.read(len(_MAGIC))
-    except FileNotFoundError:
-        raise SessionError(f"{called}: no such file") from None
-    except OSError as error:
-        raise SessionError(f"{called}: cannot be read: {error.strerror}") from error
-    if magic != _MAGIC:
-        raise SessionError(f"{called}: expected a Rerun recording (.rrd), found another kind of file")
-
-
-@contextmanager
-def _reading(path: Path) -> Iterator[None]:
-    try:
-        with warnings.catch_warnings():
-            # A session that was killed has no footer; that is no news to its reader.
-            warnings.simplefilter("ignore")
-            yield
-    except _UNREADABLE as error:
-        if any(sign in str(error) for sign in _TORN):
-            raise SessionError(
-                f"{path}: the file is torn: its last message is cut; "
-                "`pdtui sessions repair` rescues what is before it"
-            ) from error
-        raise SessionError(f"{path}: cannot be read as a recording: {error}") from error
+        return read(memoryview(payload))
+    except _DAMAGED as error:
+        why = " ".join(str(error).split())[:200]
+        raise SessionError(f"byte {frame.start}: a message is damaged: {why}; {RESCUE}") from error

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.compute as pc
-from rerun.chunk import Chunk
+import rerun.chunk
 
 from pdtui.errors import SessionError
-from pdtui.sessions.file import SessionFile, readable_chunks
-from pdtui.sessions.frames import without_torn_tail
+from pdtui.sessions.file import SessionFile, Stream
 from pdtui.sessions.heading import Heading, read_heading
 from pdtui.sessions.properties import info_from_properties
 from pdtui.sessions.record import DriveInfo
@@ -49,9 +48,7 @@ def examine(path: Path) -> Condition:
     Raises:
         SessionError: no session, or cut before everything that determines the run was written.
     """
-    with without_torn_tail(path) as readable:
-        file = SessionFile(readable, only=(DIGEST_EPISODE,), torn=True, called=path)
-        finished = readable == path and file.complete and file.has_footer()
+    file = SessionFile(path, only=(DIGEST_EPISODE,), torn=True)
     try:
         info, _ = info_from_properties(file.properties(INFO))
         steps = file.rows(DRIVE).steps
@@ -61,7 +58,7 @@ def examine(path: Path) -> Condition:
     kept = int(gaps[0]) if gaps.size else len(steps)
     said = file.properties(OUTCOME).get("outcome", [])
     outcome = said[0] if len(said) == 1 and isinstance(said[0], str) else ""
-    whole = finished and not gaps.size and bool(outcome)
+    whole = file.finished and not gaps.size and bool(outcome)
     return Condition(info, kept, outcome, file.recording_id, whole)
 
 
@@ -86,8 +83,7 @@ def repair_session(path: Path, output: Path) -> Heading:
         os.close(handle)
     beside = Path(name)
     try:
-        with without_torn_tail(path) as readable:
-            _rewrite(readable, beside, condition)
+        _rewrite(path, beside, condition)
         repaired = read_heading(beside)
         if repaired.steps != condition.steps:
             raise SessionError(f"{path}: {condition.steps} steps were there, {repaired.steps} were rescued")
@@ -114,16 +110,18 @@ def _rewrite(path: Path, output: Path, condition: Condition) -> None:
         recording.disconnect()
 
 
-def _kept(path: Path, steps: int) -> Iterator[Chunk]:
+def _kept(path: Path, steps: int) -> Iterator[rerun.chunk.Chunk]:
     """Chunks without the rows of later steps: a batch's events and views may be there without its drive."""
-    for chunk in readable_chunks(path):
-        if STEP not in chunk.timeline_names:
-            yield chunk
-            continue
-        batch = chunk.to_record_batch()
-        early = pc.less(batch.column(STEP), steps)
-        count = pc.sum(early).as_py() or 0
-        if count == batch.num_rows:
-            yield chunk
-        elif count:
-            yield from Chunk.from_record_batch(batch.filter(early))
+    stream = iter(Stream(path))
+    while True:
+        try:
+            chunk = next(stream, None)
+        except SessionError:  # the rest is what is left out
+            return
+        if chunk is None:
+            return
+        batch = chunk.batch
+        if STEP in chunk.timelines:
+            batch = batch.filter(pc.less(batch.column(STEP), steps))
+        if batch.num_rows:
+            yield from rerun.chunk.Chunk.from_record_batch(batch)
