@@ -9,6 +9,8 @@ from functools import lru_cache
 @lru_cache(maxsize=512)
 def plain(text: str) -> str:
     """Text from a file without anything that a terminal would obey: control and formatting characters."""
+    if text.isprintable():
+        return text
     return "".join(
         " " if character in "\t\n" else "\N{REPLACEMENT CHARACTER}" if _obeyed(character) else character
         for character in text

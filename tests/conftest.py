@@ -10,6 +10,7 @@ import torch
 
 from pdtui.dissection.dissect import dissect
 from pdtui.dissection.findings import Dissection
+from pdtui.policies.choices import FOLDERS
 from pdtui.policies.files import save_network
 from pdtui.policies.load import load_policy
 from pdtui.policies.network import NetworkSpec, PolicyNetwork
@@ -68,6 +69,14 @@ def viewer() -> Iterator[RealViewer]:
     """The Rerun viewer, without a window."""
     with real_viewer() as started:
         yield started
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _weights_anywhere(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Maps and sessions of tests may name weights in any folder of the tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(FOLDERS, str(tmp_path_factory.getbasetemp()))
+        yield
 
 
 @pytest.fixture(scope="session")

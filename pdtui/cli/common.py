@@ -150,7 +150,8 @@ def show_result(data: dict[str, Any], as_json: bool, table: Callable[[], Any]) -
         return
     from rich.console import Console
 
-    Console().print(table())
+    # Names in tables come from maps and sessions, so nothing in them is markup.
+    Console(markup=False, emoji=False).print(table())
 
 
 def progress_bar_or_none(

@@ -8,6 +8,7 @@ import click
 
 from pdtui.cli.common import choice_options, progress_bar_or_none
 from pdtui.policies.choices import PolicyChoices
+from pdtui.text import plain
 
 
 @click.group()
@@ -77,5 +78,5 @@ def episode(
         )
     draw_episode(output, curves, start=start, seconds=seconds)
     for pair in curves.pairs:
-        click.echo(f"{pair.attribute.name}: unit {pair.unit}, discrepancy {pair.discrepancy:.3g}")
+        click.echo(f"{plain(pair.attribute.name)}: unit {pair.unit}, discrepancy {pair.discrepancy:.3g}")
     click.echo(f"wrote {output}")

@@ -117,9 +117,10 @@ def _drive_headless(order: DriveOrder, keys: Path | None, steps: int, record: Pa
         f"{summary.steps} steps, {summary.seconds:g} s simulated; falls {summary.falls}, "
         f"steps with a key {summary.involvement}"
     )
-    click.echo("mean " + ", ".join(f"{name} {value:.3g}" for name, value in list(summary.mean.items())[:8]))
+    means = ", ".join(f"{name} {value:.3g}" for name, value in list(summary.mean.items())[:8])
+    click.echo(plain(f"mean {means}"))
     if record is not None:
-        click.echo(f"recorded in {record}")
+        click.echo(plain(f"recorded in {record}"))
 
 
 def _drive_on_screen(order: DriveOrder, recording: Path | None, fps: int) -> None:
@@ -143,7 +144,7 @@ def _show(order: DriveOrder, *, fps: int, watching: bool = False) -> None:
         last_words = link.close()
     if app.return_code or link.failed:
         raise ScreenError(message or last_words)
-    click.echo(last_words)
+    click.echo(plain(last_words))
 
 
 def pick_and_drive() -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
-from hashlib import sha256
+from hashlib import file_digest
+from os import fstat
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,12 @@ from safetensors.torch import save
 
 from pdtui.errors import PolicyError
 from pdtui.policies.choices import find_beside
-from pdtui.policies.network import NetworkSpec, PolicyNetwork
+from pdtui.policies.network import NetworkSpec, PolicyNetwork, check_tensors
+from pdtui.reading import open_regular
 
 WEIGHTS = Path(__file__).parent / "weights"
+MAX_BYTES = 1 << 30
+"""Of a file of weights."""
 _KEY = "pdtui"
 
 
@@ -39,6 +43,8 @@ def find_weights(name: str, folders: Sequence[Path] = ()) -> Path:
 def is_own_format(path: Path) -> bool:
     """Whether `save_network` wrote the file: safetensors with metadata of ours."""
     try:
+        with open_regular(path):
+            pass  # no pipe is waited for
         with safe_open(str(path), framework="pt") as handle:
             return _KEY in (handle.metadata() or {})
     except (OSError, SafetensorError):
@@ -52,7 +58,8 @@ def file_hash(path: Path) -> str:
         PolicyError: the file cannot be read.
     """
     try:
-        return sha256(path.read_bytes()).hexdigest()
+        with open_regular(path) as file:
+            return file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise PolicyError(f"{path}: cannot be read: {error.strerror}") from error
 
@@ -73,12 +80,7 @@ def load_network(path: Path) -> PolicyNetwork:
     Raises:
         PolicyError: not a safetensors file, no metadata of ours, or tensors that do not fit it.
     """
-    try:
-        with safe_open(str(path), framework="pt") as handle:
-            metadata: dict[str, str] = handle.metadata() or {}
-            tensors: dict[str, torch.Tensor] = {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118
-    except (OSError, SafetensorError) as error:
-        raise PolicyError(f"{path}: expected a safetensors file: {error}") from error
+    metadata, tensors = _read(path)
     if _KEY not in metadata:
         found = ", ".join(sorted(tensors)[:6])
         raise PolicyError(f"{path}: expected metadata '{_KEY}' in the file; it holds tensors {found}")
@@ -86,10 +88,31 @@ def load_network(path: Path) -> PolicyNetwork:
         fields: dict[str, Any] = json.loads(metadata[_KEY])
         for name in ("layers", "action_low", "action_high"):
             fields[name] = tuple(fields[name])
-        network = PolicyNetwork(NetworkSpec(**fields))
+        spec = NetworkSpec(**fields)
+        # Before anything of the sizes that it names is made.
+        spec.check_values()
+        with torch.device("meta"):
+            expected = PolicyNetwork(spec).state_dict()
+        check_tensors(expected, tensors)
+        network = PolicyNetwork(spec)
         network.load_tensors(tensors)
-    except (TypeError, KeyError, ValueError) as error:
-        raise PolicyError(f"{path}: metadata '{_KEY}' is not complete: {error}") from error
     except PolicyError as error:
         raise PolicyError(f"{path}: {error}") from error
+    except (TypeError, KeyError, ValueError, RuntimeError, RecursionError) as error:
+        raise PolicyError(f"{path}: metadata '{_KEY}' is not complete: {error}") from error
     return network.eval()
+
+
+def _read(path: Path) -> tuple[dict[str, str], dict[str, torch.Tensor]]:
+    try:
+        with open_regular(path) as file:
+            size = fstat(file.fileno()).st_size
+        if size > MAX_BYTES:
+            raise PolicyError(
+                f"{path}: expected weights of at most {MAX_BYTES >> 20} MiB, found {size >> 20} MiB"
+            )
+        with safe_open(str(path), framework="pt") as handle:
+            metadata: dict[str, str] = handle.metadata() or {}
+            return metadata, {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118
+    except (OSError, SafetensorError, RuntimeError, TypeError, ValueError) as error:
+        raise PolicyError(f"{path}: expected a safetensors file: {error}") from error

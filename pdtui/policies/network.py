@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Literal, get_args
@@ -22,6 +23,7 @@ ACTIVATIONS: dict[str, type[nn.Module]] = {
     "sigmoid": nn.Sigmoid,
     "softplus": nn.Softplus,
 }
+MAX_WIDTH, MAX_LAYERS = 1 << 20, 100
 Head = Literal["squashed_gaussian", "tanh", "gaussian", "mean", "categorical"]
 LogStd = Literal["output", "parameter"]
 
@@ -84,6 +86,26 @@ class NetworkSpec:
                 f"got {len(self.action_low)} and {len(self.action_high)}"
             )
 
+    def check_values(self) -> None:
+        """See that every field is what it is said to be; a file may say anything.
+
+        Raises:
+            PolicyError: one is not.
+        """
+        sizes = (self.observations, self.actions, *self.layers)
+        if not all(type(size) is int and 0 < size <= MAX_WIDTH for size in sizes):
+            raise PolicyError(f"expected sizes of 1 to {MAX_WIDTH}, found {str(sizes)[:80]}")
+        if not 0 < len(self.layers) <= MAX_LAYERS:
+            raise PolicyError(f"expected 1 to {MAX_LAYERS} hidden layers, found {len(self.layers)}")
+        limits = (self.log_std_low, self.log_std_high, self.mean_limit, self.observation_clip)
+        for value in (*limits, *self.action_low, *self.action_high):
+            if type(value) not in (int, float) or not -1e30 < value < 1e30:
+                raise PolicyError(f"expected bounds and limits that are numbers, found {str(value)[:40]}")
+        if not isinstance(self.robot, str) or not isinstance(self.command, str):
+            raise PolicyError("expected robot and command as text")
+        if not isinstance(self.score, dict):
+            raise PolicyError("expected a score by name")
+
     @property
     def gaussian(self) -> bool:
         """Whether the action is drawn from a Gaussian."""
@@ -140,15 +162,9 @@ class PolicyNetwork(nn.Module):
         Raises:
             PolicyError: a tensor is missing, superfluous, of another shape or not finite.
         """
-        expected = {name: tuple(tensor.shape) for name, tensor in self.state_dict().items()}
-        found = {name: tuple(tensor.shape) for name, tensor in tensors.items()}
-        for name in sorted(expected.keys() | found.keys()):
-            if expected.get(name) != found.get(name):
-                raise PolicyError(
-                    f"tensor '{name}': expected shape {expected.get(name, 'none')}, "
-                    f"found {found.get(name, 'none')}"
-                )
-            if not bool(torch.isfinite(tensors[name]).all()):
+        check_tensors(self.state_dict(), tensors)
+        for name, tensor in tensors.items():
+            if not bool(torch.isfinite(tensor).all()):
                 raise PolicyError(f"tensor '{name}': expected finite numbers, found NaN or infinity")
         self.load_state_dict(tensors)
         mean, std = self.normaliser.mean, self.normaliser.std
@@ -167,3 +183,16 @@ class PolicyNetwork(nn.Module):
         for stage in self.stages():
             x = stage(x)
         return x
+
+
+def check_tensors(expected: Mapping[str, torch.Tensor], found: Mapping[str, torch.Tensor]) -> None:
+    """See that tensors have the names and shapes of others, whose numbers are not looked at.
+
+    Raises:
+        PolicyError: a tensor is missing, superfluous, or of another shape.
+    """
+    shapes, others = ({name: tuple(one.shape) for name, one in all.items()} for all in (expected, found))
+    for name in sorted(shapes.keys() | others.keys()):
+        if shapes.get(name) != others.get(name):
+            wanted, there = (all.get(name, "none") for all in (shapes, others))
+            raise PolicyError(f"tensor '{name}': expected shape {wanted}, found {there}")

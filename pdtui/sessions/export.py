@@ -75,8 +75,9 @@ def _gains(session: Session) -> Columns:
 
 
 def _activations(session: Session) -> Columns:
-    units = [format_unit(unit, session.info.layers) for unit in range(sum(session.info.layers))]
-    return _named(read_activations(session.path), units)
+    activations = read_activations(session.path)
+    units = [format_unit(unit, session.info.layers) for unit in range(activations.shape[1])]
+    return _named(activations, units)
 
 
 def _behaviors(session: Session) -> Columns:

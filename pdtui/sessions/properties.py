@@ -15,7 +15,7 @@ from pdtui.sessions.schema import SCHEMA
 
 T = TypeVar("T")
 _SIZES = {"capsule": 2, "sphere": 1, "box": 3}
-_MAX_LINKS, _MAX_WIDTH = 10_000, 10_000_000
+_MAX_LINKS, _MAX_UNITS, _MAX_TEXT = 10_000, 4_000_000, 1000
 
 
 def info_to_properties(info: DriveInfo, created: str) -> dict[str, Any]:
@@ -64,8 +64,10 @@ def info_from_properties(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo
     if not (math.isfinite(dt) and 0 < dt < 1e6):
         raise SessionError(f"property 'dt': expected a time in s, found {dt}")
     layers = properties.get("layers", [])
-    if not layers or not all(type(width) is int and 0 < width <= _MAX_WIDTH for width in layers):
+    if not layers or not all(type(width) is int and width > 0 for width in layers):
         raise SessionError("property 'layers': expected the widths of the hidden layers")
+    if sum(layers) > _MAX_UNITS:
+        raise SessionError(f"property 'layers': expected at most {_MAX_UNITS} units, found {sum(layers)}")
     info = DriveInfo(
         robot=_one(properties, "robot", str),
         seed=int(seed),
@@ -98,7 +100,7 @@ def _listed(
         if not isinstance(items, list) or len(items) > _MAX_LINKS:
             raise ValueError("not a list of bearable length")
         return tuple(build(item) for item in items)
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         raise SessionError(f"property '{name}': not what pdtui writes: {error!r}") from error
 
 
@@ -125,6 +127,9 @@ def _link(item: dict[str, Any]) -> Link:
 def _text(value: Any) -> str:
     if not isinstance(value, str):
         raise ValueError(f"expected text, found {type(value).__name__}")
+    if len(value) > _MAX_TEXT:
+        raise ValueError(f"expected at most {_MAX_TEXT} characters, found {len(value)}")
+    value.encode()  # JSON can name halves of characters, which nobody could write
     return value
 
 

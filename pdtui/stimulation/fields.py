@@ -9,6 +9,11 @@ from typing import Any
 from pdtui.errors import MapError
 
 NUMBER = (int, float)
+MAX_TEXT = 1000
+"""Characters of one text."""
+MAX_ENTRIES = 4096
+"""Entries of one list or table of numbers."""
+_MAX_WHOLE = 2**53  # larger ones are no longer what they say once they are floating point
 
 
 class FieldTable:
@@ -30,13 +35,17 @@ class FieldTable:
         value = self._data.pop(name)
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
             raise self.error(name, f"expected {_name(kind)}, found {_kind(value)}")
-        if isinstance(value, float) and not math.isfinite(value):
-            raise self.error(name, "expected a finite number")
+        if isinstance(value, NUMBER) and not _is_bearable(value):
+            raise self.error(name, "expected a finite number of bearable size")
+        if isinstance(value, list | dict) and len(value) > MAX_ENTRIES:
+            raise self.error(name, f"expected at most {MAX_ENTRIES} entries, found {len(value)}")
         return value
 
     def text(self, name: str, default: Any = ...) -> str:
         """A field of printable text."""
         value: str = self.take(name, str, default)
+        if len(value) > MAX_TEXT:
+            raise self.error(name, f"expected at most {MAX_TEXT} characters, found {len(value)}")
         if not value.isprintable():
             raise self.error(name, "expected printable text, found a control character")
         return value
@@ -61,8 +70,8 @@ class FieldTable:
         """A field that is a table of finite numbers."""
         data = self.take(name, dict, default)
         for key, value in data.items():
-            if isinstance(value, bool) or not isinstance(value, NUMBER) or not math.isfinite(value):
-                raise self.error(name, f"'{key}': expected a finite number, found {value!r}")
+            if isinstance(value, bool) or not isinstance(value, NUMBER) or not _is_bearable(value):
+                raise self.error(name, f"'{key[:80]}': expected a finite number, found {_shown(value)}")
         return {key: float(value) for key, value in data.items()}
 
     def done(self) -> None:
@@ -74,6 +83,11 @@ class FieldTable:
         """An error that names this table's line and a field."""
         line = _line_of(self._text, self._header, self._number, name)
         return MapError(f"{self._source}:{line}: {self._where}: field '{name}' {problem}")
+
+
+def _is_bearable(value: float) -> bool:
+    """Not infinite, not NaN; TOML's whole numbers have no end either."""
+    return abs(value) <= _MAX_WHOLE if isinstance(value, int) else math.isfinite(value)
 
 
 def _line_of(text: str, header: str, number: int, field: str) -> int:
@@ -91,6 +105,10 @@ def _line_of(text: str, header: str, number: int, field: str) -> int:
         if pattern.search(lines[row].split("#")[0]):
             return row + 1
     return start + 1
+
+
+def _shown(value: Any) -> str:
+    return repr(value[:40]) if isinstance(value, str) else _kind(value)
 
 
 def _name(kind: type | tuple[type, ...]) -> str:

@@ -9,6 +9,7 @@ from typing import cast, get_args
 from pdtui.errors import MapError
 from pdtui.policies.choices import ACTIVATION_NAMES, SQUASH_NAMES, PolicyChoices
 from pdtui.policies.units import ADDRESS
+from pdtui.reading import read_at_most
 from pdtui.stimulation.fields import NUMBER, FieldTable
 from pdtui.stimulation.maps import (
     RESERVED_KEYS,
@@ -23,7 +24,8 @@ from pdtui.stimulation.maps import (
     StimulationMap,
 )
 
-_MAX_BYTES = 1_000_000
+MAX_BYTES = 1_000_000
+"""Of a map's text. 100 behaviors of 60 units have 200,000."""
 
 
 def load_map(path: Path) -> StimulationMap:
@@ -33,10 +35,10 @@ def load_map(path: Path) -> StimulationMap:
         MapError: the file is missing, is no TOML, or a field is wrong; the message names line and field.
     """
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise MapError(f"{path}: expected a map of at most {_MAX_BYTES} bytes")
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_at_most(path, MAX_BYTES).decode("utf-8")
+    except OSError as error:
+        raise MapError(f"{path}: cannot be read as a map: {error.strerror}") from error
+    except UnicodeDecodeError as error:
         raise MapError(f"{path}: cannot be read as a map: {error}") from error
     return parse_map(text, str(path))
 
@@ -47,9 +49,11 @@ def parse_map(text: str, source: str) -> StimulationMap:
     Raises:
         MapError: as `load_map`.
     """
+    if len(text) > MAX_BYTES:
+        raise MapError(f"{source}: expected a map of at most {MAX_BYTES} characters")
     try:
         data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # a whole number of too many digits is no TOMLDecodeError
         raise MapError(f"{source}: not a TOML file: {error}") from error
     top = FieldTable(source, text, "top level", data, "", 0)
     if (schema := top.take("schema", int)) != SCHEMA:

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any, cast
 
 import tomlkit
+from tomlkit.exceptions import TOMLKitError
 
-from pdtui.policies.choices import NO_CHOICES, NO_NORMALISER, PolicyChoices, find_beside
+from pdtui.errors import MapError
+from pdtui.policies.choices import NO_CHOICES, NO_NORMALISER, PolicyChoices, find_inside
 from pdtui.stimulation.maps import StimulationMap
 
 
@@ -24,27 +26,45 @@ def settle(
         stimulation_map: as its file has it.
         policy: weights to use instead of the map's; empty for those.
         choices: of this drive; where they are silent, the map's hold.
+
+    Raises:
+        PolicyError: the map names a file outside of its own folder and the working directory.
+        MapError: its text cannot be changed.
     """
-    folder = Path(stimulation_map.source).parent
-    name = policy or _from_here(stimulation_map.policy, folder)
+    found = locate(stimulation_map, policy, choices)
+    if (found.policy, found.choices) == (stimulation_map.policy, stimulation_map.choices):
+        return stimulation_map
+    try:
+        document = tomlkit.parse(stimulation_map.text)
+    except TOMLKitError as error:
+        raise MapError(f"{stimulation_map.source}: not a TOML file: {error}") from error
+    table = cast(dict[str, Any], document.setdefault("policy", tomlkit.table()))
+    table["name"] = found.policy
+    table.update({field: value for field, value in asdict(found.choices).items() if value})
+    return replace(found, text=tomlkit.dumps(document))
+
+
+def locate(
+    stimulation_map: StimulationMap, policy: str = "", choices: PolicyChoices = NO_CHOICES
+) -> StimulationMap:
+    """As `settle`, but the map's text stays as it is.
+
+    Raises:
+        PolicyError: the map names a file outside of its own folder and the working directory.
+    """
+    source = stimulation_map.source
+    folder = Path(source).parent
+    name = policy or _from_here(stimulation_map.policy, folder, source)
     merged = choices.over(stimulation_map.choices)
     if merged.normaliser != NO_NORMALISER and not choices.normaliser:
-        merged = replace(merged, normaliser=_from_here(merged.normaliser, folder))
-    if (name, merged) == (stimulation_map.policy, stimulation_map.choices):
-        return stimulation_map
-    document = tomlkit.parse(stimulation_map.text)
-    table = cast(dict[str, Any], document.setdefault("policy", tomlkit.table()))
-    table["name"] = name
-    table.update({field: value for field, value in asdict(merged).items() if value})
-    return replace(stimulation_map, policy=name, choices=merged, text=tomlkit.dumps(document))
+        merged = replace(merged, normaliser=_from_here(merged.normaliser, folder, source))
+    return replace(stimulation_map, policy=name, choices=merged)
 
 
-def _from_here(name: str, folder: Path) -> str:
+def _from_here(name: str, folder: Path, source: str) -> str:
     """The name of a file as the working directory reaches it; as it is where it is found so, or nowhere."""
-    if not name or find_beside(name, ()) is not None:
-        return name
-    found = find_beside(name, (folder,))
-    if found is None:
+    found = find_inside(name, (folder,), source) if name else None
+    if found is None or found == Path(name):
         return name
     here = Path.cwd()
     return str(found.resolve().relative_to(here) if found.resolve().is_relative_to(here) else found.resolve())

@@ -12,6 +12,8 @@ from pdtui.stimulation.latch import ActiveBehavior
 from pdtui.stimulation.maps import StimulationMap
 from pdtui.teleop.loop import ControlLoop
 
+MAX_BYTES = 10_000_000
+"""Of a keystroke file; a key in every step of an hour has 2 million."""
 FACTOR_STEP = 1.25
 REWIND_SECONDS = 3.0
 _LINE = re.compile(r"(\d{1,9})\s+(\S+)")
@@ -83,7 +85,11 @@ def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, li
         EventError: the file cannot be read, or a line is not what was expected; the line is named.
     """
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        with path.open("rb") as file:  # it may be a pipe
+            read = file.read(MAX_BYTES + 1)
+        if len(read) > MAX_BYTES:
+            raise EventError(f"{path}: expected at most {MAX_BYTES} bytes of keystrokes, there are more")
+        lines = read.decode("utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise EventError(f"{path}: cannot be read as keystrokes: {error}") from error
     known = run_keys(stimulation_map)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -151,7 +152,7 @@ class ControlLoop:
             case "reset":
                 self._start_episode()
             case "rewind":
-                self._rewind(int(event.value))
+                self._rewind(event.value)
             case _:
                 raise EventError(f"step {event.step}: unknown event '{event.kind}'")
 
@@ -171,7 +172,8 @@ class ControlLoop:
         while len(self._moments) > SNAPSHOTS_KEPT:
             self._moments.popitem(last=False)
 
-    def _rewind(self, step: int) -> None:
+    def _rewind(self, value: float) -> None:
+        step = int(value) if math.isfinite(value) else -1
         if step not in self._moments:
             known = f"{self.rewindable[0]}..{self.rewindable[-1]}" if self._moments else "none yet"
             raise EventError(

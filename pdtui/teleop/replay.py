@@ -17,6 +17,7 @@ from pdtui.sessions.events import events_by_step
 from pdtui.sessions.reader import Session, read_session
 from pdtui.sessions.versions import differences, differences_that_compute, environment_versions
 from pdtui.stimulation.mapfile import parse_map
+from pdtui.stimulation.settle import locate
 from pdtui.teleop.drive import build_loop
 from pdtui.teleop.loop import ControlLoop
 from pdtui.teleop.order import DriveOrder
@@ -99,9 +100,11 @@ def order_of(session: Session, source: str, policy: str = "") -> DriveOrder:
 
     Raises:
         MapError: the map inside the session is broken.
+        PolicyError: it names a file that lies outside of the session's folder and the working directory.
     """
     info = session.info
     stimulation_map = parse_map(info.map_text, f"{source} (map)")
+    stimulation_map = locate(stimulation_map, policy)
     # A drive that was forced had other weights than its map was made for; a replay wants the session's own.
     stimulation_map = replace(stimulation_map, policy_hash=info.policy_hash)
     return DriveOrder(
@@ -148,7 +151,7 @@ def replay_session(
     """
     session = read_session(path)
     given = policy if isinstance(policy, Policy) else None
-    order = order_of(session, str(path), policy if isinstance(policy, str) else "")
+    order = order_of(session, str(path), policy if isinstance(policy, str) else "given")
     loop = build_loop(replace(order, force=force), robot, given)
     if loop.robot.attributes != session.info.attributes:
         raise SessionError(f"{path}: the robot measures other attributes now; nothing can be compared")

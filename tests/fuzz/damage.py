@@ -1,0 +1,121 @@
+"""How files are damaged: bytes turned, cut, put in and moved; lengths changed; also inside what is packed."""
+
+from __future__ import annotations
+
+import struct
+
+import pyarrow as pa
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from pdtui.sessions import wire
+
+_LENGTHS = (0, 1, 7, 16, 255, 2**16, 2**31 - 1, 2**31, 2**32, 2**48, 2**62, 2**63, 2**64 - 1)
+_WORDS = (
+    b'"', b"\n", b"[", b"]]", b"{", b"= ", b"1e999", b"-nan", b"9" * 400, b"0x" + b"f" * 900, b"\x1b[2J",
+    b"\xe2\x80\xae", b"../../etc/passwd", b"/dev/zero", b"\\ud800", b"\xff", b"null", b"-1", b"true",
+)  # fmt: skip
+
+
+class Content(bytes):
+    """What is in a file; errors do not print it."""
+
+    def __repr__(self) -> str:
+        return f"Content of {len(self)} bytes"
+
+
+@st.composite
+def damaged(draw: DrawFn, content: Content) -> bytes:
+    """The content with one to four things wrong with it."""
+    data = bytearray(content)
+    for _ in range(draw(st.integers(1, 4))):
+        place = draw(st.integers(0, max(0, len(data) - 1)))
+        _damage(draw, data, place)
+    return bytes(data)
+
+
+def _damage(draw: DrawFn, data: bytearray, place: int) -> None:
+    span = draw(st.integers(1, 40))
+    match draw(st.integers(0, 6)):
+        case 0 if data:
+            data[place] ^= 1 << draw(st.integers(0, 7))
+        case 1:
+            data[place : place + 1] = bytes([draw(st.integers(0, 255))])
+        case 2:
+            del data[place:]
+        case 3:
+            del data[place : place + span]
+        case 4:
+            data[place:place] = draw(st.binary(min_size=1, max_size=40))
+        case 5:
+            other = draw(st.integers(0, max(0, len(data) - 1)))
+            data[place:place] = data[other : other + 25 * span]
+        case _:
+            data[place:place] = draw(st.sampled_from(_WORDS))
+
+
+@st.composite
+def damaged_session(draw: DrawFn, content: Content) -> bytes:
+    """As `damaged`; or with another length of a message, or with a message whose rows are damaged."""
+    kind = draw(st.integers(0, 3))
+    if kind == 0:
+        return draw(damaged(content))
+    starts = _starts(content)
+    start = draw(st.sampled_from(starts))
+    if kind == 1:
+        data = bytearray(content)
+        which = draw(st.sampled_from((0, 8)))
+        struct.pack_into("<Q", data, start + which, draw(st.sampled_from(_LENGTHS)))
+        return bytes(data)
+    length = struct.unpack_from("<QQ", content, start)[1]
+    end = start + 16 + length
+    payload = _damaged_inside(draw, content[start + 16 : end])
+    kind_of_it = content[start : start + 8]
+    rest = content[end:] if draw(st.booleans()) else b""
+    return content[:start] + kind_of_it + struct.pack("<Q", len(payload)) + payload + rest
+
+
+def damaged_weights(content: Content) -> SearchStrategy[bytes]:
+    """As `damaged`, mostly in the header, which says what the rest is."""
+    (length,) = struct.unpack_from("<Q", content)
+    header, rest = Content(content[8 : 8 + length]), content[8 + length :]
+    repacked = damaged(header).map(lambda changed: struct.pack("<Q", len(changed)) + changed + rest)
+    return st.one_of(
+        damaged(content), repacked, damaged(Content(content[: 8 + length])).map(lambda some: some + rest)
+    )
+
+
+def _starts(content: bytes) -> list[int]:
+    starts, place = [], 12
+    while place + 16 <= len(content):
+        starts.append(place)
+        kind, length = struct.unpack_from("<QQ", content, place)
+        if kind == 0:
+            break
+        place += 16 + length
+    return starts
+
+
+def _damaged_inside(draw: DrawFn, payload: bytes) -> bytes:
+    """The message with rows that are damaged beneath their compression."""
+    try:
+        found = wire.fields(memoryview(payload))
+        packed, size = wire.part(found, 5), wire.number(found, 3)
+        plain = pa.decompress(packed, size, codec="lz4_raw")
+    except (ValueError, OSError, pa.ArrowException):
+        return draw(damaged(Content(payload)))
+    changed = draw(damaged(Content(plain)))
+    parts = [_field(1, wire.part(found, 1)), b"\x10\x01", b"\x20\x01", _field(5, memoryview(changed))]
+    return b"".join(parts)
+
+
+def _field(number: int, content: memoryview) -> bytes:
+    return bytes([number << 3 | 2]) + _varint(len(content)) + bytes(content)
+
+
+def _varint(value: int) -> bytes:
+    found = bytearray()
+    while value > 127:
+        found.append(value & 127 | 128)
+        value >>= 7
+    return bytes([*found, value])

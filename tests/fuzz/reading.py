@@ -1,0 +1,140 @@
+"""A process that reads damaged files, so that one which takes it down is seen as a failing test."""
+
+from __future__ import annotations
+
+import resource
+import select
+import subprocess
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+from pdtui.errors import PdtuiError
+
+SECONDS = 30
+"""What reads so long hangs."""
+MEMORY = 1 << 30
+"""Bytes of memory that reading one small file may take beyond what the process had."""
+_ADDRESSES = 32 << 30  # a last line, so that a fault here does not take the machine's memory
+
+
+class Reader:
+    """Reads files in a child process, which is started anew when a file has ended it.
+
+    Args:
+        map_path: the map that keystroke files are read for.
+    """
+
+    def __init__(self, map_path: Path) -> None:
+        self._map_path = map_path
+        self._child: subprocess.Popen[str] | None = None
+
+    def read(self, kind: str, path: Path) -> str:
+        """Read a file: ``read``, ``refused: …`` with the error's message, or what else happened."""
+        if self._child is None:
+            self._child = subprocess.Popen(
+                [sys.executable, "-m", "tests.fuzz.reading", str(self._map_path)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            self._answer()
+        assert self._child.stdin is not None
+        print(kind, path, file=self._child.stdin, flush=True)
+        return self._answer()
+
+    def close(self) -> None:
+        """End the child."""
+        if self._child is not None:
+            self._child.kill()
+            self._child.communicate()
+            self._child = None
+
+    def _answer(self) -> str:
+        assert self._child is not None
+        assert self._child.stdout is not None
+        if not select.select([self._child.stdout], [], [], SECONDS)[0]:
+            self.close()
+            return f"it hangs: no answer in {SECONDS} s"
+        line = self._child.stdout.readline()
+        if not line:
+            code = self._child.wait()
+            self.close()
+            return f"the process ended with {code}"
+        return line.strip()
+
+
+def read_session_file(path: Path) -> None:
+    """Everything that a command does with a session before it simulates."""
+    from rich.console import Console
+
+    from pdtui.cli.session_tables import compare_table, show_table
+    from pdtui.sessions.compare import compare_sessions
+    from pdtui.sessions.reader import read_activations, read_session
+    from pdtui.sessions.repair import examine, repair_session
+    from pdtui.sessions.summary import summarize
+    from pdtui.teleop.keys import write_keystrokes
+    from pdtui.teleop.replay import order_of
+
+    output = path.with_name("repaired.rrd")
+    try:
+        session = read_session(path)
+    except PdtuiError:
+        if examine(path).steps:
+            repair_session(path, output)
+            assert examine(output).whole
+        raise
+    read_activations(path)
+    examine(path)
+    with Path("/dev/null").open("w") as nowhere:
+        console = Console(file=nowhere)
+        console.print(show_table(session, summarize(session)))
+        console.print(compare_table(compare_sessions(session, session)))
+    write_keystrokes(session.events)
+    order_of(session, str(path))
+
+
+def _reads(map_path: Path) -> dict[str, Callable[[Path], object]]:
+    from pdtui.policies.load import load_policy
+    from pdtui.stimulation.mapfile import load_map
+    from pdtui.stimulation.settle import settle
+    from pdtui.teleop.keys import read_keystrokes
+
+    known = load_map(map_path)
+    return {
+        "session": read_session_file,
+        "map": lambda path: settle(load_map(path)),
+        "keys": lambda path: read_keystrokes(path, known),
+        "weights": load_policy,
+    }
+
+
+def _serve(map_path: Path) -> None:
+    reads = _reads(map_path)
+    resource.setrlimit(resource.RLIMIT_AS, (_ADDRESSES, _ADDRESSES))
+    print("ready", flush=True)
+    for line in sys.stdin:
+        kind, _, path = line.strip().partition(" ")
+        before = _peak()
+        try:
+            reads[kind](Path(path))
+            answer = "read"
+        except PdtuiError as error:
+            answer = f"refused: {error}"
+        except BaseException as error:
+            where = traceback.extract_tb(error.__traceback__)[-5:]
+            answer = (
+                f"{type(error).__name__}: {error} at {[(one.filename[-30:], one.lineno) for one in where]}"
+            )
+        if _peak() - before > MEMORY:
+            answer = f"it took {_peak() - before} bytes of memory"
+        print(ascii(answer), flush=True)
+
+
+def _peak() -> int:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+if __name__ == "__main__":
+    _serve(Path(sys.argv[1]))
