@@ -4,6 +4,9 @@ Every message names the thing at fault, what was expected of it and what is ther
 can print it as its only line.
 """
 
+import traceback
+from pathlib import PurePath
+
 
 class PdtuiError(Exception):
     """Base of every error that a user can cause or must hear of."""
@@ -29,8 +32,16 @@ class EventError(PdtuiError):
     """A keystroke file or an event cannot be applied."""
 
 
+class DriveEnded(PdtuiError):  # noqa: N818 - it names what happened
+    """A drive was ended from outside; its recording is whole."""
+
+
 class SessionError(PdtuiError):
     """A recording cannot be written, read or replayed."""
+
+
+class RecordingEnded(SessionError):  # noqa: N818 - it names what happened
+    """A recording had to end before its drive; what was recorded is whole."""
 
 
 class PictureError(PdtuiError):
@@ -43,3 +54,13 @@ class ScreenError(PdtuiError):
 
 class TrainingError(PdtuiError):
     """A training run cannot start or go on."""
+
+
+def said_of(error: BaseException) -> str:
+    """An exception in one line, for where no traceback can be printed: what it is, and where it was raised."""
+    words = " ".join(traceback.format_exception_only(error)[-1].split())
+    frames = traceback.extract_tb(error.__traceback__)
+    if not frames:
+        return words
+    last = frames[-1]
+    return f"{words} ({PurePath(last.filename).name}, line {last.lineno}, in {last.name})"

@@ -20,6 +20,7 @@ from pdtui.cli.common import (
 )
 from pdtui.errors import EventError, ScreenError, SessionError
 from pdtui.policies.choices import PolicyChoices
+from pdtui.sessions.schema import ACTIVATIONS_KEPT, ActivationsKept
 from pdtui.text import plain
 
 if TYPE_CHECKING:
@@ -39,6 +40,15 @@ if TYPE_CHECKING:
     "--record", type=click.Path(path_type=Path), help="Session file; default: a new one in ./sessions."
 )
 @click.option("--no-record", is_flag=True, help="Do not record.")
+@click.option(
+    "--record-activations",
+    "activations",
+    type=click.Choice(ACTIVATIONS_KEPT),
+    default="all",
+    show_default=True,
+    help="Activations in the session: as they are, as float16, or none but the picture of all. "
+    "A replay computes them again.",
+)
 @click.option("--fps", type=click.IntRange(1, 60), default=12, show_default=True, help="Frames a second.")
 @click.option("--headless", is_flag=True, help="No screen: drive from --keys, as fast as it goes.")
 @click.option("--keys", type=click.Path(path_type=Path), help="Keystrokes to drive from: lines 'STEP KEY'.")
@@ -55,13 +65,23 @@ def drive(
     stochastic: bool,
     record: Path | None,
     no_record: bool,
+    activations: ActivationsKept,
     fps: int,
     headless: bool,
     keys: Path | None,
     steps: int,
 ) -> None:
     """Drive ROBOT with its map's keys; ROBOT may be a map's file, too."""
-    order = order_of_drive(robot, map_name, policy, choices, force=force, seed=seed, stochastic=stochastic)
+    order = order_of_drive(
+        robot,
+        map_name,
+        policy,
+        choices,
+        force=force,
+        seed=seed,
+        stochastic=stochastic,
+        activations=activations,
+    )
     if record is not None and record.exists():
         raise SessionError(f"{record}: exists already; a drive is recorded into a new file")
     if keys is not None and not headless:
@@ -108,11 +128,14 @@ def _drive_headless(order: DriveOrder, keys: Path | None, steps: int, record: Pa
     from pdtui.sessions.recorder import SessionRecorder
     from pdtui.teleop.drive import build_loop, drive_headless
     from pdtui.teleop.keys import read_keystrokes
+    from pdtui.teleop.signals import ending_signals
 
     presses = read_keystrokes(keys, order.stimulation_map) if keys is not None else {}
     loop = build_loop(order)
-    recorder = SessionRecorder(record, loop.info) if record is not None else None
-    summary = drive_headless(loop, presses, steps, recorder)
+    info = replace(loop.info, activations=order.activations)
+    recorder = SessionRecorder(record, info) if record is not None else None
+    with ending_signals() as ended:
+        summary = drive_headless(loop, presses, steps, recorder, ended)
     click.echo(
         f"{summary.steps} steps, {summary.seconds:g} s simulated; falls {summary.falls}, "
         f"steps with a key {summary.involvement}"
@@ -143,7 +166,8 @@ def _show(order: DriveOrder, *, fps: int, watching: bool = False) -> None:
     finally:
         last_words = link.close()
     if app.return_code or link.failed:
-        raise ScreenError(message or last_words)
+        said = message or last_words
+        raise ScreenError(said if order.recording in said else f"{said}; {last_words}")
     click.echo(plain(last_words))
 
 

@@ -16,6 +16,12 @@ from pdtui.sessions.reader import Session
 from pdtui.sessions.summary import SessionSummary
 from pdtui.text import plain, size_of
 
+_KEPT = {
+    "all": "of every unit, in every step",
+    "half": "of every unit, in every step, as float16",
+    "off": "not recorded; a replay computes them again",
+}
+
 
 def _cell(text: object, style: str = "") -> Text:
     return Text(plain(str(text)), style)
@@ -58,6 +64,7 @@ def show_table(session: Session, summary: SessionSummary) -> Any:
         ("robot", info.robot),
         ("policy", f"{info.policy}, SHA-256 {info.policy_hash[:12]}…"),
         ("layers", " ".join(map(str, info.layers))),
+        ("activations", _KEPT[info.activations]),
         ("map", f"{len(info.map_text.splitlines())} lines, inside the session"),
         ("seed", f"{info.seed}{', actions drawn at random' if info.stochastic else ''}"),
         ("driven", session.created),

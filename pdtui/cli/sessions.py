@@ -78,6 +78,7 @@ def show(file: Path, as_json: bool) -> None:
         "seed": session.info.seed,
         "stochastic": session.info.stochastic,
         "layers": session.info.layers,
+        "activations": session.info.activations,
         "map": session.info.map_text,
         "created": session.created,
         "outcome": session.outcome,

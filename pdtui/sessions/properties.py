@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from pdtui.errors import SessionError
 from pdtui.robots.types import Attribute, Link
 from pdtui.sessions.record import DriveInfo
-from pdtui.sessions.schema import SCHEMA
+from pdtui.sessions.schema import ACTIVATIONS_KEPT, SCHEMA
 
 T = TypeVar("T")
 _SIZES = {"capsule": 2, "sphere": 1, "box": 3}
@@ -36,6 +36,7 @@ def info_to_properties(info: DriveInfo, created: str) -> dict[str, Any]:
         "stochastic": info.stochastic,
         "dt": info.dt,
         "layers": list(info.layers),
+        "activations": info.activations,
         "attributes": json.dumps([asdict(attribute) for attribute in info.attributes]),
         "links": json.dumps([asdict(link) for link in info.links]),
         "map": info.map_text,
@@ -68,6 +69,12 @@ def info_from_properties(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo
         raise SessionError("property 'layers': expected the widths of the hidden layers")
     if sum(layers) > _MAX_UNITS:
         raise SessionError(f"property 'layers': expected at most {_MAX_UNITS} units, found {sum(layers)}")
+    # Sessions from before there was a choice have them all.
+    kept = _one(properties, "activations", str) if "activations" in properties else "all"
+    if kept not in ACTIVATIONS_KEPT:
+        raise SessionError(
+            f"property 'activations': expected one of {', '.join(ACTIVATIONS_KEPT)}, found '{kept[:40]}'"
+        )
     info = DriveInfo(
         robot=_one(properties, "robot", str),
         seed=int(seed),
@@ -79,6 +86,7 @@ def info_from_properties(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo
         attributes=_listed(properties, "attributes", _attribute),
         links=_listed(properties, "links", _link),
         layers=tuple(layers),
+        activations=kept,
     )
     return info, _one(properties, "created", str)
 

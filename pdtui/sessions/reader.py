@@ -96,8 +96,10 @@ def read_session(path: Path | str) -> Session:
 def read_activations(path: Path | str) -> NDArray[np.float32]:
     """Output of every hidden unit in every step, as the next layer saw it, shape (S, U).
 
+    Where they were recorded as float16, they are rounded to 11 bits.
+
     Raises:
-        SessionError: as `read_session`.
+        SessionError: as `read_session`, and where they were not recorded.
     """
     path = Path(path)
     file = SessionFile(path, only=("activations",))
@@ -105,7 +107,12 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
         info, _ = info_from_properties(file.properties(INFO))
         drive = file.rows(DRIVE)
         count_steps(drive)
-        return drive.block("activations", np.float32, sum(info.layers))
+        if info.activations == "off":
+            raise SessionError(
+                "its activations were not recorded (--record-activations off); a replay has them"
+            )
+        kind = np.float16 if info.activations == "half" else np.float32
+        return drive.block("activations", kind, sum(info.layers)).astype(np.float32, copy=False)
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
 

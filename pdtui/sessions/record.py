@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pdtui.policies.units import Stimulation
 from pdtui.robots.types import Attribute, Floats, Link
 from pdtui.sessions.events import Event
+from pdtui.sessions.schema import ActivationsKept
 from pdtui.stimulation.latch import ActiveBehavior
 
 
@@ -27,6 +28,7 @@ class DriveInfo:
         stochastic: whether actions are drawn from the policy's distribution instead of its mean.
         dt: simulated time of a control step, s.
         attributes, links, layers: of robot and policy.
+        activations: how they are recorded; no part of the run.
     """
 
     robot: str
@@ -39,6 +41,7 @@ class DriveInfo:
     attributes: tuple[Attribute, ...]
     links: tuple[Link, ...]
     layers: tuple[int, ...]
+    activations: ActivationsKept = "all"
 
 
 class StepRecord(NamedTuple):

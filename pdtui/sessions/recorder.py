@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -11,19 +12,25 @@ from typing import Any, Self, cast
 
 import rerun as rr
 
-from pdtui.errors import SessionError
+from pdtui.errors import RecordingEnded, SessionError
 from pdtui.sessions.columns import Column, indexes
+from pdtui.sessions.frames import whole_length
 from pdtui.sessions.properties import info_to_properties
 from pdtui.sessions.record import DriveInfo, StepRecord
+from pdtui.sessions.room import Reserve, room_for
 from pdtui.sessions.rows import drive_columns, ending_columns, event_columns
 from pdtui.sessions.schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
 from pdtui.sessions.versions import environment_versions
 from pdtui.sessions.views import Views
-from pdtui.sessions.writing import errors_named, open_recording, send_property
+from pdtui.sessions.writing import abandon, errors_named, flush, open_recording, send_property
+from pdtui.text import size_of
 
-_VIEW_ROWS = 32
+_VIEW_ROWS = 128
 _SAFE_ROWS = 16
 """Batches up to this length are waited for; a wait costs 0.5 ms, on a busy machine more."""
+
+_BATCHES_ON_THEIR_WAY = 8
+"""So many of the larger ones are not waited for: what the disk does not take must not fill the memory."""
 
 
 class SessionRecorder:
@@ -34,21 +41,33 @@ class SessionRecorder:
     `rows_per_write` − 1 steps, and the file can be read without its end. With large batches, which are for
     drives faster than time, it does not wait for the thread that writes.
 
+    Before each batch it looks at the room that is left on the disk. While the recording's end still fits, it
+    ends it, whole, and raises `RecordingEnded`. Where a write fails all the same, as on a disk that others
+    fill, the file is cut behind its last whole message, so that it can be read up to there.
+
     Args:
         path: the file; its folder is made, an existing file is overwritten.
         info: what determines the run.
         rows_per_write: control steps a batch. Small batches lose less in a crash; large ones cost less.
+        view_rows: control steps a batch of what only the viewer draws.
 
     Raises:
-        SessionError: the file cannot be written.
+        SessionError: the file cannot be written, or there is no room for a recording.
     """
 
-    def __init__(self, path: Path, info: DriveInfo, *, rows_per_write: int = 128) -> None:
+    def __init__(
+        self, path: Path, info: DriveInfo, *, rows_per_write: int = 128, view_rows: int = _VIEW_ROWS
+    ) -> None:
         self.path, self.info = Path(path), info
         self._rows_per_write = max(1, rows_per_write)
         self._rows: list[StepRecord] = []
-        self._events = 0
-        self._closed = False
+        self._view_rows = max(view_rows, 2 * self._rows_per_write)
+        self._waits = self._rows_per_write <= _SAFE_ROWS
+        self._events = self._steps = self._batches = self._chunks = 0
+        self._closed = self._failed = False
+        rows = self._view_rows + self._rows_per_write * (1 if self._waits else _BATCHES_ON_THEIR_WAY)
+        self._reserve = Reserve(self.path, sum(info.layers), rows)
+        self._require_room_to_begin()
         self._recording = open_recording(self.path, info)
         self._write_start()
         self._views = Views(info, self._send, self._log_static)
@@ -58,16 +77,21 @@ class SessionRecorder:
         """Take in one control step; the recorder keeps its arrays, so nobody may change them.
 
         Raises:
+            RecordingEnded: the disk is full; the recording was closed with this step as its last.
             SessionError: the file cannot be written, or the recorder is closed.
         """
         if self._closed:
             raise SessionError(f"{self.path}: the session is closed")
         self._rows.append(record)
+        self._steps += 1
         if record.events or record.ended:
+            self._require_room()
             self.flush()
         elif len(self._rows) >= self._rows_per_write:
+            self._require_room()
             self._write_rows()
-            self._send_off(wait=self._rows_per_write <= _SAFE_ROWS)
+            self._batches += 1
+            self._send_off(wait=self._waits or self._batches % _BATCHES_ON_THEIR_WAY == 0)
 
     def flush(self) -> None:
         """Write all steps so far and wait until the operating system has them.
@@ -96,12 +120,17 @@ class SessionRecorder:
             return
         self._closed = True
         try:
-            self.flush()
-            self._views.finish()
-            self._property(OUTCOME, {"outcome": outcome})
-            self._send_off()
+            if not self._failed:
+                self.flush()
+                self._views.finish()
+                self._property(OUTCOME, {"outcome": outcome})
+                self._send_off()
         finally:
-            self._recording.disconnect()
+            if self._failed:
+                abandon(self._recording)
+                self._cut()
+            else:
+                self._recording.disconnect()
 
     def __enter__(self) -> Self:
         return self
@@ -120,15 +149,48 @@ class SessionRecorder:
         self._property(INFO, info_to_properties(info, created))
         self._property(VERSIONS, environment_versions())
 
+    def _require_room_to_begin(self) -> None:
+        with self._errors_named():
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            left, needed = room_for(self.path.parent), self._reserve.to_begin
+        if left < needed:
+            raise SessionError(
+                f"{self.path}: cannot be written: the disk is full: {size_of(left)} are left, "
+                f"a recording begins with {size_of(needed)}"
+            )
+
+    def _require_room(self) -> None:
+        if not self._reserve.is_short(self._steps, self._chunks):
+            return
+        self.close(f"the disk is full: {self._steps} steps were recorded")
+        raise RecordingEnded(
+            f"the disk is full; {self.path} was closed in time and is whole: {self._steps} steps"
+        )
+
+    @contextmanager
+    def _failure_noted(self) -> Iterator[None]:
+        try:
+            with self._errors_named():
+                yield
+        except SessionError:
+            self._failed = True
+            raise
+
+    def _cut(self) -> None:
+        """Leave out the message that the disk did not take whole: a file that ends in one cannot be read."""
+        with self._errors_named():
+            os.truncate(self.path, whole_length(self.path))
+
     def _write_rows(self) -> None:
         records, self._rows = self._rows, []
         if not records:
             return
         self._write_events(records)
-        self._send(DRIVE, [record.step for record in records], drive_columns(records))
+        steps = [record.step for record in records]
+        self._send(DRIVE, steps, drive_columns(records, self.info.activations))
         self._views.add(records)
         self._views.write_changes()
-        if self._views.pending >= max(_VIEW_ROWS, 2 * self._rows_per_write):
+        if self._views.pending >= self._view_rows:
             self._views.write()
 
     def _write_events(self, records: Sequence[StepRecord]) -> None:
@@ -141,6 +203,7 @@ class SessionRecorder:
             self._send(ENDINGS, [record.step for record in ended], ending_columns(ended))
 
     def _send(self, entity: str, steps: Sequence[int], columns: list[Column]) -> None:
+        self._chunks += 1
         with self._errors_named():
             ready = cast("list[rr.ComponentColumn]", columns)
             rr.send_columns(
@@ -157,9 +220,9 @@ class SessionRecorder:
 
     def _send_off(self, *, wait: bool = True) -> None:
         """Hand everything to the operating system, where it outlives this process."""
-        with self._errors_named():
+        with self._failure_noted():
             if wait:
-                self._recording.flush()
+                flush(self._recording, self.path)
             else:
                 self._recording.flush(timeout_sec=0.0)
 

@@ -9,18 +9,19 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import rerun as rr
+from numpy.typing import NDArray
 
 from pdtui.sessions.columns import Column, nested, ragged, rows, stacked, texts
 from pdtui.sessions.events import Event
 from pdtui.sessions.record import StepRecord
-from pdtui.sessions.schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION
+from pdtui.sessions.schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION, ActivationsKept
 from pdtui.stimulation.latch import ActiveBehavior
 
 
-def drive_columns(records: Sequence[StepRecord]) -> list[Column]:
+def drive_columns(records: Sequence[StepRecord], kept: ActivationsKept = "all") -> list[Column]:
     """One row a control step: everything of a `StepRecord` but its events and poses.
 
-    What no step of the batch has (behaviors, stimulation) gets no column.
+    What no step of the batch has (behaviors, stimulation) gets no column; activations do as `kept` says.
     """
     of: Any = StepRecord._make(zip(*records, strict=True))
     actions = stacked(of.action)
@@ -29,11 +30,13 @@ def drive_columns(records: Sequence[StepRecord]) -> list[Column]:
     counters = np.empty((len(records), 2), np.int64)
     counters[:, 0], counters[:, 1] = of.digest, of.episode
     columns = [
-        nested("activations", stacked(of.activations)),
         nested("attributes", stacked(of.attributes)),
         nested(REWARD_COST_ACTION, gains),
         rows(DIGEST_EPISODE, counters),
     ]
+    if kept != "off":
+        activations = stacked(of.activations)
+        columns.append(nested("activations", to_half(activations) if kept == "half" else activations))
     if any(stimulation.units for stimulation in of.stimulation):
         columns.append(ragged("stimulation", [_overwrites(record) for record in records], pa.float64()))
     if any(of.behaviors):
@@ -43,6 +46,12 @@ def drive_columns(records: Sequence[StepRecord]) -> list[Column]:
         ]
         columns += [ragged("behaviors", names, pa.utf8()), ragged("active", states, pa.float64())]
     return columns
+
+
+def to_half(activations: NDArray[np.float32]) -> NDArray[np.float16]:
+    """As float16; what is beyond its range (±65504) becomes infinite, without a warning."""
+    with np.errstate(over="ignore"):
+        return activations.astype(np.float16)
 
 
 def event_columns(events: Sequence[Event], first: int) -> list[Column]:

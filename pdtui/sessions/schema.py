@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal, get_args
+
 APP = "pdtui"
 SCHEMA = 1
 STEP, TIME = "step", "time"
@@ -28,3 +30,8 @@ ACTIVE_FIELDS = ("remaining", "factor", "target", "value", "error", "magnitude")
 
 OVERWRITE_FIELDS = ("unit", "overwritten", "natural")
 """Columns of `stimulation`."""
+
+ActivationsKept = Literal["all", "half", "off"]
+"""How activations are recorded: as they are, as float16, or not at all."""
+
+ACTIVATIONS_KEPT: tuple[ActivationsKept, ...] = get_args(ActivationsKept)

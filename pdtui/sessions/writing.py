@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
+import threading
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +17,11 @@ from rerun.recording_stream import is_enabled
 from pdtui.errors import SessionError
 from pdtui.sessions.blueprint import layout
 from pdtui.sessions.record import DriveInfo
+from pdtui.sessions.room import is_full
 from pdtui.sessions.schema import APP
+
+_ANSWER, _PATIENCE = 1.0, 30.0
+"""How long a flush is waited for before the disk is looked at, and at most; s."""
 
 _ARROW_TYPES = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.utf8()}
 
@@ -43,6 +50,33 @@ def send_property(recording: rr.RecordingStream, name: str, values: Mapping[str,
     recording.send_property(name, rr.AnyValues(**arrays))
 
 
+def flush(recording: rr.RecordingStream, path: Path) -> None:
+    """Wait until the operating system has everything.
+
+    Raises:
+        RuntimeError: the file cannot be written.
+    """
+    # A flush that meets the end of the thread that writes is never answered.
+    deadline = time.monotonic() + _PATIENCE
+    while True:
+        try:
+            recording.flush(timeout_sec=_ANSWER)
+        except RuntimeError:
+            if is_full(path) or time.monotonic() > deadline:
+                raise
+        else:
+            return
+
+
+def abandon(recording: rr.RecordingStream) -> None:
+    """Close a file that cannot be written; where the library waits for its own dead thread, do not wait."""
+    closing = threading.Thread(target=recording.disconnect, daemon=True)
+    closing.start()
+    closing.join(_ANSWER)
+    if closing.is_alive():
+        atexit.unregister(rr.rerun_shutdown)  # it would wait for the same thread, and the program never end
+
+
 @contextmanager
 def errors_named(path: Path) -> Iterator[None]:
     """Turn what the operating system or the library says into a `SessionError` that names the file."""
@@ -51,4 +85,6 @@ def errors_named(path: Path) -> Iterator[None]:
     except OSError as error:
         raise SessionError(f"{path}: cannot be written: {error.strerror}") from error
     except RuntimeError as error:
-        raise SessionError(f"{path}: cannot be written: {error}") from error
+        # The library says only that its thread is gone.
+        why = f"the disk is full ({error})" if is_full(path) else str(error)
+        raise SessionError(f"{path}: cannot be written: {why}") from error

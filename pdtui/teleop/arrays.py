@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.errors import PdtuiError, said_of
 from pdtui.policies.units import Stimulation, parse_unit
 from pdtui.robots.types import Floats, column_of
 from pdtui.sessions.events import Event
@@ -101,7 +102,7 @@ def drive_to_arrays(
                 recorder.write(record)
         outcome = "finished"
     except Exception as error:
-        outcome = str(error)
+        outcome = str(error) if isinstance(error, PdtuiError) else said_of(error)
         raise
     finally:
         if recorder is not None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from pdtui.errors import EventError, SimulationDiverged
+from pdtui.errors import DriveEnded, EventError, PdtuiError, SimulationDiverged, said_of
 from pdtui.policies.choices import Spaces
 from pdtui.policies.fit import check_fit
 from pdtui.policies.load import load_policy
@@ -97,10 +97,19 @@ def drive_headless(
     presses: Mapping[int, Sequence[str]],
     steps: int,
     recorder: SessionRecorder | None,
+    ended: Callable[[], str] = str,
 ) -> DriveSummary:
     """Drive from keystrokes without a screen, recording if a recorder is given, and sum it up.
 
+    Args:
+        loop: the drive, before its first step.
+        presses: keys by the control step before which they are pressed.
+        steps: control steps.
+        recorder: takes every step; it is closed at the end, however that comes.
+        ended: asked after each step; why to end there, empty to go on.
+
     Raises:
+        DriveEnded: `ended` said so.
         PdtuiError: as `drive_keys`; the recording is whole all the same.
     """
     falls = involvement = done = 0
@@ -114,9 +123,11 @@ def drive_headless(
             falls += bool(record.ended)
             involvement += any(event.key for event in record.events)
             total += record.attributes
+            if reason := ended():
+                raise DriveEnded(f"{reason}: {done} steps{_recorded(recorder)}")
         outcome = "finished"
     except Exception as error:
-        outcome = str(error)
+        outcome = str(error) if isinstance(error, PdtuiError) else said_of(error)
         raise
     finally:
         if recorder is not None:
@@ -126,3 +137,7 @@ def drive_headless(
         for attribute, value in zip(loop.robot.attributes, total, strict=True)
     }
     return DriveSummary(done, done * loop.robot.control_dt, falls, involvement, means)
+
+
+def _recorded(recorder: SessionRecorder | None) -> str:
+    return "" if recorder is None else f", recorded in {recorder.path}"

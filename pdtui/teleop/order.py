@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pdtui.sessions.events import Event
+from pdtui.sessions.schema import ActivationsKept
 from pdtui.stimulation.maps import StimulationMap
 
 
@@ -20,6 +21,7 @@ class DriveOrder:
         stochastic: draw actions instead of taking the mean.
         force: drive although the policy is not the map's.
         recording: file to record into, empty for none.
+        activations: how they are recorded.
         script: events by step that are played instead of keys, where a session is watched.
         digests: what the watched session left, to compare with.
     """
@@ -31,5 +33,6 @@ class DriveOrder:
     stochastic: bool = False
     force: bool = False
     recording: str = ""
+    activations: ActivationsKept = "all"
     script: tuple[Event, ...] | None = None
     digests: tuple[int, ...] = ()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import signal
 import time
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
@@ -18,6 +20,8 @@ _PATIENCE = 15.0
 
 
 def _simulate(connection: Connection, order: DriveOrder) -> None:
+    # What the recording library prints when the disk is full would go over the screen, which says so itself.
+    os.environ.setdefault("RUST_LOG", "off")
     from pdtui.teleop.simulation import simulate  # torch and the simulator load here, not under the screen
 
     simulate(connection, order)
@@ -107,5 +111,9 @@ class ProcessLink:
             return  # the process is gone; the next poll says why
 
     def _death(self) -> str:
-        line = f"the simulation's process ended with code {self._process.exitcode}"
+        code = self._process.exitcode
+        how = (
+            f"was killed by {signal.Signals(-code).name}" if code and code < 0 else f"ended with code {code}"
+        )
+        line = f"the simulation's process {how}"
         return f"{line}; the recording up to then is in {self._recording}" if self._recording else line

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import signal
 import time
+from contextlib import suppress
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from pdtui.errors import PdtuiError
+from pdtui.errors import PdtuiError, SessionError, said_of
 from pdtui.sessions.events import Event, events_by_step
+from pdtui.sessions.record import StepRecord
 from pdtui.sessions.recorder import SessionRecorder
 from pdtui.teleop.drive import build_loop
 from pdtui.teleop.keys import key_event
@@ -37,7 +40,8 @@ class Simulation:
         self._recorder: SessionRecorder | None = None
         if order.recording:
             path = Path(order.recording)
-            self._recorder = SessionRecorder(path, self._loop.info, rows_per_write=PACED_ROWS_PER_WRITE)
+            info = replace(self._loop.info, activations=order.activations)
+            self._recorder = SessionRecorder(path, info, rows_per_write=PACED_ROWS_PER_WRITE)
         self._pacer = Pacer(self._loop.robot.control_dt, time.monotonic())
         self._pressed: list[str] = []
         self._wanted = False
@@ -69,6 +73,10 @@ class Simulation:
                 self._serve()
                 if self._wanted:
                     self._send_snapshot()
+        except Exception as error:
+            if not isinstance(error, PdtuiError):
+                self._closing = said_of(error)
+            raise
         finally:
             self._close_recording()
 
@@ -79,7 +87,8 @@ class Simulation:
     def outcome(self) -> str:
         """How the drive ended, in one line."""
         line = f"{self._finished or self._closing}: {self._loop.step} steps"
-        return f"{line}, recorded in {self._order.recording}" if self._order.recording else line
+        place = self._order.recording
+        return f"{line}, recorded in {place}" if place and place not in line else line
 
     def _serve(self) -> None:
         """Wait for the next step or a request, whichever is first."""
@@ -110,7 +119,7 @@ class Simulation:
     def _advance(self) -> None:
         record = self._loop.advance(self._events())
         if self._recorder is not None:
-            self._recorder.write(record)
+            self._record(self._recorder, record)
         self._observer.see(record)
         self._pacer.stepped(time.monotonic())
         if record.diverged:
@@ -118,6 +127,15 @@ class Simulation:
             self._close_recording()
         if self._order.script is not None:
             self._compare(record.step, record.digest)
+
+    def _record(self, recorder: SessionRecorder, record: StepRecord) -> None:
+        try:
+            recorder.write(record)
+        except SessionError as error:
+            # What is not recorded cannot be repeated: the drive ends here, and the screen says why.
+            self._finished, self.failed = str(error), True
+            with suppress(SessionError):
+                recorder.close(str(error))
 
     def _events(self) -> list[Event]:
         if self._order.script is not None:
@@ -181,8 +199,12 @@ def simulate(connection: Connection, order: DriveOrder) -> None:
         _send_quietly(connection, PdtuiError(outcome) if simulation.failed else outcome)
     except PdtuiError as error:
         _send_quietly(connection, error)
-    except OSError:
+    except ConnectionError:
         return  # the screen went away while robot and policy were loading
+    except Exception as error:
+        # A traceback would be drawn over by the screen.
+        done = f"; {simulation.outcome()}" if simulation is not None else ""
+        _send_quietly(connection, PdtuiError(f"the simulation failed: {said_of(error)}{done}"))
 
 
 def _send_quietly(connection: Connection, message: str | PdtuiError) -> None:

@@ -110,7 +110,9 @@ def test_a_signal_leaves_a_whole_recording(
 def test_a_killed_simulation_says_where_the_recording_is(link: ProcessLink, recording: Path) -> None:
     steps = _until(link, lambda snapshot: snapshot.step >= 10)[-1].step
     os.kill(link.pid, signal.SIGKILL)
-    with pytest.raises(PdtuiError, match=r"ended with code -9; the recording up to then is in .*drive\.rrd"):
+    with pytest.raises(
+        PdtuiError, match=r"was killed by SIGKILL; the recording up to then is in .*drive\.rrd"
+    ):
         _until(link, lambda _: False)
     session = read_session(recording)
     assert session.steps >= steps - 3

@@ -1,0 +1,30 @@
+"""Signals that end a drive, taken between two control steps instead of in the middle of one."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextmanager
+def ending_signals() -> Iterator[Callable[[], str]]:
+    """Yield a function that tells which signal came, in words; empty while none did.
+
+    Left to their default, SIGTERM and SIGHUP would leave a recording without its end. What was set before
+    is set again at the end. Only a program's main thread can do this.
+    """
+    came: list[str] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        came.append(f"ended by {signal.Signals(number).name}")
+
+    before = {number: signal.signal(number, note) for number in ENDING}
+    try:
+        yield lambda: came[0] if came else ""
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
