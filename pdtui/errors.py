@@ -57,7 +57,7 @@ class TrainingError(PdtuiError):
 
 
 def said_of(error: BaseException) -> str:
-    """An exception in one line, for where no traceback can be printed: what it is, and where it was raised."""
+    """An exception in one line, for where no traceback can be printed: what it is and where it was raised."""
     words = " ".join(traceback.format_exception_only(error)[-1].split())
     frames = traceback.extract_tb(error.__traceback__)
     if not frames:
