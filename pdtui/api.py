@@ -174,6 +174,7 @@ def drive(
     steps: int = 1000,
     seed: int = 0,
     stochastic: bool = False,
+    start: str = "",
     record: str | Path | None = None,
     force: bool = False,
 ) -> Drive:
@@ -195,6 +196,7 @@ def drive(
         steps: control steps.
         seed: of the reset and of every random number.
         stochastic: draw actions from the policy's distribution instead of taking its mean.
+        start: state in which episodes start, for a robot with several.
         record: a new session file.
         force: drive although the map was made for another policy.
 
@@ -208,7 +210,7 @@ def drive(
     given = live if isinstance(live, Policy) else None
     named = "" if given is not None or live is None else str(live)
     stimulation_map = settle(stimulation_map, named, choices)
-    order = DriveOrder(name, stimulation_map, seed, stochastic=stochastic, force=force)
+    order = DriveOrder(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
     loop = build_loop(order, robot if isinstance(robot, Robot) else None, given)
     presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
     if record is not None and Path(record).exists():

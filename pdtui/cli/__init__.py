@@ -11,7 +11,7 @@ from pdtui import __version__
 from pdtui.cli.common import OneLineErrors
 from pdtui.cli.drawing import figure
 from pdtui.cli.driving import drive, pick_and_drive, replay
-from pdtui.cli.measuring import bench, convert, dissect, evaluate, train
+from pdtui.cli.measuring import bench, convert, dissect, evaluate, pursue, train
 from pdtui.cli.sessions import sessions
 
 
@@ -27,5 +27,5 @@ def main(ctx: click.Context) -> None:
         pick_and_drive()
 
 
-for command in (drive, replay, sessions, evaluate, dissect, figure, convert, train, bench):
+for command in (drive, replay, sessions, evaluate, dissect, pursue, figure, convert, train, bench):
     main.add_command(command)

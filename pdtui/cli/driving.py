@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     "--stochastic", is_flag=True, help="Draw actions from the policy's distribution instead of its mean."
 )
 @click.option(
+    "--start", default="", metavar="STATE", help="Where episodes start, for a robot with several states."
+)
+@click.option(
     "--record", type=click.Path(path_type=Path), help="Session file; default: a new one in ./sessions."
 )
 @click.option("--no-record", is_flag=True, help="Do not record.")
@@ -63,6 +66,7 @@ def drive(
     force: bool,
     seed: int,
     stochastic: bool,
+    start: str,
     record: Path | None,
     no_record: bool,
     activations: ActivationsKept,
@@ -80,6 +84,7 @@ def drive(
         force=force,
         seed=seed,
         stochastic=stochastic,
+        start=start,
         activations=activations,
     )
     if record is not None and record.exists():

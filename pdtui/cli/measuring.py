@@ -190,6 +190,61 @@ def dissect(
 
 
 @click.command()
+@click.argument("robot")
+@click.argument("task")
+@click.option("--policy", default="", help="Weights; default: the robot's shipped policy.")
+@choice_options
+@click.option("--seed", type=click.IntRange(1000, 2**31 - 1), default=1000, show_default=True)
+@click.option(
+    "--minutes",
+    type=click.FloatRange(0, min_open=True),
+    default=10.0,
+    show_default=True,
+    help="The search ends, with the best so far, when these are over; every unit is tried all the same.",
+)
+@click.option("--quick", is_flag=True, help="A first look: few outputs of each unit, and hardly a search.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="The map that gets the behavior, new or of the same policy; default: maps/ROBOT-dissected.toml.",
+)
+@workers_option
+@json_option
+def pursue(
+    robot: str,
+    task: str,
+    policy: str,
+    choices: PolicyChoices,
+    seed: int,
+    minutes: float,
+    quick: bool,
+    output: Path | None,
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """Search for units that do a TASK of ROBOT, such as 'walker hop', and write the behavior into a map."""
+    from pdtui.dissection.pursue import QUICK_PURSUIT, PursuitSizes
+    from pdtui.dissection.pursuit_command import pursue_into_map
+    from pdtui.robots import file_stem
+
+    with progress_bar_or_none("pursuing", quiet=as_json) as advance:
+        found = pursue_into_map(
+            robot,
+            task,
+            policy or robot,
+            output or Path("maps") / f"{file_stem(robot)}-dissected.toml",
+            choices=choices,
+            seed=seed,
+            workers=cores(workers),
+            minutes=minutes,
+            sizes=QUICK_PURSUIT if quick else PursuitSizes(),
+            progress=advance,
+        )
+    show_result(found.as_dict(), as_json, found.text)
+
+
+@click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="The safetensors file.")
 @click.option("--robot", help="The robot that it drives; it gives bounds of actions that FILE may lack.")
@@ -215,7 +270,11 @@ def convert(file: Path, output: Path, robot: str | None, choices: PolicyChoices)
 @click.option("--steps", type=click.IntRange(1), default=None, help="Control steps over all worlds.")
 @click.option("--algorithm", type=click.Choice(["ppo", "sac"]), default="ppo", show_default=True)
 @click.option("--learning-rate", type=click.FloatRange(0, min_open=True), default=None, help="At the start.")
-@click.option("--forward", type=click.Choice(["either", "x"]), default="x", show_default=True)
+@click.option(
+    "--forward",
+    type=click.Choice(["either", "x"]),
+    help="What the Ant is paid for; default: x, as in stock Ant.",
+)
 @click.option("--folder", type=click.Path(path_type=Path), help="Checkpoints; default: runs/ROBOT-seed.")
 def train(
     robot: str,
@@ -223,7 +282,7 @@ def train(
     seed: int,
     steps: int | None,
     learning_rate: float | None,
-    forward: str,
+    forward: str | None,
     folder: Path | None,
 ) -> None:
     """Train a policy for ROBOT; the same line again goes on where a killed run stopped."""
@@ -237,7 +296,7 @@ def train(
             steps,
             learning_rate,
             forward,
-            folder or Path("runs") / f"{robot}-{algorithm}-{forward}-{seed}",
+            folder or Path("runs") / "-".join(filter(None, (robot, algorithm, forward, str(seed)))),
             advance,
         )
     click.echo(f"best weights: {path}")

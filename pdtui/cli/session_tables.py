@@ -66,6 +66,7 @@ def show_table(session: Session, summary: SessionSummary) -> Any:
         ("layers", " ".join(map(str, info.layers))),
         ("activations", _KEPT[info.activations]),
         ("map", f"{len(info.map_text.splitlines())} lines, inside the session"),
+        *([("start", info.start)] if info.start else []),
         ("seed", f"{info.seed}{', actions drawn at random' if info.stochastic else ''}"),
         ("driven", session.created),
         ("outcome", session.outcome or "none: the file was cut off"),

@@ -77,6 +77,7 @@ def show(file: Path, as_json: bool) -> None:
         "policy_sha256": session.info.policy_hash,
         "seed": session.info.seed,
         "stochastic": session.info.stochastic,
+        "start": session.info.start,
         "layers": session.info.layers,
         "activations": session.info.activations,
         "map": session.info.map_text,

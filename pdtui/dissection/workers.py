@@ -12,8 +12,9 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from types import TracebackType
+from typing import TypeVar
 
-from pdtui.dissection.monitor import Start
+from pdtui.dissection.monitor import Progress, Start
 from pdtui.dissection.rollout import Job, Outcome, roll_out
 from pdtui.errors import RobotError
 from pdtui.policies.choices import NO_CHOICES, PolicyChoices, Spaces
@@ -27,6 +28,8 @@ from pdtui.robots.base import Robot
 _STEPS_A_CHUNK = 1200
 
 _worker: tuple[Robot, Policy] | None = None
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 def _start_worker(robot: str, policy: str, choices: PolicyChoices) -> None:
@@ -40,6 +43,11 @@ def _start_worker(robot: str, policy: str, choices: PolicyChoices) -> None:
 
 def _load(policy: str | Path, world: Robot, choices: PolicyChoices) -> Policy:
     return load_policy(policy, world.name, choices=choices, spaces=Spaces.of_world(world))
+
+
+def _apply(function: Callable[[Robot, Policy, Item], Result], item: Item) -> Result:
+    assert _worker is not None
+    return function(*_worker, item)
 
 
 def _end_with_parent() -> None:
@@ -150,6 +158,36 @@ class Crew:
                 done(finished)
         return [outcome for outcomes in results for outcome in outcomes]
 
+    def map(
+        self,
+        function: Callable[[Robot, Policy, Item], Result],
+        items: Sequence[Item],
+        progress: Progress | None = None,
+    ) -> list[Result]:
+        """Apply a function of a module to robot, policy and each item; results in the order of the items.
+
+        Raises:
+            RobotError: a worker process died.
+        """
+        results: list[Result] = []
+        if self._workers == 1:
+            for item in items:
+                results.append(function(self.robot, self.policy, item))
+                if progress is not None:
+                    progress(len(results), len(items))
+            return results
+        try:
+            for result in self._processes().map(_apply, [function] * len(items), items):
+                results.append(result)
+                if progress is not None:
+                    progress(len(results), len(items))
+        except BrokenProcessPool as error:
+            raise self._died() from error
+        except BaseException:
+            self.close()
+            raise
+        return results
+
     def count(self, outcomes: Sequence[Outcome]) -> None:
         """Take roll-outs into `rollouts` and `steps_run`, wherever they were run."""
         self.rollouts += len(outcomes)
@@ -163,6 +201,21 @@ class Crew:
             for number, chunk in enumerate(chunks):
                 yield number, _run((self.robot, self.policy), chunk, needed[number], steps, measure_from)
             return
+        pool = self._processes()
+        futures: dict[Future[list[Outcome]], int] = {}
+        try:
+            for number, chunk in enumerate(chunks):
+                future = pool.submit(_run_chunk, chunk, needed[number], steps, measure_from)
+                futures[future] = number
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BrokenProcessPool as error:
+            raise self._died() from error
+        except BaseException:
+            self.close()
+            raise
+
+    def _processes(self) -> ProcessPoolExecutor:
         if self._pool is None:
             self._pool = ProcessPoolExecutor(
                 self._workers,
@@ -170,18 +223,10 @@ class Crew:
                 initializer=_start_worker,
                 initargs=self._names,
             )
-        futures: dict[Future[list[Outcome]], int] = {}
-        try:
-            for number, chunk in enumerate(chunks):
-                future = self._pool.submit(_run_chunk, chunk, needed[number], steps, measure_from)
-                futures[future] = number
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BrokenProcessPool as error:
-            raise RobotError(
-                f"{self.robot.name}: a worker process died (out of memory, or killed); one worker runs "
-                "without other processes"
-            ) from error
-        except BaseException:
-            self.close()
-            raise
+        return self._pool
+
+    def _died(self) -> RobotError:
+        return RobotError(
+            f"{self.robot.name}: a worker process died (out of memory, or killed); one worker runs "
+            "without other processes"
+        )

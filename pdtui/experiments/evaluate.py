@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from pdtui.experiments.tasks import TaskResult, TaskRun, run_task, summarise_task
 from pdtui.robots.types import Floats
 from pdtui.sessions.events import Event
 from pdtui.stimulation.maps import Behavior, Measured
@@ -66,6 +67,7 @@ class Evaluation:
     policy: str
     seeds: tuple[int, ...]
     behaviors: tuple[BehaviorResult, ...]
+    tasks: tuple[TaskResult, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """The form that ``--json`` prints."""
@@ -74,6 +76,7 @@ class Evaluation:
             "policy": self.policy,
             "seeds": list(self.seeds),
             "behaviors": [asdict(result) for result in self.behaviors],
+            "tasks": [asdict(result) for result in self.tasks],
         }
 
     def measured(self) -> dict[str, Measured]:
@@ -97,7 +100,7 @@ def evaluate_map(
     workers: int = 2,
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
-    """Measure every behavior of the order's map that has an aim.
+    """Measure every behavior of the order's map that has an aim or a task.
 
     Args:
         order: robot, map and policy; its seed is not used.
@@ -108,14 +111,18 @@ def evaluate_map(
     Raises:
         PdtuiError: robot, policy or map cannot be had.
     """
-    behaviors = [b for b in order.stimulation_map.behaviors.values() if b.aim is not None and b.pid is None]
+    known = order.stimulation_map.behaviors.values()
+    tasked = [b for b in known if b.task]
+    behaviors = [b for b in known if b.aim is not None and b.pid is None]
     loop = build_loop(order)
-    jobs = [(order, name, seed) for name in ["", *(b.name for b in behaviors)] for seed in seeds]
-    runs: dict[tuple[str, int], _Run] = {}
+    names = ["", *(b.name for b in behaviors)] if behaviors else []
+    jobs: list[_Job] = [(order, name, seed, "aim") for name in names for seed in seeds]
+    jobs += [(order, b.name, seed, kind) for b in tasked for kind in ("task", "untouched") for seed in seeds]
+    runs: dict[tuple[str, int, str], Any] = {}
     with multiprocessing.get_context("spawn").Pool(workers) as pool:
-        results: Iterable[_Run] = pool.imap(_run_job, jobs)
-        for done, ((_, name, seed), run) in enumerate(zip(jobs, results, strict=True), start=1):
-            runs[name, seed] = run
+        results: Iterable[_Run | TaskRun] = pool.imap(_run_job, jobs)
+        for done, ((_, name, seed, kind), run) in enumerate(zip(jobs, results, strict=True), start=1):
+            runs[name, seed, kind] = run
             if progress is not None:
                 progress(done, len(jobs))
     return Evaluation(
@@ -123,12 +130,28 @@ def evaluate_map(
         loop.policy.name,
         tuple(seeds),
         tuple(_summarise(loop, behavior, runs, seeds) for behavior in behaviors),
+        tuple(
+            summarise_task(
+                behavior,
+                order.robot,
+                [runs[behavior.name, seed, "task"] for seed in seeds],
+                [runs[behavior.name, seed, "untouched"] for seed in seeds],
+            )
+            for behavior in tasked
+        ),
     )
 
 
-def _run_job(job: tuple[DriveOrder, str, int]) -> _Run:
-    order, name, seed = job
-    return run_behavior(_build_once(order), name, seed)
+_Job = tuple[DriveOrder, str, int, str]
+"""A drive, a behavior's name, a seed, and what to run: ``aim``, ``task`` or ``untouched``."""
+
+
+def _run_job(job: _Job) -> _Run | TaskRun:
+    order, name, seed, kind = job
+    loop = _build_once(order)
+    if kind == "aim":
+        return run_behavior(loop, name, seed)
+    return run_task(loop, loop.map.behaviors[name], seed, untouched=kind == "untouched")
 
 
 def _build_once(order: DriveOrder) -> ControlLoop:
@@ -155,13 +178,13 @@ def run_behavior(built: ControlLoop, name: str, seed: int) -> _Run:
 
 
 def _summarise(
-    loop: ControlLoop, behavior: Behavior, runs: dict[tuple[str, int], _Run], seeds: Sequence[int]
+    loop: ControlLoop, behavior: Behavior, runs: dict[tuple[str, int, str], Any], seeds: Sequence[int]
 ) -> BehaviorResult:
     assert behavior.aim is not None
     column = loop.robot.attribute_index(behavior.aim.attribute)
-    with_it = np.array([runs[behavior.name, seed].mean[column] for seed in seeds])
-    default = np.array([runs["", seed].mean[column] for seed in seeds])
-    fell = np.array([runs[behavior.name, seed].fell for seed in seeds])
+    with_it = np.array([runs[behavior.name, seed, "aim"].mean[column] for seed in seeds])
+    default = np.array([runs["", seed, "aim"].mean[column] for seed in seeds])
+    fell = np.array([runs[behavior.name, seed, "aim"].fell for seed in seeds])
     effect = with_it - default
     sign = behavior.aim.sign
     if behavior.aim.direction == "stop":
@@ -184,7 +207,7 @@ def _summarise(
         float(default.mean()),
         int((right & ~fell).sum()),
         int(fell.sum()),
-        int(sum(runs["", seed].fell for seed in seeds)),
+        int(sum(runs["", seed, "aim"].fell for seed in seeds)),
     )
 
 

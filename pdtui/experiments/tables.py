@@ -24,8 +24,35 @@ def _seeds(seeds: tuple[int, ...]) -> str:
     return f"{len(seeds)} seeds, {seeds[0]}–{seeds[-1]}"
 
 
-def behavior_table(result: Evaluation) -> Table:
-    """One row a behavior."""
+def behavior_table(result: Evaluation) -> Group:
+    """One row a behavior: those that move an attribute, then those that accomplish something."""
+    tables = [_aim_table(result)] if result.behaviors else []
+    return Group(*tables, *([_task_table(result)] if result.tasks else []))
+
+
+def _task_table(result: Evaluation) -> Table:
+    table = _table(
+        f"{result.robot}, policy {result.policy}, {_seeds(result.seeds)}",
+        *("behavior", "wanted", "done", "by itself", "falls", "measured (by itself)"),
+    )
+    count = len(result.seeds)
+    for row in result.tasks:
+        measured = ", ".join(
+            f"{name} {value:.2f} ({row.figures_by_itself.get(name, float('nan')):.2f})"
+            for name, value in row.figures.items()
+        )
+        table.add_row(
+            row.behavior,
+            row.wanted,
+            f"{row.done}/{count}",
+            f"{row.by_itself}/{count}",
+            f"{row.falls}/{count}",
+            measured,
+        )
+    return table
+
+
+def _aim_table(result: Evaluation) -> Table:
     table = _table(
         f"{result.robot}, policy {result.policy}, {_seeds(result.seeds)}",
         *("behavior", "measure", "with it", "default", "effect [95 %]", "right", "falls"),

@@ -11,8 +11,6 @@ from pdtui.teleop.drive import build_loop
 from pdtui.teleop.loop import ControlLoop
 from pdtui.teleop.order import DriveOrder
 
-EPISODE = 1000
-
 
 @dataclass(frozen=True)
 class Walking:
@@ -41,15 +39,16 @@ def evaluate_walking(
     order: DriveOrder,
     seeds: Sequence[int],
     *,
-    steps: int = EPISODE,
+    steps: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Walking:
-    """Drive the policy untouched, one episode a seed.
+    """Drive the policy untouched, one episode a seed, as long as the robot's episodes are by default.
 
     Raises:
         PdtuiError: robot, policy or map cannot be had.
     """
     built = build_loop(order)
+    steps = steps or built.robot.episode_steps
     names = [attribute.name for attribute in built.robot.attributes]
     column = names.index("speed") if "speed" in names else None
     speeds, net_speeds, returns, finished = [], [], [], 0
@@ -63,7 +62,7 @@ def evaluate_walking(
             if column is not None:
                 speeds.append(float(record.attributes[column]))
             ended = record.ended
-            if ended:
+            if ended or record.finished:
                 break
         seconds = loop.step * loop.robot.control_dt
         net_speeds += (np.linalg.norm(record.poses[:1, :2] - start, axis=1) / seconds).tolist()

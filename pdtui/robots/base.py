@@ -8,19 +8,32 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.errors import RobotError
 from pdtui.robots.types import Attribute, Floats, Link, RobotSnapshot, column_of
 
 
 class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     """A Gymnasium environment with named attributes, link poses and a snapshot.
 
-    `step` puts ``cost`` (float) into its info and, when the episode ends, ``reason`` (str).
+    `step` puts ``cost`` (float) into its info and, when the episode ends, ``reason`` (str). Where the
+    robot's task is done although it can go on, ``finished`` is true: training and scores end there, a drive
+    does not.
+
+    Attributes:
+        name: as maps, sessions and the command line call it.
+        title: for people.
+        attributes: what `read_attributes` measures.
+        links: what there is to draw.
+        starts: states besides the usual one in which `reset` can start, by its option ``start``.
+        episode_steps: control steps after which training and scores end an episode.
     """
 
     name: str
     title: str
     attributes: tuple[Attribute, ...]
     links: tuple[Link, ...]
+    starts: tuple[str, ...] = ()
+    episode_steps: int = 1000
 
     @property
     @abstractmethod
@@ -54,6 +67,17 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     @abstractmethod
     def digest(self) -> int:
         """A 63-bit digest of the simulator's state: equal states have equal digests."""
+
+    def check_start(self, start: str) -> str:
+        """Return the name of a start state, empty for the usual one.
+
+        Raises:
+            RobotError: the robot has no such start.
+        """
+        if start and start not in self.starts:
+            known = f"there are {', '.join(self.starts)}" if self.starts else "it has only the usual one"
+            raise RobotError(f"{self.name}: no start '{start}'; {known}")
+        return start
 
     def attribute_index(self, name: str) -> int:
         """Column of an attribute in `read_attributes`.

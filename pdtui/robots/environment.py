@@ -13,6 +13,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from pdtui.errors import RobotError, SimulationDiverged
+from pdtui.robots.actions import ActionLog
 from pdtui.robots.base import Robot
 from pdtui.robots.memory import digest_of, layers_of, plain_of, recall, remember, unknown_parts
 from pdtui.robots.spaces import action_for, as_vector, flat_observations, known_actions, number_of, numbers_of
@@ -71,7 +72,7 @@ class EnvironmentRobot(Robot):
     def __init__(self, name: str, title: str = "", environment: str = "") -> None:
         self.name, self.title = name, title or name
         self._environment = environment or name
-        self.env = make_environment(self._environment)
+        self.env = self.make_world()
         self._flattened = not isinstance(self.env.observation_space, spaces.Box)
         self.observation_space: Any = flat_observations(self.env.observation_space, self.name)
         self.action_space = known_actions(self.env.action_space, self.name)
@@ -80,8 +81,13 @@ class EnvironmentRobot(Robot):
         self.info: Mapping[str, Any] = {}
         self._observation: NDArray[Any] = np.zeros(self.observation_space.shape or (0,))
         self._seed = 0
-        self._actions: list[NDArray[np.float32]] = []
+        self._start = ""
+        self._actions = ActionLog(0)
         self._repeats: bool | None = None
+
+    def make_world(self) -> gymnasium.Env[Any, Any]:
+        """A new environment; a class of its own may build another than Gymnasium has registered."""
+        return make_environment(self._environment)
 
     @property
     def world(self) -> Any:
@@ -111,7 +117,8 @@ class EnvironmentRobot(Robot):
         self._seed = int(self.np_random.integers(_SEEDS)) if seed is None else seed
         if self._repeats:
             self._renew()
-        self._actions, self.reward = [], 0.0
+        self._start = self.check_start(str((options or {}).get("start", ""))) if self.starts else ""
+        self._actions, self.reward = ActionLog(int(np.prod(self.action_space.shape or (1,)))), 0.0
         observation, self.info = self.env.reset(seed=self._seed, options=options)
         self._see(observation)
         return self.observe(), dict(self.info)
@@ -127,7 +134,7 @@ class EnvironmentRobot(Robot):
             SimulationDiverged: the observation is not finite.
         """
         if self._repeats:
-            self._actions.append(np.array(action, np.float32))
+            self._actions.append(action)
         observation, reward, terminated, truncated, info = self.env.step(
             action_for(self.env.action_space, action, self.name)
         )
@@ -141,10 +148,12 @@ class EnvironmentRobot(Robot):
 
     def snapshot(self) -> RobotSnapshot:
         digest = self.digest()
-        mark = np.array([digest, self._seed], np.int64).view(np.float64)
+        start = self.starts.index(self._start) + 1 if self._start else 0
+        mark = np.array([digest, self._seed, start], np.int64).view(np.float64)
         if self._repeats:
-            actions = np.array(self._actions, np.float64)
-            return RobotSnapshot(self.name, actions, (mark,), self.np_random.bit_generator.state)
+            return RobotSnapshot(
+                self.name, self._actions.so_far(), (mark,), self.np_random.bit_generator.state
+            )
         memory = {
             "environment": remember(self.env),
             "robot": {"reward": self.reward, "info": numbers_of(self.info), "seen": self._observation.copy()},
@@ -156,7 +165,8 @@ class EnvironmentRobot(Robot):
         if snapshot.robot != self.name:
             raise RobotError(f"{self.name}: expected a snapshot of {self.name}, got one of {snapshot.robot}")
         self._settle()
-        digest, self._seed = (int(value) for value in snapshot.extras[0].view(np.int64))
+        digest, self._seed, start = (int(value) for value in snapshot.extras[0].view(np.int64))
+        self._start = self.starts[start - 1] if start else ""
         if snapshot.memory is None:
             self._repeat(snapshot.state.astype(np.float32))
         else:
@@ -203,10 +213,10 @@ class EnvironmentRobot(Robot):
     def _renew(self) -> None:
         """A new world: one that is used again may not repeat itself (Box2D's does not)."""
         self.env.close()
-        self.env = make_environment(self._environment)
+        self.env = self.make_world()
 
     def _repeat(self, actions: NDArray[np.float32]) -> None:
-        self.reset(seed=self._seed)
+        self.reset(seed=self._seed, options={"start": self._start} if self._start else None)
         for action in actions:
             self.step(action)
 

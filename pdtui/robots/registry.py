@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 
 GROUP = "pdtui.robots"
 TRUSTED = "PDTUI_ENVIRONMENT_MODULES"
-ROBOTS: dict[str, str] = {"ant": "pdtui.robots.ant:Ant"}
+ROBOTS: dict[str, str] = {
+    "ant": "pdtui.robots.ant:Ant",
+    "bipedal_walker": "pdtui.robots.bipedal_walker:BipedalWalker",
+    "walker": "pdtui.robots.walker:Walker",
+}
 
 
 def trust_module(robot: str) -> None:

@@ -154,7 +154,7 @@ def _told(event: Event | None) -> str:
 def _circumstances(a: Session, b: Session) -> tuple[str, ...]:
     lines = [
         f"{name}: {getattr(a.info, name)} and {getattr(b.info, name)}"
-        for name in ("robot", "seed", "policy", "policy_hash", "stochastic", "dt")
+        for name in ("robot", "seed", "policy", "policy_hash", "stochastic", "start", "dt")
         if getattr(a.info, name) != getattr(b.info, name)
     ]
     if a.info.map_text != b.info.map_text:

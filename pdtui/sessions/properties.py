@@ -34,6 +34,7 @@ def info_to_properties(info: DriveInfo, created: str) -> dict[str, Any]:
         "policy": info.policy,
         "policy_hash": info.policy_hash,
         "stochastic": info.stochastic,
+        "start": info.start,
         "dt": info.dt,
         "layers": list(info.layers),
         "activations": info.activations,
@@ -87,6 +88,8 @@ def info_from_properties(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo
         links=_listed(properties, "links", _link),
         layers=tuple(layers),
         activations=kept,
+        # Sessions of robots with one start only were written without it.
+        start=_one(properties, "start", str) if "start" in properties else "",
     )
     return info, _one(properties, "created", str)
 

@@ -26,6 +26,7 @@ class DriveInfo:
         policy_hash: SHA-256 of its weights.
         map_text: the map, whole.
         stochastic: whether actions are drawn from the policy's distribution instead of its mean.
+        start: state in which episodes start, empty for the robot's usual one.
         dt: simulated time of a control step, s.
         attributes, links, layers: of robot and policy.
         activations: how they are recorded; no part of the run.
@@ -42,6 +43,7 @@ class DriveInfo:
     links: tuple[Link, ...]
     layers: tuple[int, ...]
     activations: ActivationsKept = "all"
+    start: str = ""
 
 
 class StepRecord(NamedTuple):
@@ -62,6 +64,7 @@ class StepRecord(NamedTuple):
         digest: of the simulator's state after the step.
         ended: why the episode ended with this step, empty if it did not.
         diverged: whether the simulation cannot go on.
+        finished: whether the robot's task is done, though it can go on.
     """
 
     step: int
@@ -79,3 +82,4 @@ class StepRecord(NamedTuple):
     digest: int
     ended: str = ""
     diverged: bool = False
+    finished: bool = False

@@ -173,6 +173,7 @@ def _behavior(table: FieldTable, primitives: dict[str, Primitive]) -> Behavior:
         aim=aim,
         measured=_measured(table),
         pid=pid,
+        task=table.text("task", ""),
     )
     table.done()
     return behavior

@@ -127,7 +127,8 @@ class Behavior:
         period: activation period T in s; None lasts until another key.
         together: names of behaviors that may stay latched with this one.
         mode: ``fixed`` magnitudes, or ``pid``.
-        aim: what it is meant to do.
+        aim: what it is meant to do to an attribute.
+        task: name of what it is meant to accomplish, where that is more than an aim; empty for none.
         measured: change of the aim's attribute, against the default.
         pid: the controller of mode ``pid``.
     """
@@ -143,6 +144,7 @@ class Behavior:
     aim: Aim | None = None
     measured: Measured | None = None
     pid: Pid | None = None
+    task: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
-"""New figures in a map that somebody edited: everything else stays as it was written."""
+"""New figures and behaviors in a map that somebody edited: everything else stays as it was written."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 
@@ -46,15 +47,54 @@ def with_measured(text: str, measured: Mapping[str, Measured], source: str) -> s
     return changed
 
 
+def with_behavior(text: str, entry: Mapping[str, Any], source: str) -> str:
+    """The map's text with one behavior more, or with a new one in place of that of the same name.
+
+    Args:
+        text: of a map.
+        entry: the behavior's fields, as the map is to hold them; ``name`` and ``key`` among them. A behavior
+            that is replaced keeps its key.
+        source: of the text, for messages.
+
+    Raises:
+        MapError: the text is no map, or is none any more with the behavior.
+    """
+    parse_map(text, source)
+    document = tomlkit.parse(text)
+    behaviors = document.setdefault("behaviors", tomlkit.aot())
+    table = next((one for one in behaviors if one["name"] == entry["name"]), None)
+    if table is None:
+        table = tomlkit.table()
+        behaviors.append(table)
+        table["name"], table["key"] = entry["name"], entry["key"]
+    for field in [name for name in table if name not in ("name", "key")]:
+        del table[field]
+    for field, value in entry.items():
+        if field not in ("name", "key"):
+            table[field] = value
+    changed = tomlkit.dumps(document)
+    parse_map(changed, source)
+    return changed
+
+
 def update_map(path: Path, measured: Mapping[str, Measured]) -> None:
     """Write figures into a map's file, in one step.
 
     Raises:
         MapError: as `with_measured`, or the file cannot be written.
     """
+    change_map(path, lambda text: with_measured(text, measured, str(path)))
+
+
+def change_map(path: Path, change: Callable[[str], str]) -> None:
+    """Replace a map's text, in one step.
+
+    Raises:
+        MapError: what `change` raises, or the file cannot be read or written.
+    """
     partial = path.with_name(path.name + ".part")
     try:
-        changed = with_measured(path.read_text(encoding="utf-8"), measured, str(path))
+        changed = change(path.read_text(encoding="utf-8"))
         partial.write_text(changed, encoding="utf-8")
         partial.replace(path)
     except OSError as error:

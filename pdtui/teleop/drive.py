@@ -58,7 +58,7 @@ def build_loop(order: DriveOrder, robot: Robot | None = None, policy: Policy | N
     )
     wanted.check(order.robot, policy.layers, policy.sha256, force=order.force)
     check_fit(policy, robot, order.robot)
-    return ControlLoop(robot, policy, wanted, order.seed, stochastic=order.stochastic)
+    return ControlLoop(robot, policy, wanted, order.seed, stochastic=order.stochastic, start=order.start)
 
 
 def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:

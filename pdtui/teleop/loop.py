@@ -42,9 +42,11 @@ class ControlLoop:
         stimulation_map: the behaviors that events may latch.
         seed: of the robot's first reset and of the action noise.
         stochastic: draw actions from the policy's distribution instead of taking its mean.
+        start: state in which episodes start, empty for the robot's usual one.
 
     Raises:
         PolicyError: a unit of the map does not exist.
+        RobotError: the robot has no such start.
     """
 
     def __init__(
@@ -55,15 +57,17 @@ class ControlLoop:
         seed: int,
         *,
         stochastic: bool = False,
+        start: str = "",
     ) -> None:
         self.robot, self.policy, self.map, self.seed = robot, policy, stimulation_map, seed
+        self.start = robot.check_start(start)
         self.step = 0
         self.episode = 0
         self.latch = Latch(stimulation_map, policy.layers, robot.attributes, robot.control_dt)
         self._noise = np.random.default_rng(seed) if stochastic else None
         self._ended = False
         self._moments: OrderedDict[int, _Moment] = OrderedDict()
-        self._observation, _ = robot.reset(seed=seed)
+        self._observation, _ = robot.reset(seed=seed, options=self._options)
         policy.reset()
         self.attributes: Floats = robot.read_attributes()
 
@@ -77,11 +81,16 @@ class ControlLoop:
             policy_hash=self.policy.sha256,
             map_text=self.map.text,
             stochastic=self._noise is not None,
+            start=self.start,
             dt=self.robot.control_dt,
             attributes=self.robot.attributes,
             links=self.robot.links,
             layers=self.policy.layers,
         )
+
+    @property
+    def _options(self) -> dict[str, str] | None:
+        return {"start": self.start} if self.start else None
 
     @property
     def rewindable(self) -> tuple[int, ...]:
@@ -106,10 +115,11 @@ class ControlLoop:
         stimulation = self.latch.stimulate(self.attributes)
         behaviors = self.latch.active
         acted = self.policy.act(self._observation, stimulation, self._noise)
-        diverged, ended, reward, cost = False, "", 0.0, 0.0
+        diverged, ended, reward, cost, finished = False, "", 0.0, 0.0, False
         try:
             self._observation, gained, terminated, truncated, details = self.robot.step(acted.action)
             reward, cost = float(gained), float(details["cost"])
+            finished = bool(details.get("finished", False))
             if terminated or truncated:
                 ended = str(details.get("reason", "the episode is over"))
         except SimulationDiverged as error:
@@ -131,6 +141,7 @@ class ControlLoop:
             self.robot.digest(),
             ended,
             diverged,
+            finished,
         )
         self.step += 1
         self.latch.tick()
@@ -157,7 +168,7 @@ class ControlLoop:
                 raise EventError(f"step {event.step}: unknown event '{event.kind}'")
 
     def _start_episode(self) -> None:
-        self._observation, _ = self.robot.reset()
+        self._observation, _ = self.robot.reset(options=self._options)
         self.policy.reset()
         self.attributes = self.robot.read_attributes()
         self.latch.clear()

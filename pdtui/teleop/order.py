@@ -19,6 +19,7 @@ class DriveOrder:
         seed: of the drive.
         policy: weights file or shipped name; empty takes the map's.
         stochastic: draw actions instead of taking the mean.
+        start: state in which episodes start, empty for the robot's usual one.
         force: drive although the policy is not the map's.
         recording: file to record into, empty for none.
         activations: how they are recorded.
@@ -31,6 +32,7 @@ class DriveOrder:
     seed: int
     policy: str = ""
     stochastic: bool = False
+    start: str = ""
     force: bool = False
     recording: str = ""
     activations: ActivationsKept = "all"

@@ -113,6 +113,7 @@ def order_of(session: Session, source: str, policy: str = "") -> DriveOrder:
         seed=info.seed,
         policy=policy,
         stochastic=info.stochastic,
+        start=info.start,
         script=session.events,
         digests=tuple(int(digest) for digest in session.digests),
     )

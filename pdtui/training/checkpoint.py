@@ -46,8 +46,8 @@ def save_checkpoint(
     groups = []
     for number, group in enumerate(worlds):
         state = group.state()
-        arrays[f"worlds.{number}"] = np.array([snapshot.state for snapshot in state.snapshots])
         for index, snapshot in enumerate(state.snapshots):
+            arrays[f"states.{number}.{index}"] = np.ascontiguousarray(snapshot.state)
             extras = {f"worlds.{number}.{index}.{k}": extra for k, extra in enumerate(snapshot.extras)}
             arrays |= extras
         groups.append(
@@ -90,7 +90,7 @@ def load_checkpoint(
         for index, world_rng in enumerate(kept["rng"]):
             prefix = f"worlds.{number}.{index}."
             extras = tuple(arrays[name] for name in sorted(arrays) if name.startswith(prefix))
-            state = arrays[f"worlds.{number}"][index]
+            state = arrays[f"states.{number}.{index}"]
             snapshots.append(RobotSnapshot(kept["robot"], state, extras, world_rng))
         group.restore(WorldsState(snapshots, kept["ages"]))
     rng.bit_generator.state = record["rng"]

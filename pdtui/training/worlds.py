@@ -13,7 +13,6 @@ from pdtui.robots.base import Robot
 from pdtui.robots.types import RobotSnapshot
 from pdtui.training.sac import Batch
 
-TIME_LIMIT = 1000
 Actor = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 
@@ -41,12 +40,13 @@ class Worlds:
         after, reward, discount = before.copy(), np.zeros(len(before)), np.ones(len(before))
         for index, robot in enumerate(self.robots):
             try:
-                observation, gained, terminated, _, _ = robot.step(actions[index])
+                observation, gained, terminated, _, info = robot.step(actions[index])
             except SimulationDiverged:
-                observation, gained, terminated = before[index].astype(np.float64), 0.0, True
+                observation, gained, terminated, info = before[index].astype(np.float64), 0.0, True, {}
             self.ages[index] += 1
             after[index], reward[index], discount[index] = observation, float(gained), float(not terminated)
-            self.restarted[index] = terminated or self.ages[index] >= TIME_LIMIT
+            over = self.ages[index] >= robot.episode_steps or info.get("finished", False)
+            self.restarted[index] = terminated or over
             if self.restarted[index]:
                 observation, self.ages[index] = robot.reset()[0], 0
             self.observations[index] = observation
@@ -73,19 +73,19 @@ class Score:
     falls: int
 
 
-def score_actor(make: Callable[[], Robot], actor: Actor, seeds: range, steps: int = TIME_LIMIT) -> Score:
+def score_actor(make: Callable[[], Robot], actor: Actor, seeds: range, steps: int) -> Score:
     """Run one episode a seed, all at once, with the given actor."""
     robots = [make() for _ in seeds]
     observations = np.array([robot.reset(seed=s)[0] for robot, s in zip(robots, seeds, strict=True)])
     speed_column = robots[0].attribute_index("speed")
-    returns, speeds, fallen = np.zeros(len(robots)), [0.0] * len(robots), np.zeros(len(robots), bool)
-    lengths = np.zeros(len(robots))
+    returns, speeds, lengths = np.zeros(len(robots)), [0.0] * len(robots), np.zeros(len(robots))
+    fallen, finished = np.zeros(len(robots), bool), np.zeros(len(robots), bool)
     for _ in range(steps):
         actions = actor(observations.astype(np.float32))
-        for index in np.flatnonzero(~fallen):
+        for index in np.flatnonzero(~(fallen | finished)):
             robot = robots[index]
             try:
-                observation, reward, terminated, _, _ = robot.step(actions[index])
+                observation, reward, terminated, _, info = robot.step(actions[index])
             except SimulationDiverged:
                 fallen[index] = True
                 continue
@@ -94,5 +94,6 @@ def score_actor(make: Callable[[], Robot], actor: Actor, seeds: range, steps: in
             speeds[index] += float(robot.read_attributes()[speed_column])
             lengths[index] += 1
             fallen[index] = terminated
+            finished[index] = info.get("finished", False)
     mean_speed = float(np.mean(np.array(speeds) / np.maximum(lengths, 1)))
     return Score(len(robots), float(returns.mean()), float(returns.std()), mean_speed, int(fallen.sum()))

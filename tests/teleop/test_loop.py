@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from pdtui.stimulation.maps import StimulationMap
 from pdtui.teleop.loop import ControlLoop
 
 
-def _loop(policy: Policy, small_map: StimulationMap, seed: int = 3, **options: bool) -> ControlLoop:
+def _loop(policy: Policy, small_map: StimulationMap, seed: int = 3, **options: Any) -> ControlLoop:
     return ControlLoop(make_robot("ant"), policy, small_map, seed, **options)
 
 

@@ -1,0 +1,137 @@
+"""What `pdtui pursue` runs: search for a task's stimulation, then write the behavior into a map."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+from rich.console import RenderableType
+from rich.text import Text
+
+from pdtui.dissection.pursue import Pursued, Pursuit, PursuitSizes
+from pdtui.dissection.tomlparts import outputs_table
+from pdtui.dissection.workers import Crew
+from pdtui.errors import MapError
+from pdtui.policies.choices import NO_CHOICES, PolicyChoices
+from pdtui.policies.units import Stimulation, parse_unit
+from pdtui.stimulation.mapfile import load_map
+from pdtui.stimulation.maps import StimulationMap
+from pdtui.stimulation.remeasured import change_map, with_behavior
+from pdtui.tasks import Burst, find_task
+
+
+@dataclass(frozen=True)
+class PursuedBehavior:
+    """What was found and where it was written."""
+
+    result: Pursued
+    units: dict[str, float]
+    seconds: float | None
+    output: Path
+
+    def as_dict(self) -> dict[str, Any]:
+        """The form that ``--json`` prints."""
+        held = self.result.verdicts
+        return {
+            "task": self.result.task.name,
+            "magnitudes": self.units,
+            "period": self.seconds,
+            "held_out": {
+                "walks": len(held),
+                "done": sum(verdict.success for verdict in held),
+                "by_itself": sum(verdict.success for verdict in self.result.untouched),
+                "figures": self._figures(),
+            },
+            "rollouts": self.result.rollouts,
+            "map": str(self.output),
+        }
+
+    def text(self) -> RenderableType:
+        """What the command prints."""
+        told = self.as_dict()
+        held = told["held_out"]
+        lasts = "" if self.seconds is None else f" for {self.seconds:g} s"
+        figures = ", ".join(f"{name} {value:.2f}" for name, value in held["figures"].items())
+        return Text(
+            f"{told['task']}: {len(self.units)} units{lasts}; done on {held['done']} of {held['walks']} "
+            f"walks that the search did not see, by itself on {held['by_itself']}; {figures}\n"
+            f"wrote {self.output} ({told['rollouts']} roll-outs)"
+        )
+
+    def _figures(self) -> dict[str, float]:
+        names = dict.fromkeys(name for verdict in self.result.verdicts for name in verdict.figures)
+        return {
+            name: float(np.mean([v.figures[name] for v in self.result.verdicts if name in v.figures]))
+            for name in names
+        }
+
+
+def pursue_into_map(
+    robot: str,
+    task: str,
+    policy: str,
+    output: Path,
+    *,
+    choices: PolicyChoices = NO_CHOICES,
+    seed: int,
+    workers: int,
+    minutes: float,
+    sizes: PursuitSizes,
+    progress: Callable[[int, int], None] | None = None,
+) -> PursuedBehavior:
+    """Search, and write the behavior into a map: a new file, or one of this policy.
+
+    A behavior of the task that the map has already is where the search begins, too, and is replaced.
+
+    Raises:
+        MapError: no such task, or the map is of another policy or cannot be written.
+        PdtuiError: the robot or the policy cannot be had.
+    """
+    wanted = find_task(task, robot)
+    known = load_map(output) if output.exists() else None
+    with Crew(robot, policy, workers, choices) as crew:
+        if known is not None:
+            known.check(robot, crew.policy.layers, crew.policy.sha256)
+        begin = [] if known is None else _known(known, task, crew)
+        until = time.monotonic() + 60.0 * minutes
+        pursuit = Pursuit(crew, wanted, seed, sizes)
+        result = pursuit.run(begin, lambda: time.monotonic() >= until, progress)
+        dt, addressed = crew.robot.control_dt, result.burst.stimulation.by_address(crew.policy.layers)
+        if known is None:
+            _new_map(output, robot, crew.policy.name, crew.policy.sha256, choices)
+    seconds = None if result.burst.steps is None else round(result.burst.steps * dt, 6)
+    entry: dict[str, Any] = {"name": wanted.name, "key": wanted.key, "says": wanted.says}
+    if seconds is not None:
+        entry["period"] = seconds
+    entry |= {"task": wanted.name, "magnitudes": outputs_table(addressed)}
+    change_map(output, lambda text: with_behavior(text, entry, str(output)))
+    return PursuedBehavior(result, addressed, seconds, output)
+
+
+def _known(stimulation_map: StimulationMap, task: str, crew: Crew) -> list[Burst]:
+    """The map's own behavior for the task."""
+    found = []
+    for behavior in stimulation_map.behaviors.values():
+        if behavior.task == task and behavior.mode == "fixed":
+            addressed = stimulation_map.units_of(behavior).items()
+            values = {parse_unit(address, crew.policy.layers): value for address, value in addressed}
+            steps = None if behavior.period is None else round(behavior.period / crew.robot.control_dt)
+            found.append(Burst(Stimulation.of(values), steps))
+    return found
+
+
+def _new_map(path: Path, robot: str, policy: str, sha256: str, choices: PolicyChoices) -> None:
+    document = tomlkit.document()
+    document["schema"], document["robot"] = 1, robot
+    given = {name: value for name, value in vars(choices).items() if value}
+    document["policy"] = {"name": policy, "sha256": sha256, **given}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(tomlkit.dumps(document), encoding="utf-8")
+    except OSError as error:
+        raise MapError(f"{path}: cannot be written: {error.strerror}") from error

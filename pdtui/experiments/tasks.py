@@ -1,0 +1,104 @@
+"""What behaviors accomplish: each seed is driven with the behavior and without, and both are judged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.robots.types import Floats
+from pdtui.sessions.events import Event
+from pdtui.stimulation.maps import Behavior
+from pdtui.tasks import Task, Trace, Verdict, find_task
+from pdtui.tasks.run import walk_of
+from pdtui.teleop.loop import ControlLoop
+
+
+@dataclass(frozen=True)
+class TaskResult:
+    """One behavior over all seeds.
+
+    Attributes:
+        behavior: its name.
+        task: what it is for.
+        wanted: what counts as done.
+        done: seeds on which it was done with the behavior,
+        by_itself: and without.
+        falls: seeds on which the robot fell with the behavior.
+        figures: means over seeds of what was measured, with the behavior.
+        figures_by_itself: the same, without.
+    """
+
+    behavior: str
+    task: str
+    wanted: str
+    done: int
+    by_itself: int
+    falls: int
+    figures: dict[str, float]
+    figures_by_itself: dict[str, float]
+
+
+@dataclass(frozen=True)
+class TaskRun:
+    """One run, judged."""
+
+    verdict: Verdict
+    fell: bool
+
+
+def run_task(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bool) -> TaskRun:
+    """One run of a behavior's task through the control loop, as a drive would do it.
+
+    Raises:
+        MapError: the robot has no such task.
+    """
+    task = find_task(behavior.task, built.robot.name)
+    loop = ControlLoop(built.robot, built.policy, built.map, seed, start=task.start)
+    walk = walk_of(task, seed)
+    rows: list[Floats] = [loop.attributes]
+    fell = False
+    for step in range(walk + task.steps):
+        pressed = step == walk and not untouched
+        record = loop.advance([Event(step, "behavior", behavior.name)] if pressed else [])
+        rows.append(record.attributes)
+        fell = bool(record.ended)
+        if fell:
+            break
+    if len(rows) <= walk + 1:
+        return TaskRun(Verdict(False, 0.0, {}), True)
+    return TaskRun(_judge(task, loop, np.array(rows), walk, fell), fell)
+
+
+def _judge(task: Task, loop: ControlLoop, rows: Floats, walk: int, fell: bool) -> Verdict:
+    values = rows[walk + 1 :].copy()
+    for column, attribute in enumerate(loop.robot.attributes):
+        if attribute.wraps:
+            values[:, column] = np.unwrap(values[:, column])
+    return task.judge(Trace(loop.robot.attributes, rows[: walk + 1], values, fell))
+
+
+def summarise_task(
+    behavior: Behavior, robot: str, runs: Sequence[TaskRun], untouched: Sequence[TaskRun]
+) -> TaskResult:
+    """The figures of one behavior."""
+    task = find_task(behavior.task, robot)
+    return TaskResult(
+        behavior.name,
+        task.name,
+        task.wanted,
+        sum(run.verdict.success for run in runs),
+        sum(run.verdict.success for run in untouched),
+        sum(run.fell for run in runs),
+        _means(runs),
+        _means(untouched),
+    )
+
+
+def _means(runs: Iterable[TaskRun]) -> dict[str, float]:
+    found: dict[str, list[float]] = {}
+    for run in runs:
+        for name, value in run.verdict.figures.items():
+            found.setdefault(name, []).append(value)
+    return {name: float(np.mean(values)) for name, values in found.items()}

@@ -1,0 +1,123 @@
+"""The Walker2d of the paper: a torso on two legs that moves in the plane of x and z."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv
+from numpy.typing import NDArray
+
+from pdtui.robots.geometry import wrap_angle
+from pdtui.robots.mujoco import MujocoRobot, links_of
+from pdtui.robots.types import Attribute, Floats
+
+_LONGEST_STRIDE = 0.4
+"""s"""
+_FEET = {"right": "foot_geom", "left": "foot_left_geom"}
+
+
+class Walker(MujocoRobot, Walker2dEnv):
+    """Gymnasium's Walker2d with the feet of the paper's: friction 0.9 right and 1.9 left; 0.008 s a step.
+
+    Observation (17): height, pitch, 6 joint angles; then the 9 velocities, clipped at ±10. Reward is
+    Gymnasium's: 1 for being up, vx, less 0.001 times the squared action. An episode ends where the torso
+    leaves 0.8–2.0 m or leans by more than 1 rad.
+
+    Clearance is how far the lowest point of a foot is above the ground: under 0 it stands.
+
+    Args:
+        alternate: for training: reward is 1 less at each step at which a foot has been off the ground for
+            more than 0.4 s. Without that, policies hop on one leg.
+    """
+
+    name = "walker"
+    title = "Walker (MuJoCo)"
+
+    def __init__(self, alternate: bool = False) -> None:
+        super().__init__(xml_file="walker2d.xml")
+        self._alternate = alternate
+        self._in_air = np.zeros(len(_FEET))
+        self.links = links_of(self.model)
+        self._feet = [self.model.geom(geom).id for geom in _FEET.values()]
+        motors = [self.model.actuator(index) for index in range(self.model.nu)]
+        joints = [self.model.joint(int(motor.trnid[0])).name.removesuffix("_joint") for motor in motors]
+        self._gears = [float(motor.gear[0]) for motor in motors]
+        self.attributes = (
+            Attribute("vx", "m/s"),
+            Attribute("speed", "m/s"),
+            Attribute("height", "m"),
+            Attribute("pitch", "rad", wraps=True),
+            Attribute("pitch rate", "rad/s"),
+            *(Attribute(f"{side} foot clearance", "m") for side in _FEET),
+            *(
+                Attribute(f"{_side(joint)} torque", "N m", scale=1.0 / gear)
+                for joint, gear in zip(joints, self._gears, strict=True)
+            ),
+        )
+
+    @property
+    def control_dt(self) -> float:
+        return float(self.dt)
+
+    def observe(self) -> Floats:
+        observation: Floats = self._get_obs()
+        return observation
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Floats, Any, bool, bool, dict[str, Any]]:
+        observation, reward, terminated, truncated, info = super().step(action)
+        self._check_finite()
+        info["cost"] = 0.0
+        if self._alternate:
+            reward -= self._drags()
+        if terminated:
+            height, pitch = self.data.qpos[1:3].tolist()
+            low, high = self._healthy_z_range
+            info["reason"] = (
+                f"fell: leans by {pitch:.2f} rad"
+                if low < height < high
+                else f"fell: torso at {height:.2f} m, outside {low}–{high} m"
+            )
+        return observation, float(reward), terminated, truncated, info
+
+    def read_attributes(self) -> Floats:
+        mujoco.mj_kinematics(self.model, self.data)
+        _, height, pitch = self.data.qpos[:3].tolist()
+        vx, vz, pitch_rate = self.data.qvel[:3].tolist()
+        torques = [
+            gear * min(1.0, max(-1.0, command))
+            for gear, command in zip(self._gears, self.data.ctrl.tolist(), strict=True)
+        ]
+        clearances = [self._clearance(foot) for foot in self._feet]
+        return np.array(
+            [vx, math.hypot(vx, vz), height, wrap_angle(pitch), pitch_rate, *clearances, *torques]
+        )
+
+    def reset_model(self) -> Floats:
+        self._in_air = np.zeros(len(_FEET))
+        observation: Floats = super().reset_model()
+        return observation
+
+    def _drags(self) -> float:
+        """1 where a foot is off the ground for too long, else 0."""
+        mujoco.mj_kinematics(self.model, self.data)
+        for index, foot in enumerate(self._feet):
+            self._in_air[index] = self._in_air[index] + self.dt if self._clearance(foot) > 0.0 else 0.0
+        return float((self._in_air > _LONGEST_STRIDE).any())
+
+    def _extras(self) -> tuple[Floats, ...]:
+        return (self._in_air.copy(),)
+
+    def _set_extras(self, extras: tuple[Floats, ...]) -> None:
+        self._in_air = extras[0].copy()
+
+    def _clearance(self, geom: int) -> float:
+        radius, half = self.model.geom_size[geom, :2].tolist()
+        # A capsule's axis is its local z: the rotation's last number says how far its ends differ in height.
+        return float(self.data.geom_xpos[geom, 2] - abs(self.data.geom_xmat[geom, 8]) * half - radius)
+
+
+def _side(joint: str) -> str:
+    return f"left {joint.removesuffix('_left')}" if joint.endswith("_left") else f"right {joint}"
