@@ -142,8 +142,8 @@ def test_divergence_is_an_error_that_says_when(ant: Ant) -> None:
 
 
 def test_unknown_robot_lists_the_known_ones() -> None:
-    with pytest.raises(RobotError, match="unknown robot 'walrus'; there are ant"):
-        make_robot("walrus")
+    with pytest.raises(RobotError, match="unknown robot 'qqqqqqqq'; there are ant"):
+        make_robot("qqqqqqqq")
 
 
 def test_wrap_angle() -> None:
