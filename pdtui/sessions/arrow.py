@@ -8,6 +8,7 @@ what is left takes as much memory as it has bytes.
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from functools import lru_cache
 
 import pyarrow as pa
@@ -15,7 +16,7 @@ import pyarrow as pa
 MAX_ROWS = 1 << 20
 _MAX_COLUMNS = 1000
 _MAX_DEPTH = 6
-_BATCH = "record batch"
+_SCHEMA, _BATCH = "schema", "record batch"
 _SIZED = (
     pa.types.is_boolean,
     pa.types.is_integer,
@@ -41,14 +42,18 @@ def read_batch(data: pa.Buffer) -> pa.RecordBatch:
     """
     reader = pa.ipc.MessageReader.open_stream(data)
     try:
-        schema = pa.ipc.read_schema(reader.read_next_message())
-        message = reader.read_next_message()
+        first, message = reader.read_next_message(), reader.read_next_message()
     except StopIteration:
         raise ValueError("expected a schema and a record batch, found less") from None
+    if first.type != _SCHEMA:  # Arrow would take any message for one, and crash
+        raise ValueError(f"expected a {_SCHEMA}, found a {first.type}")
+    schema = pa.ipc.read_schema(first)
     if len(schema) > _MAX_COLUMNS:
         raise ValueError(f"expected at most {_MAX_COLUMNS} columns, found {len(schema)}")
+    _check_texts(schema.metadata)
     for field in schema:
         _check_type(field.type, _MAX_DEPTH)
+        _check_field(field)
     if message.type != _BATCH:
         raise ValueError(f"expected a {_BATCH}, found a {message.type}")
     if _is_compressed(message.metadata):
@@ -58,6 +63,20 @@ def read_batch(data: pa.Buffer) -> pa.RecordBatch:
         raise ValueError(f"expected at most {MAX_ROWS} rows, found {batch.num_rows}")
     batch.validate(full=True)
     return batch
+
+
+def _check_field(field: pa.Field) -> None:
+    """See that names are text, which Arrow does not ask for and Rerun does; reading a name decodes it."""
+    kind, _ = field.type, field.name
+    _check_texts(field.metadata)
+    for index in range(kind.num_fields):
+        _check_field(kind.field(index))
+
+
+def _check_texts(metadata: Mapping[bytes, bytes] | None) -> None:
+    for pair in (metadata or {}).items():
+        for text in pair:
+            text.decode()
 
 
 @lru_cache(maxsize=256)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.compute as pc
 import rerun.chunk
 
@@ -124,4 +125,10 @@ def _kept(path: Path, steps: int) -> Iterator[rerun.chunk.Chunk]:
         if STEP in chunk.timelines:
             batch = batch.filter(pc.less(batch.column(STEP), steps))
         if batch.num_rows:
-            yield from rerun.chunk.Chunk.from_record_batch(batch)
+            try:
+                ready = rerun.chunk.Chunk.from_record_batch(batch)
+            except (ValueError, RuntimeError, pa.ArrowException) as error:
+                raise SessionError(
+                    f"{path}: rows of '{chunk.entity[:80]}' cannot be rescued: {error}"
+                ) from error
+            yield from ready

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import cast, get_args
@@ -26,6 +27,8 @@ from pdtui.stimulation.maps import (
 
 MAX_BYTES = 1_000_000
 """Of a map's text. 100 behaviors of 60 units have 200,000."""
+_MAX_DOTS = 64
+_BETWEEN = re.compile(r"[=,{}\[\]\n#]")
 
 
 def load_map(path: Path) -> StimulationMap:
@@ -51,6 +54,8 @@ def parse_map(text: str, source: str) -> StimulationMap:
     """
     if len(text) > MAX_BYTES:
         raise MapError(f"{source}: expected a map of at most {MAX_BYTES} characters")
+    if _has_long_key(text):
+        raise MapError(f"{source}: not a TOML file of ours: a key of more than {_MAX_DOTS} parts")
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a whole number of too many digits is no TOMLDecodeError
@@ -93,6 +98,16 @@ def parse_map(text: str, source: str) -> StimulationMap:
                     f"{source}: behavior '{behavior.name}': together names '{other}', which does not exist"
                 )
     return StimulationMap(robot, name, sha256, default_key, primitives, behaviors, text, source, choices)
+
+
+def _has_long_key(text: str) -> bool:
+    """Whether dots join more parts than any key has: the time that they take grows with their square."""
+    joined = 0
+    for part in text.split("."):
+        joined = 0 if not part or _BETWEEN.search(part) else joined + 1
+        if joined > _MAX_DOTS:
+            return True
+    return False
 
 
 def _primitive(table: FieldTable) -> Primitive:
