@@ -25,6 +25,7 @@ from rerun.experimental import ViewerClient, ViewerState
 from pdtui.sessions.viewer import LOCAL, find_viewer
 
 _PATIENCE = 30.0
+_NO_MATTER = ("Software rasterizer", "Failed to load examples")
 _NO_DRIVER = ("No graphics adapter", "Failed to get render context")
 ARTIFACTS = Path(os.environ.get("PDTUI_ARTIFACTS", Path(__file__).parents[1] / "test-artifacts"))
 """Where screenshots are kept."""
@@ -40,7 +41,7 @@ class RealViewer:
     def __init__(self, port: int) -> None:
         self.port = port
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the viewer
-        command = [find_viewer(), "--headless", "--bind", LOCAL, "--port", str(port)]
+        command = [find_viewer(), "--headless", "--hide-welcome-screen", "--bind", LOCAL, "--port", str(port)]
         self._process = subprocess.Popen(
             command, stdout=self._said, stderr=subprocess.STDOUT, start_new_session=True
         )
@@ -84,15 +85,20 @@ class RealViewer:
             self.client.save_screenshot(str(path))
         complaints = {view.name: view.reports for view in self.client.get_state().views if view.reports}
         assert not complaints, complaints
-        errors = [entry for entry in self.client.get_logs() if entry.level == "ERROR"]
-        assert not errors, errors
+        logged = [entry for entry in self.client.get_logs() if entry.level in ("WARN", "ERROR")]
+        said = [entry for entry in logged if not any(one in entry.message for one in _NO_MATTER)]
+        assert not said, said
         with Image.open(path) as picture:
             return np.asarray(picture.convert("RGB"))
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal to all of its processes."""
+        os.killpg(self._process.pid, number)
 
     def kill(self) -> None:
         """End the viewer, and what it started, at once."""
         if self._process.poll() is None:
-            os.killpg(self._process.pid, signal.SIGKILL)
+            self.signal(signal.SIGKILL)
         self._process.wait()
 
     def _connect(self) -> ViewerClient:

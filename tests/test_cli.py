@@ -12,6 +12,7 @@ from click.testing import CliRunner, Result
 
 from pdtui.cli import main
 from pdtui.stimulation.maps import StimulationMap
+from tests.real_viewer import RealViewer, free_port, is_blank
 
 
 def run(*arguments: str | Path | int) -> Result:
@@ -180,3 +181,26 @@ def test_importing_the_commands_pulls_in_nothing_heavy() -> None:
     code = f"import sys, pdtui.cli; print([m for m in {heavy!r} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
+
+
+def test_a_drive_is_shown_in_a_viewer_and_goes_on_without_one(
+    map_path: Path, keys: Path, tmp_path: Path, viewer: RealViewer
+) -> None:
+    drive = ("drive", "ant", "--map", map_path, "--headless", "--keys", keys, "--steps", 80)
+    before = {recording.store_id for recording in viewer.client.get_state().recordings}
+    shown = run(*drive, "--record", tmp_path / "shown.rrd", "--viewer", viewer.port)
+    assert shown.exit_code == 0, shown.output
+    viewer.wait_for(
+        lambda state: (
+            state.active_recording not in {None, *before}
+            and any(view.name.startswith("All activations") for view in state.views)
+        )
+    )
+    assert not is_blank(viewer.picture("driven", step=60))
+    nobody = free_port()
+    alone = run(*drive, "--record", tmp_path / "alone.rrd", "--viewer", nobody)
+    assert alone.exit_code == 0, alone.output
+    assert f"no viewer listens on 127.0.0.1:{nobody}: start `rerun --bind 127.0.0.1" in alone.output
+    assert "80 steps" in alone.output
+    refused = run(*drive, "--viewer", nobody)
+    assert "--viewer shows what is recorded" in refused.output

@@ -21,6 +21,7 @@ from pdtui.cli.common import (
 from pdtui.errors import EventError, ScreenError, SessionError
 from pdtui.policies.choices import PolicyChoices
 from pdtui.sessions.schema import ACTIVATIONS_KEPT, ActivationsKept
+from pdtui.sessions.viewer import LOCAL, PORT, ViewerAddress
 from pdtui.text import plain
 
 if TYPE_CHECKING:
@@ -52,6 +53,13 @@ if TYPE_CHECKING:
     help="Activations in the session: as they are, as float16, or none but the picture of all. "
     "A replay computes them again.",
 )
+@click.option(
+    "--viewer",
+    is_flag=False,
+    flag_value=str(PORT),
+    metavar="[PORT|HOST[:PORT]]",
+    help=f"Show the drive in a Rerun viewer that listens there, too; alone: on {LOCAL}:{PORT}.",
+)
 @click.option("--fps", type=click.IntRange(1, 60), default=12, show_default=True, help="Frames a second.")
 @click.option("--headless", is_flag=True, help="No screen: drive from --keys, as fast as it goes.")
 @click.option("--keys", type=click.Path(path_type=Path), help="Keystrokes to drive from: lines 'STEP KEY'.")
@@ -70,6 +78,7 @@ def drive(
     record: Path | None,
     no_record: bool,
     activations: ActivationsKept,
+    viewer: str | None,
     fps: int,
     headless: bool,
     keys: Path | None,
@@ -91,6 +100,10 @@ def drive(
         raise SessionError(f"{record}: exists already; a drive is recorded into a new file")
     if keys is not None and not headless:
         raise EventError("--keys needs --headless; on the screen, you press them")
+    if viewer is not None:
+        if no_record or (headless and record is None):
+            raise SessionError("--viewer shows what is recorded: add --record FILE, or leave --no-record out")
+        order = replace(order, viewer=ViewerAddress.parse(viewer))
     if headless:
         _drive_headless(order, keys, steps, record)
     else:
@@ -137,8 +150,11 @@ def _drive_headless(order: DriveOrder, keys: Path | None, steps: int, record: Pa
 
     presses = read_keystrokes(keys, order.stimulation_map) if keys is not None else {}
     loop = build_loop(order)
-    info = replace(loop.info, activations=order.activations)
-    recorder = SessionRecorder(record, info) if record is not None else None
+    info, viewer = replace(loop.info, activations=order.activations), order.viewer
+    if viewer is not None and not viewer.listens:
+        click.echo(viewer.absence, err=True)
+        viewer = None
+    recorder = SessionRecorder(record, info, viewer=viewer) if record is not None else None
     with ending_signals() as ended:
         summary = drive_headless(loop, presses, steps, recorder, ended)
     click.echo(

@@ -76,6 +76,14 @@ def vectors(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> Co
     return _listed(descriptor, values, _regular(count, width))
 
 
+def lines(descriptor: rr.ComponentDescriptor, block: NDArray[Any]) -> Column:
+    """A block (n, m, k) as n lists of one polyline through m points of k coordinates."""
+    points = vectors(descriptor, block).array
+    item = pa.field("item", points.type.value_type, nullable=False)
+    strips = pa.ListArray.from_arrays(points.offsets, points.values, type=pa.list_(item))
+    return _listed(descriptor, strips, _regular(len(block), 1))
+
+
 def ragged(
     descriptor: rr.ComponentDescriptor | str, lists: Sequence[Sequence[Any]], kind: pa.DataType
 ) -> Column:

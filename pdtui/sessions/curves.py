@@ -16,16 +16,12 @@ Key = TypeVar("Key")
 Send = Callable[[str, Sequence[int], list[Column]], None]
 LogStatic = Callable[[str, Any], None]
 
-PALETTE = (
-    (230, 159, 0),
-    (86, 180, 233),
-    (0, 158, 115),
-    (204, 121, 167),
-    (240, 228, 66),
-    (0, 114, 178),
-    (213, 94, 0),
-)
+Color = tuple[int, int, int]
+
 _HEAT_COLUMNS = 768
+_SAMPLED = 1_000_000
+_CLIPPED = 0.01
+"""Share of activations that the heat map clips: what overwrites a unit may be twenty times the others."""
 
 
 class Curves(Generic[Key]):
@@ -34,7 +30,8 @@ class Curves(Generic[Key]):
     Args:
         entity: parent of the entities.
         label: name of a key.
-        fields: names of the values.
+        color: of a key.
+        fields: names of the values; of several, the last is drawn brightest.
         send: writes a batch of rows.
         log_static: writes what holds at all times.
     """
@@ -43,14 +40,21 @@ class Curves(Generic[Key]):
         self,
         entity: str,
         label: Callable[[Key], str],
+        color: Callable[[Key], Color],
         fields: tuple[str, ...],
         send: Send,
         log_static: LogStatic,
     ) -> None:
-        self._entity, self._label, self._fields = entity, label, fields
+        self._entity, self._label, self._color, self._fields = entity, label, color, fields
         self._send, self._log_static = send, log_static
+        self._gap = (math.nan,) * len(fields)
         self._rows: dict[Key, list[tuple[int, tuple[Any, ...]]]] = {}
         self._last: tuple[Key, ...] = ()
+
+    @property
+    def keys(self) -> tuple[Key, ...]:
+        """All that had values so far."""
+        return tuple(self._rows)
 
     @property
     def drawing(self) -> bool:
@@ -62,12 +66,17 @@ class Curves(Generic[Key]):
         for key in self._last:
             if key not in values:
                 # A gap, or the viewer would draw a line to where the curve comes back.
-                self._rows[key].append((step, (math.nan,) * len(self._fields)))
+                self._rows[key].append((step, self._gap))
         for key, row in values.items():
             if key not in self._rows:
                 self._start(key)
             self._rows[key].append((step, row))
         self._last = tuple(values)
+
+    def finish(self, step: int) -> None:
+        """End all curves at the session's last step."""
+        for buffered in self._rows.values():
+            buffered.append((step, self._gap))
 
     def write(self) -> None:
         """Write what was added since the last time."""
@@ -79,11 +88,11 @@ class Curves(Generic[Key]):
                 self._rows[key] = []
 
     def _start(self, key: Key) -> None:
-        names = [f"{self._label(key)} {field}" for field in self._fields]
-        pair = _shades(PALETTE[len(self._rows) % len(PALETTE)])
-        colors = pair if len(names) == len(pair) else list(PALETTE[: len(names)])
-        self._log_static(self._entity_of(key), rr.SeriesLines(names=names, colors=colors))
-        self._rows[key] = []
+        names = [f"{self._label(key)} {field}".rstrip() for field in self._fields]
+        shades = _shades(self._color(key), len(names))
+        self._log_static(self._entity_of(key), rr.SeriesLines(names=names, colors=shades))
+        # From the session's first step, so that plots one above the other cover the same time.
+        self._rows[key] = [(0, self._gap)]
 
     def _entity_of(self, key: Key) -> str:
         return f"{self._entity}/{rr.escape_entity_path_part(self._label(key))}"
@@ -105,21 +114,26 @@ class HeatMap:
                 self._stride *= 2
 
     def picture(self) -> NDArray[np.uint8] | None:
-        """Units from top to bottom, time from left to right; 128 is zero, the largest magnitude 1 or 255."""
+        """Units from top to bottom, time from left to right; 128 is zero.
+
+        1 and 255 are the largest magnitudes but for a few, which are clipped.
+        """
         if not self._columns:
             return None
         values = np.concatenate(self._columns).reshape(len(self._columns), -1)
         if not np.isfinite(values).all():
             np.nan_to_num(values, copy=False)
         # In place, and turned only when the numbers are small: this is the last thing that a drive waits for.
-        values /= max(float(values.max()), -float(values.min()), 1e-9)
-        values *= 127
+        sizes = np.abs(values.ravel()[:: 1 + values.size // _SAMPLED])
+        largest = len(sizes) - 1 - int(_CLIPPED * len(sizes))
+        sizes.partition(largest)
+        values *= 127 / max(float(sizes[largest]), 1e-9)
+        np.clip(values, -127, 127, out=values)
         values += 128
         picture: NDArray[np.uint8] = np.rint(values, out=values).astype(np.uint8)
         return np.ascontiguousarray(picture.T)
 
 
-def _shades(color: tuple[int, int, int]) -> list[tuple[int, int, int]]:
-    """A faint and a full shade: two curves that belong together look alike."""
-    red, green, blue = color
-    return [(red // 2, green // 2, blue // 2), color]
+def _shades(color: Color, count: int) -> list[Color]:
+    """From faint to full: curves that belong together look alike."""
+    return [tuple(part * (level + 1) // count for part in color) for level in range(count)]  # type: ignore[misc]

@@ -13,19 +13,22 @@ from typing import Any, Self, cast
 import rerun as rr
 
 from pdtui.errors import RecordingEnded, SessionError
+from pdtui.sessions.blueprint import layout
 from pdtui.sessions.columns import Column, indexes
 from pdtui.sessions.frames import whole_length
+from pdtui.sessions.live import LiveView
 from pdtui.sessions.properties import info_to_properties
 from pdtui.sessions.record import DriveInfo, StepRecord
 from pdtui.sessions.room import Reserve, room_for
 from pdtui.sessions.rows import drive_columns, ending_columns, event_columns
 from pdtui.sessions.schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
 from pdtui.sessions.versions import environment_versions
+from pdtui.sessions.viewer import ViewerAddress
 from pdtui.sessions.views import Views
 from pdtui.sessions.writing import abandon, errors_named, flush, open_recording, send_property
 from pdtui.text import size_of
 
-_VIEW_ROWS = 128
+_VIEW_ROWS, _LIVE_ROWS = 128, 8
 _SAFE_ROWS = 16
 """Batches up to this length are waited for; a wait costs 0.5 ms, on a busy machine more."""
 
@@ -50,18 +53,25 @@ class SessionRecorder:
         info: what determines the run.
         rows_per_write: control steps a batch. Small batches lose less in a crash; large ones cost less.
         view_rows: control steps a batch of what only the viewer draws.
+        viewer: where a viewer listens that shows the drive, too; None for none.
 
     Raises:
         SessionError: the file cannot be written, or there is no room for a recording.
     """
 
     def __init__(
-        self, path: Path, info: DriveInfo, *, rows_per_write: int = 128, view_rows: int = _VIEW_ROWS
+        self,
+        path: Path,
+        info: DriveInfo,
+        *,
+        rows_per_write: int = 128,
+        view_rows: int = _VIEW_ROWS,
+        viewer: ViewerAddress | None = None,
     ) -> None:
         self.path, self.info = Path(path), info
         self._rows_per_write = max(1, rows_per_write)
         self._rows: list[StepRecord] = []
-        self._view_rows = max(view_rows, 2 * self._rows_per_write)
+        self._view_rows = max(view_rows if viewer is None else _LIVE_ROWS, 2 * self._rows_per_write)
         self._waits = self._rows_per_write <= _SAFE_ROWS
         self._events = self._steps = self._batches = self._chunks = 0
         self._closed = self._failed = False
@@ -69,6 +79,9 @@ class SessionRecorder:
         self._reserve = Reserve(self.path, sum(info.layers), rows)
         self._require_room_to_begin()
         self._recording = open_recording(self.path, info)
+        self._live: LiveView | None = None
+        if viewer is not None:
+            self._live = LiveView(viewer, info, self._recording.get_recording_id() or "")
         self._write_start()
         self._views = Views(info, self._send, self._log_static)
         self._send_off()
@@ -125,12 +138,25 @@ class SessionRecorder:
                 self._views.finish()
                 self._property(OUTCOME, {"outcome": outcome})
                 self._send_off()
+                self._lay_out()
         finally:
             if self._failed:
                 abandon(self._recording)
                 self._cut()
             else:
                 self._recording.disconnect()
+            if self._live is not None:
+                self._live.close()
+
+    def _lay_out(self) -> None:
+        """Lay out what there is, now that it is known."""
+        content = self._views.content()
+        with self._errors_named():
+            # Active, or a viewer that shows another session would lay this one out like that.
+            self._recording.send_blueprint(layout(self.info, content), make_active=True)
+        self._send_off()
+        if self._live is not None:
+            self._live.lay_out(content)
 
     def __enter__(self) -> Self:
         return self
@@ -209,14 +235,20 @@ class SessionRecorder:
             rr.send_columns(
                 entity, indexes(steps, self.info.dt), ready, recording=self._recording, strict=True
             )
+        if self._live is not None:
+            self._live.send(entity, steps, columns)
 
     def _log_static(self, entity: str, archetype: Any) -> None:
         with self._errors_named():
             rr.log(entity, archetype, static=True, recording=self._recording, strict=True)
+        if self._live is not None:
+            self._live.log_static(entity, archetype)
 
     def _property(self, name: str, values: dict[str, Any]) -> None:
         with self._errors_named():
             send_property(self._recording, name, values)
+        if self._live is not None:
+            self._live.send_property(name, values)
 
     def _send_off(self, *, wait: bool = True) -> None:
         """Hand everything to the operating system, where it outlives this process."""

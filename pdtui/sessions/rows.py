@@ -87,8 +87,8 @@ def describe_event(event: Event) -> str:
     said = {
         "behavior": f"behavior '{event.name}'",
         "default": "nothing is overwritten any more",
-        "target": f"target of '{event.name}' is {event.value:g}",
-        "factor": f"magnitudes of '{event.name}' times {event.value:g}",
+        "target": f"target of '{event.name}' is {event.value:.4g}",
+        "factor": f"magnitudes of '{event.name}' times {event.value:.4g}",
         "reset": "next episode",
         "rewind": f"rewinds to step {event.value:.0f}",
     }[event.kind]

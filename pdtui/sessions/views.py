@@ -7,19 +7,24 @@ of it loses no fact.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import rerun as rr
 
 from pdtui.policies.units import format_unit
 from pdtui.robots.types import Floats
-from pdtui.sessions.columns import rows, texts, vectors
-from pdtui.sessions.curves import PALETTE, Curves, HeatMap, LogStatic, Send
+from pdtui.sessions.blueprint import Content
+from pdtui.sessions.columns import lines, rows, texts
+from pdtui.sessions.curves import Color, Curves, HeatMap, LogStatic, Send
+from pdtui.sessions.legend import Legend
 from pdtui.sessions.record import DriveInfo, StepRecord
-from pdtui.sessions.schema import BEHAVIORS, CONTROLLERS, HEAT_MAP, PATH, ROBOT, UNITS
+from pdtui.sessions.schema import BEHAVIORS, HEAT_MAP, MAGNITUDES, PATH, ROBOT, TARGETS, UNITS
 from pdtui.sessions.shapes import Shapes
 
-_IDLE = (150, 150, 150)
+_UNITS_DRAWN = 4
+"""Units drawn of a state: an imprint of sixty would be a tangle, and the heat map has them all."""
 _DRAWN_APART = 0.04
 """Simulated time between two pictures of the robot, s: what the eye needs. Poses are the largest stream after
 the activations, and a replay has all of them."""
@@ -40,40 +45,63 @@ class Views:
         self._draw_every = max(1, round(_DRAWN_APART / info.dt))
         for part in self._shapes.static():
             log_static(ROBOT, part)
-        self._units: Curves[int] = Curves(
-            UNITS, lambda unit: format_unit(unit, info.layers), ("natural", "overwritten"), send, log_static
+        self._legend = Legend(info)
+        self._units: Curves[tuple[str, int]] = Curves(
+            UNITS,
+            lambda key: f"{key[0]}, {format_unit(key[1], info.layers)}",
+            lambda key: self._color(key[0]),
+            ("natural", "overwritten"),
+            send,
+            log_static,
         )
-        self._controllers: Curves[str] = Curves(
-            CONTROLLERS, str, ("target", "value", "error", "c"), send, log_static
-        )
-        self._colors: dict[str, tuple[int, int, int]] = {}
+        self._targets: Curves[str] = Curves(TARGETS, str, self._legend.color, ("target",), send, log_static)
+        self._magnitudes: Curves[str] = Curves(MAGNITUDES, str, self._legend.color, ("",), send, log_static)
+        self._shown_units: dict[str, tuple[int, ...]] = {}
+        self._left_out = False
+        self._states: dict[str, tuple[str, ...]] = {name: (name,) for name in self._legend.names}
         self._state = ""
+        self._new_state = bool(self._states)
         self._pending = 0
         self._changes: list[tuple[int, str]] = []
-        self._drawn: list[tuple[int, Floats, str]] = []
+        self._drawn: list[tuple[int, Floats, str, bool]] = []
+        self._here: Floats | None = None
+        self._jumped = True
+        self._episode = self._last = 0
+        self._bounds = np.array([[np.inf] * 2, [-np.inf] * 2])
         self._heat = HeatMap()
+        self._heat_drawn = False
 
     def add(self, records: Sequence[StepRecord]) -> None:
         """Take in control steps."""
         self._pending += len(records)
         for record in records:
-            behaviors, stimulation = record.behaviors, record.stimulation
+            self._last, behaviors, stimulation = record.step, record.behaviors, record.stimulation
             state = " + ".join([behavior.name for behavior in behaviors]) if behaviors else ""
             if state != self._state:
                 self._changes.append((record.step, state))
                 self._state = state
+                if state and state not in self._states:
+                    self._states[state] = tuple(behavior.name for behavior in behaviors)
+                    self._new_state = True
+            # The path does not run through the air to where an episode starts or a rewind leads.
+            self._jumped |= record.episode != self._episode or any(
+                event.kind in ("reset", "rewind") for event in record.events
+            )
+            self._episode = record.episode
             if record.step % self._draw_every == 0:
-                self._drawn.append((record.step, record.poses, state))
+                self._drawn.append((record.step, record.poses, state, self._jumped))
+                self._jumped = False
             if stimulation.units or self._units.drawing:
-                values = zip(record.natural, stimulation.values, strict=True)
-                self._units.add(record.step, dict(zip(stimulation.units, values, strict=True)))
-            if behaviors or self._controllers.drawing:
-                self._controllers.add(
+                self._units.add(record.step, self._outputs(state, record))
+            if behaviors or self._magnitudes.drawing:
+                self._targets.add(
+                    record.step, {one.name: (one.target,) for one in behaviors if one.target is not None}
+                )
+                self._magnitudes.add(
                     record.step,
                     {
-                        one.name: (one.target, one.value, one.error, one.magnitude)
+                        one.name: (one.factor * (1.0 if one.magnitude is None else one.magnitude),)
                         for one in behaviors
-                        if one.target is not None
                     },
                 )
             self._heat.add(record.step, record.activations)
@@ -86,18 +114,20 @@ class Views:
     def write(self) -> None:
         """Write what was collected since the last time."""
         if self._drawn:
-            self._name_states()
-            steps, poses, states = zip(*self._drawn, strict=True)
-            self._write_robot(steps, np.array(poses), states)
+            steps, poses, states, jumps = zip(*self._drawn, strict=True)
+            self._write_robot(steps, np.array(poses), states, np.array(jumps))
             self._drawn = []
         self._pending = 0
-        self._units.write()
-        self._controllers.write()
+        for curves in (self._units, self._targets, self._magnitudes):
+            curves.write()
 
     def write_changes(self) -> None:
         """Write at which steps other behaviors became active."""
+        if self._new_state:
+            colors = [self._color(state) for state in self._states]
+            self._log_static(BEHAVIORS, rr.StateConfiguration(values=list(self._states), colors=colors))
+            self._new_state = False
         if self._changes:
-            self._name_states()
             steps, states = zip(*self._changes, strict=True)
             self._send(BEHAVIORS, steps, [texts(rr.StateChange.descriptor_state(), states)])
             self._changes = []
@@ -105,44 +135,73 @@ class Views:
     def finish(self) -> None:
         """Write what can only be drawn at the end."""
         self.write_changes()
+        for curves in (self._units, self._targets, self._magnitudes):
+            curves.finish(self._last)
         self.write()
         picture = self._heat.picture()
         if picture is not None:
             self._log_static(HEAT_MAP, rr.Tensor(picture, dim_names=("unit", "time")))
+            self._heat_drawn = True
 
-    def _write_robot(self, steps: Sequence[int], poses: Floats, states: Sequence[str]) -> None:
+    def content(self) -> Content:
+        """What there is to be laid out, so far."""
+        low, high = self._bounds
+        return Content(
+            units=len(self._units.keys),
+            units_left_out=self._left_out,
+            targets=self._targets.keys,
+            magnitudes=len(self._magnitudes.keys),
+            heat_map=self._heat_drawn,
+            path=(tuple(low), tuple(high)) if np.isfinite(low).all() else None,
+        )
+
+    def _color(self, state: str) -> Color:
+        return self._legend.color_of_all(self._states.get(state, ()))
+
+    def _outputs(self, state: str, record: StepRecord) -> dict[tuple[str, int], tuple[float, float]]:
+        """Natural and overwritten outputs of the units that the state changed most when it first came."""
+        units, values, natural = record.stimulation.units, record.stimulation.values, record.natural
+        if units and state not in self._shown_units:
+            change = np.abs(np.subtract(values, natural))
+            strongest = np.argsort(-change, kind="stable")[:_UNITS_DRAWN]
+            self._shown_units[state] = tuple(units[place] for place in strongest)
+            self._left_out |= len(units) > _UNITS_DRAWN
+        shown = self._shown_units.get(state, ())
+        both = dict(zip(units, zip(natural, values, strict=True), strict=True))
+        return {(state, unit): both[unit] for unit in shown if unit in both}
+
+    def _write_robot(
+        self, steps: Sequence[int], poses: Floats, states: Sequence[str], jumps: np.ndarray[Any, Any]
+    ) -> None:
         shapes = self._shapes.columns(poses)
         if shapes:
             self._send(ROBOT, steps, shapes)
         if not poses.shape[1]:
             return
-        positions = np.zeros((len(steps), 1, 3), np.float32)
-        positions[:, 0, :2] = poses[:, 0, :2]
+        here = poses[:, 0, :2]
+        before = np.concatenate([here[:1] if self._here is None else self._here, here[:-1]])
+        before[jumps] = here[jumps]
+        self._here = here[-1:].copy()
+        self._bounds = np.array(
+            [np.fmin(self._bounds[0], here.min(0)), np.fmax(self._bounds[1], here.max(0))]
+        )
+        pieces = np.zeros((len(steps), 2, 3), np.float32)
+        pieces[:, 0, :2], pieces[:, 1, :2] = before, here
         # A picture's y axis points down, and only in a picture does the viewer fit the path to the frame.
-        above = positions[:, :, :2] * np.array([1.0, -1.0], np.float32)
-        packed = {state: _packed(self._colors.get(state, _IDLE)) for state in set(states)}
-        colors = np.array([packed[state] for state in states], np.uint32)
+        above = pieces[:, :, :2] * np.array([1.0, -1.0], np.float32)
+        packed = {state: _packed(self._color(state)) for state in set(states)}
+        colors = rows(
+            rr.LineStrips3D.descriptor_colors(), np.array([packed[state] for state in states], np.uint32)
+        )
         columns = [
-            vectors(rr.Points3D.descriptor_positions(), positions),
-            rows(rr.Points3D.descriptor_colors(), colors),
-            vectors(rr.Points2D.descriptor_positions(), above),
-            rows(rr.Points2D.descriptor_colors(), colors),
+            lines(rr.LineStrips3D.descriptor_strips(), pieces),
+            colors,
+            lines(rr.LineStrips2D.descriptor_strips(), above),
+            replace(colors, descriptor=rr.LineStrips2D.descriptor_colors()),
         ]
         self._send(PATH, steps, columns)
 
-    def _name_states(self) -> None:
-        states = {state for _, state in self._changes if state} - self._colors.keys()
-        if not states:
-            return
-        for _, state in self._changes:
-            if state in states and state not in self._colors:
-                self._colors[state] = PALETTE[len(self._colors) % len(PALETTE)]
-        self._log_static(
-            BEHAVIORS,
-            rr.StateConfiguration(values=list(self._colors), colors=list(self._colors.values())),
-        )
 
-
-def _packed(color: tuple[int, int, int]) -> int:
+def _packed(color: Color) -> int:
     red, green, blue = color
     return red << 24 | green << 16 | blue << 8 | 255

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from pdtui.sessions.events import Event
 from pdtui.sessions.schema import ActivationsKept
+from pdtui.sessions.viewer import ViewerAddress
 from pdtui.stimulation.maps import StimulationMap
 
 
@@ -23,6 +24,7 @@ class DriveOrder:
         force: drive although the policy is not the map's.
         recording: file to record into, empty for none.
         activations: how they are recorded.
+        viewer: where a Rerun viewer listens that is to show a recorded drive; None for none.
         script: events by step that are played instead of keys, where a session is watched.
         digests: what the watched session left, to compare with.
     """
@@ -36,5 +38,6 @@ class DriveOrder:
     force: bool = False
     recording: str = ""
     activations: ActivationsKept = "all"
+    viewer: ViewerAddress | None = None
     script: tuple[Event, ...] | None = None
     digests: tuple[int, ...] = ()

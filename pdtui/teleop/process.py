@@ -20,7 +20,7 @@ _PATIENCE = 15.0
 
 
 def _simulate(connection: Connection, order: DriveOrder) -> None:
-    # What the recording library prints when the disk is full would go over the screen, which says so itself.
+    # What the recording library prints when the disk is full, or a viewer gone, would go over the screen.
     os.environ.setdefault("RUST_LOG", "off")
     from pdtui.teleop.simulation import simulate  # torch and the simulator load here, not under the screen
 

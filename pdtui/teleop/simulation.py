@@ -39,9 +39,11 @@ class Simulation:
         self._observer = Observer(self._loop)
         self._recorder: SessionRecorder | None = None
         if order.recording:
-            path = Path(order.recording)
+            path, viewer = Path(order.recording), order.viewer
+            if viewer is not None and not viewer.listens:
+                self._observer.notice, viewer = viewer.absence, None
             info = replace(self._loop.info, activations=order.activations)
-            self._recorder = SessionRecorder(path, info, rows_per_write=PACED_ROWS_PER_WRITE)
+            self._recorder = SessionRecorder(path, info, rows_per_write=PACED_ROWS_PER_WRITE, viewer=viewer)
         self._pacer = Pacer(self._loop.robot.control_dt, time.monotonic())
         self._pressed: list[str] = []
         self._wanted = False

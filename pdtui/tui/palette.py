@@ -10,6 +10,8 @@ from rich.style import Style
 from textual.color import Color
 from textual.theme import Theme
 
+from pdtui.stimulation.colors import BEHAVIOR_COLORS
+
 THEME = Theme(
     name="pdtui",
     primary="#6cb6d9",
@@ -23,17 +25,6 @@ THEME = Theme(
     surface="#10151d",
     panel="#18202b",
     dark=True,
-)
-# Told apart by lightness as well as by hue; a behavior's colour is its row in the map, modulo their number.
-BEHAVIOR_COLORS = (
-    "#f0a45d",
-    "#58c4dc",
-    "#b6e36b",
-    "#e879c6",
-    "#ffe07a",
-    "#8ea8ff",
-    "#5ee0b0",
-    "#ff8a80",
 )
 _COLD, _WARM = "#4aa3ff", "#ff9d4d"
 HEAT_LEVELS = 8

@@ -87,7 +87,7 @@ def test_a_broken_middle_is_cut_there(recorded: Recorded, tmp_path: Path) -> Non
         place += 16 + struct.unpack_from("<QQ", data, place)[1]
     for claimed in (2**62, 2**33, 0):
         path = tmp_path / f"{claimed}.rrd"
-        struct.pack_into("<Q", data, headers[len(headers) * 3 // 4] + 8, claimed)
+        struct.pack_into("<Q", data, headers[len(headers) // 2] + 8, claimed)
         path.write_bytes(data)
         assert not examine(path).whole
         repaired = repair_session(path, tmp_path / "repaired.rrd")

@@ -13,11 +13,13 @@ import pytest
 
 from pdtui.errors import PdtuiError
 from pdtui.sessions.reader import read_session
+from pdtui.sessions.viewer import ViewerAddress
 from pdtui.stimulation.maps import StimulationMap
 from pdtui.teleop.order import DriveOrder
 from pdtui.teleop.process import ProcessLink
 from pdtui.teleop.replay import replay_session
 from pdtui.teleop.snapshot import Briefing, Snapshot
+from tests.real_viewer import free_port, real_viewer
 
 PATIENCE = 60.0
 
@@ -138,3 +140,34 @@ def test_a_session_can_be_watched(small_map: StimulationMap, link: ProcessLink, 
     watching.close()
     assert last.finished == f"identical, {session.steps} steps"
     np.testing.assert_array_equal(last.attributes, session.attributes[-1])
+
+
+def test_a_drive_whose_viewer_is_not_there_says_so_and_goes_on(
+    small_map: StimulationMap, recording: Path
+) -> None:
+    nobody = ViewerAddress(port=free_port())
+    link = ProcessLink(DriveOrder("ant", small_map, 3, recording=str(recording), viewer=nobody))
+    try:
+        seen = _until(link, lambda snapshot: snapshot.step > 20)
+    finally:
+        link.close()
+    assert any(snapshot.notice == nobody.absence for snapshot in seen)
+    assert read_session(recording).steps > 20
+
+
+def test_a_viewer_killed_in_mid_drive_leaves_drive_and_session_whole(
+    small_map: StimulationMap, recording: Path
+) -> None:
+    with real_viewer() as viewer:
+        address = ViewerAddress(port=viewer.port)
+        link = ProcessLink(DriveOrder("ant", small_map, 3, recording=str(recording), viewer=address))
+        try:
+            viewer.wait_for(lambda state: any(view.name == "Behaviors" for view in state.views))
+            (last,) = _until(link, lambda snapshot: snapshot.step > 20)[-1:]
+            viewer.kill()
+            _until(link, lambda snapshot: snapshot.step > last.step + 40)
+        finally:
+            outcome = link.close()
+    assert not link.failed
+    assert outcome.startswith("stopped")
+    assert replay_session(recording).identical
