@@ -99,10 +99,29 @@ def test_rerun_accepts_the_file(recorded: Recorded) -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_a_layout_is_in_the_file(recorded: Recorded) -> None:
-    reader = RrdReader(recorded[0])
-    assert len(reader.recordings()) == 1
-    assert len(reader.blueprints()) == 1
+def test_the_layout_at_the_end_adds_what_came_and_leaves_out_what_did_not(
+    recorded: Recorded, weights: Path, tmp_path: Path
+) -> None:
+    assert len(RrdReader(recorded[0]).recordings()) == 1
+    begun, ended = layouts(recorded[0])
+    assert {"/view/activations", "/behaviors"} - begun == {"/view/activations"}
+    assert {"/view/activations", "/behaviors"} <= ended
+    record_drive(tmp_path / "idle.rrd", weights, steps=3)
+    begun, ended = layouts(tmp_path / "idle.rrd")
+    assert "/behaviors" in begun - ended
+
+
+def layouts(path: Path) -> list[set[str]]:
+    """Entities that the views of each embedded layout start from."""
+    reader = RrdReader(path)
+    found = []
+    for layout in reader.blueprints():
+        batches = [chunk.to_record_batch() for chunk in reader.stream(store=layout)]
+        views = [batch for batch in batches if "ViewBlueprint:space_origin" in batch.schema.names]
+        found.append(
+            {text for view in views for row in view["ViewBlueprint:space_origin"].to_pylist() for text in row}
+        )
+    return found
 
 
 def test_poses_are_drawn_with_every_link(recorded: Recorded) -> None:

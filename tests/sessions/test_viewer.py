@@ -12,8 +12,7 @@ SAMPLE = Path(__file__).parents[2] / "sessions" / "samples" / "ant.rrd"
 
 def test_the_sample_session_opens_without_a_complaint(viewer: RealViewer) -> None:
     viewer.show(SAMPLE)
-    for step in (120, 480):
-        assert not is_blank(viewer.picture(f"sample-{step}", step=step))
+    assert not is_blank(viewer.picture("sample", step=480))
 
 
 def test_a_session_of_another_policy_and_map_opens_laid_out(viewer: RealViewer, recorded: Recorded) -> None:
