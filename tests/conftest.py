@@ -6,62 +6,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import torch
 
 from pdtui.dissection.dissect import dissect
 from pdtui.dissection.findings import Dissection
 from pdtui.policies.choices import FOLDERS
-from pdtui.policies.files import save_network
 from pdtui.policies.load import load_policy
-from pdtui.policies.network import NetworkSpec, PolicyNetwork
 from pdtui.policies.runtime import Policy
 from pdtui.stimulation.mapfile import load_map
 from pdtui.stimulation.maps import StimulationMap
 from tests.real_viewer import RealViewer, real_viewer
 from tests.small_dissection import SMALL, small_network, write_policy
-
-MAP = """\
-schema = 1
-robot = "ant"
-
-[policy]
-name = "{policy}"
-sha256 = "{sha256}"
-
-[keys]
-default = "space"
-
-[[primitives]]
-name = "sway"
-attribute = "vy"
-unit = "0:3"
-rho = -0.5
-value = 3.0
-measured = {{ effect = 0.4, low = 0.1, high = 0.7 }}
-
-[[behaviors]]
-name = "push"
-key = "w"
-says = "pushes"
-magnitudes = {{ sway = 4.0, "1:7" = 2.0 }}
-aim = {{ attribute = "vy", direction = "increase" }}
-
-[[behaviors]]
-name = "twitch"
-key = "t"
-says = "twitches for half a second"
-magnitudes = {{ "1:2" = -3.0 }}
-period = 0.5
-together = ["push"]
-
-[[behaviors]]
-name = "hold heading"
-key = "h"
-says = "holds a heading"
-mode = "pid"
-magnitudes = {{ "0:5" = 1.0 }}
-pid = {{ attribute = "yaw", kp = 2.0, ki = 0.1, kd = 0.05, limit = 3.0, step = 0.1 }}
-"""
+from tests.small_map import SMALL_MAP, write_small_weights
 
 
 @pytest.fixture(scope="session")
@@ -82,20 +37,7 @@ def _weights_anywhere(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None
 @pytest.fixture(scope="session")
 def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Weights of an untrained policy for the Ant, 2×16 tanh."""
-    torch.manual_seed(7)
-    spec = NetworkSpec(
-        robot="ant",
-        observations=27,
-        layers=(16, 16),
-        activation="tanh",
-        actions=8,
-        head="squashed_gaussian",
-        action_low=(-1.0,) * 8,
-        action_high=(1.0,) * 8,
-    )
-    path = tmp_path_factory.mktemp("weights") / "small.safetensors"
-    save_network(path, PolicyNetwork(spec))
-    return path
+    return write_small_weights(tmp_path_factory.mktemp("weights") / "small.safetensors")
 
 
 @pytest.fixture(scope="session")
@@ -105,7 +47,7 @@ def policy(weights: Path) -> Policy:
 
 @pytest.fixture(scope="session")
 def map_text(weights: Path, policy: Policy) -> str:
-    return MAP.format(policy=weights, sha256=policy.sha256)
+    return SMALL_MAP.format(policy=weights, sha256=policy.sha256)
 
 
 @pytest.fixture(scope="session")

@@ -23,6 +23,7 @@ from pdtui.cli.common import (
 )
 from pdtui.errors import MapError
 from pdtui.policies.choices import PolicyChoices, Spaces
+from pdtui.sessions.schema import ACTIVATIONS_KEPT, ActivationsKept
 
 
 @click.command()
@@ -343,6 +344,45 @@ def bench_dissect_command(robot: str, policy: str, as_json: bool, **sizes: Any) 
     with progress_bar_or_none("measuring", quiet=as_json) as advance:
         result = bench_dissect.bench_dissect(robot, policy or robot, bench_dissect.Sizes(**sizes), advance)
     show_result(asdict(result), as_json, lambda: tables.dissect_table(result))
+
+
+@bench.command("record")
+@click.argument("robot")
+@map_option
+@click.option("--steps", type=click.IntRange(100), default=6000, show_default=True)
+@json_option
+def bench_record_command(robot: str, map_name: str | None, steps: int, as_json: bool) -> None:
+    """What recording ROBOT costs at 50 Hz: share of one core, and MB a minute."""
+    from pdtui.experiments import bench_record, tables
+
+    order = order_of_drive(robot, map_name, "")
+    with progress_bar_or_none("measuring", quiet=as_json) as advance:
+        result = bench_record.bench_record(order, steps=steps, progress=advance)
+    show_result(asdict(result), as_json, lambda: tables.record_table(result))
+
+
+@bench.command("memory")
+@click.argument("robot")
+@map_option
+@click.option(
+    "--steps",
+    type=click.IntRange(100),
+    default=180_000,
+    show_default=True,
+    help="An hour has 180,000 at 50 Hz.",
+)
+@click.option("--record-activations", "activations", type=click.Choice(ACTIVATIONS_KEPT), default="all")
+@json_option
+def bench_memory_command(
+    robot: str, map_name: str | None, steps: int, activations: ActivationsKept, as_json: bool
+) -> None:
+    """Memory while a long drive of ROBOT is recorded and replayed."""
+    from pdtui.experiments import bench_record, tables
+
+    order = order_of_drive(robot, map_name, "", activations=activations)
+    with progress_bar_or_none("driving", quiet=as_json) as advance:
+        result = bench_record.bench_memory(order, steps=steps, progress=advance)
+    show_result(asdict(result), as_json, lambda: tables.memory_table(result))
 
 
 @bench.command("screen")

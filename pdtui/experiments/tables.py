@@ -7,6 +7,7 @@ from rich.table import Table
 
 from pdtui.experiments.bench import LoopBench
 from pdtui.experiments.bench_dissect import DissectBench
+from pdtui.experiments.bench_record import MemoryBench, RecordBench
 from pdtui.experiments.bench_screen import ScreenBench
 from pdtui.experiments.evaluate import Evaluation
 from pdtui.experiments.tracking import Tracking
@@ -141,6 +142,26 @@ def dissect_table(result: DissectBench) -> Group:
     rest.add_row("probing, 2 workers", f"{result.probing_two:.0f} steps/s")
     rest.add_row("2 workers / 1, median of rounds", f"{result.probing_ratio:.2f}")
     return Group(speed, growth, rest)
+
+
+def record_table(result: RecordBench) -> Table:
+    """What each way to record costs at 50 Hz."""
+    table = _table(f"recording, 50 Hz, {result.units} units", "activations", "drive", "of one core", "MB/min")
+    for one in result.costs:
+        table.add_row(one.activations, one.driven, f"{one.cpu_share:.1%}", f"{one.mb_a_minute:.2f}")
+    return table
+
+
+def memory_table(result: MemoryBench) -> Table:
+    """Resident memory over a long drive, in tenths of it."""
+    table = _table(f"memory, {result.steps} steps", "part", "done", "MB")
+    for part, sizes in result.resident.items():
+        for number, size in enumerate(sizes, start=1):
+            table.add_row(part, f"{number * 10} %", f"{size / 1e6:.0f}")
+    took = ", ".join(f"{part} {seconds:.0f} s" for part, seconds in result.seconds.items())
+    state = "whole" if result.whole else "NOT WHOLE"
+    table.caption = f"{result.file_bytes / 1e6:.0f} MB, {state}; {result.verdict}; {took}"
+    return table
 
 
 def screen_table(result: ScreenBench) -> Table:

@@ -18,7 +18,7 @@ from pdtui.robots.base import Robot
 from pdtui.sessions.events import Event
 from pdtui.sessions.record import StepRecord
 from pdtui.sessions.recorder import SessionRecorder
-from pdtui.teleop.keys import key_event
+from pdtui.teleop.keys import key_meanings
 from pdtui.teleop.loop import ControlLoop
 from pdtui.teleop.order import DriveOrder
 
@@ -68,18 +68,17 @@ def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:
         EventError: a key means nothing in the present state.
     """
     events = []
-    for key in keys:
-        event = key_event(key, loop)
-        if isinstance(event, str):
-            raise EventError(f"step {loop.step}: key '{key}': {event}")
-        events.append(event)
+    for key, meaning in zip(keys, key_meanings(keys, loop), strict=True):
+        if isinstance(meaning, str):
+            raise EventError(f"step {loop.step}: key '{key}': {meaning}")
+        events.append(meaning)
     return events
 
 
 def drive_keys(loop: ControlLoop, presses: Mapping[int, Sequence[str]], steps: int) -> Iterator[StepRecord]:
     """Drive from keystrokes, unpaced.
 
-    Keys of one step are read together: what the second means does not depend on what the first did.
+    Keys of one step are read in their order: what the second means depends on what the first did.
 
     Raises:
         EventError: a key means nothing in the state it meets.

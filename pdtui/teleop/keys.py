@@ -58,6 +58,17 @@ def key_event(key: str, loop: ControlLoop) -> Event | str:
     return f"no behavior has key '{key}'"
 
 
+def key_meanings(keys: Iterable[str], loop: ControlLoop) -> list[Event | str]:
+    """What keys mean that are pressed before the same step, each after those before it; see `key_event`."""
+    meanings: list[Event | str] = []
+    with loop.rehearsal() as rehearse:
+        for key in keys:
+            meanings.append(meaning := key_event(key, loop))
+            if isinstance(meaning, Event):
+                rehearse(meaning)
+    return meanings
+
+
 def _move_target(key: str, loop: ControlLoop, active: tuple[ActiveBehavior, ...]) -> Event | str:
     """Left and right prefer a heading, up and down anything else, where both are held."""
     held = [view for view in active if view.target is not None]

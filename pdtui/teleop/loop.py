@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -152,6 +153,15 @@ class ControlLoop:
         if event.step != self.step:
             raise EventError(f"event for step {event.step} given to step {self.step}")
         match event.kind:
+            case "reset":
+                self._start_episode()
+            case "rewind":
+                self._rewind(event.value)
+            case _:
+                self._latch_event(event)
+
+    def _latch_event(self, event: Event) -> None:
+        match event.kind:
             case "behavior":
                 self.latch.press(event.name, self.attributes)
             case "default":
@@ -160,12 +170,31 @@ class ControlLoop:
                 self.latch.set_target(event.name, event.value)
             case "factor":
                 self.latch.set_factor(event.name, event.value)
-            case "reset":
-                self._start_episode()
-            case "rewind":
-                self._rewind(event.value)
             case _:
                 raise EventError(f"step {event.step}: unknown event '{event.kind}'")
+
+    @contextmanager
+    def rehearsal(self) -> Iterator[Callable[[Event], None]]:
+        """Yield a function that does to the latch what an event of this step will; undone at the end.
+
+        So one can see what a key means after those that were pressed before the same step.
+        """
+        kept = self.latch.save()
+
+        def rehearse(event: Event) -> None:
+            if event.kind == "reset":
+                self.latch.clear()
+            elif event.kind == "rewind":
+                self.latch.load(self._moments[int(event.value)].latch)
+            else:
+                self._latch_event(event)
+
+        if self._ended:
+            self.latch.clear()  # the next step begins an episode
+        try:
+            yield rehearse
+        finally:
+            self.latch.load(kept)
 
     def _start_episode(self) -> None:
         self._observation, _ = self.robot.reset(options=self._options)

@@ -16,7 +16,7 @@ from pdtui.sessions.events import Event, events_by_step
 from pdtui.sessions.record import StepRecord
 from pdtui.sessions.recorder import SessionRecorder
 from pdtui.teleop.drive import build_loop
-from pdtui.teleop.keys import key_event
+from pdtui.teleop.keys import key_meanings
 from pdtui.teleop.loop import ControlLoop
 from pdtui.teleop.observer import Observer
 from pdtui.teleop.order import DriveOrder
@@ -143,12 +143,11 @@ class Simulation:
         if self._order.script is not None:
             return self._script.get(self._loop.step, [])
         events = []
-        for key in self._pressed:
-            event = key_event(key, self._loop)
-            if isinstance(event, Event):
-                events.append(event)
+        for meaning in key_meanings(self._pressed, self._loop):
+            if isinstance(meaning, Event):
+                events.append(meaning)
             else:
-                self._observer.notice = event
+                self._observer.notice = meaning
         self._pressed = []
         return events
 
@@ -205,8 +204,8 @@ def simulate(connection: Connection, order: DriveOrder) -> None:
         return  # the screen went away while robot and policy were loading
     except Exception as error:
         # A traceback would be drawn over by the screen.
-        done = f"; {simulation.outcome()}" if simulation is not None else ""
-        _send_quietly(connection, PdtuiError(f"the simulation failed: {said_of(error)}{done}"))
+        said = said_of(error) if simulation is None else simulation.outcome()
+        _send_quietly(connection, PdtuiError(f"the simulation failed: {said}"))
 
 
 def _send_quietly(connection: Connection, message: str | PdtuiError) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from pdtui.policies.runtime import Policy
 from pdtui.robots import make_robot
 from pdtui.sessions.events import Event
 from pdtui.stimulation.maps import StimulationMap
-from pdtui.teleop.keys import key_event, read_keystrokes, write_keystrokes
+from pdtui.teleop.keys import key_event, key_meanings, read_keystrokes, run_keys, write_keystrokes
 from pdtui.teleop.loop import ControlLoop
 
 
@@ -46,6 +47,29 @@ def test_keys_mean_what_the_map_and_the_state_say(loop: ControlLoop) -> None:
         loop.advance()
     assert _press(loop, "backspace") == Event(75, "rewind", value=10.0, key="backspace")
     assert _press(loop, "r") == Event(76, "reset", key="r")
+
+
+def test_keys_of_one_step_mean_something_after_each_other(loop: ControlLoop) -> None:
+    before = loop.latch.active
+    strengthened, again, cleared, refused = key_meanings(["w", "plus", "plus", "space", "plus"], loop)[1:]
+    assert (strengthened, again) == (
+        Event(0, "factor", "push", 1.25, "plus"),
+        Event(0, "factor", "push", 1.25**2, "plus"),
+    )
+    assert cleared == Event(0, "default", key="space")
+    assert refused == "no behavior is latched whose strength could change"
+    assert loop.latch.active == before
+
+
+def test_many_keys_a_step_are_never_more_than_refused(loop: ControlLoop, small_map: StimulationMap) -> None:
+    drawn = random.Random(5)
+    keys = [*run_keys(small_map), "z"]
+    kinds = set()
+    for _ in range(300):
+        pressed = [drawn.choice(keys) for _ in range(drawn.randrange(8))]
+        events = [one for one in key_meanings(pressed, loop) if isinstance(one, Event)]
+        kinds |= {event.kind for event in loop.advance(events).events}
+    assert kinds == {"behavior", "default", "target", "factor", "reset", "rewind"}
 
 
 def test_a_keystroke_file_is_read(tmp_path: Path, small_map: StimulationMap) -> None:
