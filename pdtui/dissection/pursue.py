@@ -28,6 +28,7 @@ class PursuitSizes:
     Attributes:
         values: outputs at which every unit is tried alone.
         screen_seeds: from so many walks.
+        screen_units: how many units, drawn at random; None tries all.
         elite, children, promoted: kept between generations, made in one, and looked at again.
         quick_seeds, full_seeds: walks of the first look at a child, and of the second.
         most_units: units at most, in the first round and in those that follow.
@@ -40,6 +41,7 @@ class PursuitSizes:
 
     values: tuple[float, ...] = (-6.0, -2.0, 2.0, 6.0)
     screen_seeds: int = 1
+    screen_units: int | None = None
     elite: int = 20
     children: int = 32
     promoted: int = 8
@@ -56,7 +58,7 @@ class PursuitSizes:
 
 
 QUICK_PURSUIT = PursuitSizes(
-    values=(-4.0, 4.0), children=4, promoted=2, elite=4, quick_seeds=1, full_seeds=2, most_units=(3,),
+    values=(-4.0, 4.0), screen_units=32, children=4, promoted=2, elite=4, quick_seeds=1, full_seeds=2, most_units=(3,),
     generations=1, finalists=2, selection_seeds=2, held_out_seeds=4,
 )  # fmt: skip
 
@@ -137,20 +139,24 @@ class Pursuit:
         return self._finish()
 
     def _screen(self, progress: Progress | None) -> tuple[list[Burst], Candidates]:
-        """Every unit alone; the best of them, and a source that draws good ones more often."""
+        """Units alone; the best of them, and a source that draws good ones more often."""
         sizes, units = self._sizes, self._crew.policy.units
         periods: list[int | None] = [None]
         if self._task.period is not None:
             periods = [self._task.period // 2]
+        tried = np.arange(units)
+        if sizes.screen_units is not None and sizes.screen_units < units:
+            tried = np.sort(self._rng.choice(units, sizes.screen_units, replace=False))
         bursts = [
             Burst(Stimulation.of({unit: value}), period)
-            for unit in range(units)
+            for unit in tried.tolist()
             for value in sizes.values
             for period in periods
         ]
         scores = self._score(bursts, sizes.screen_seeds, progress)
-        best = scores.reshape(units, -1).max(axis=1)
-        weights = np.maximum(best - np.median(scores), 0.0)
+        weights = np.zeros(units)
+        best = scores.reshape(len(tried), -1).max(axis=1)
+        weights[tried] = np.maximum(best - np.median(scores), 0.0)
         weights += weights.mean() or 1.0
         order = np.argsort(-scores, kind="stable")
         return [bursts[index] for index in order[: sizes.children]], Candidates(

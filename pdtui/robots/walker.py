@@ -31,14 +31,15 @@ class Walker(MujocoRobot, Walker2dEnv):
     Args:
         alternate: for training: reward is 1 less at each step at which a foot has been off the ground for
             more than 0.4 s. Without that, policies hop on one leg.
+        top_speed: for training: m/s beyond which going faster pays nothing.
     """
 
     name = "walker"
     title = "Walker (MuJoCo)"
 
-    def __init__(self, alternate: bool = False) -> None:
+    def __init__(self, alternate: bool = False, top_speed: float = math.inf) -> None:
         super().__init__(xml_file="walker2d.xml")
-        self._alternate = alternate
+        self._alternate, self._top_speed = alternate, top_speed
         self._in_air = np.zeros(len(_FEET))
         self.links = links_of(self.model)
         self._feet = [self.model.geom(geom).id for geom in _FEET.values()]
@@ -70,6 +71,7 @@ class Walker(MujocoRobot, Walker2dEnv):
         observation, reward, terminated, truncated, info = super().step(action)
         self._check_finite()
         info["cost"] = 0.0
+        reward -= max(0.0, float(info["x_velocity"]) - self._top_speed)
         if self._alternate:
             reward -= self._drags()
         if terminated:

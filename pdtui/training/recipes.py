@@ -23,5 +23,5 @@ class Recipe:
 RECIPES: dict[str, Recipe] = {
     "ant": Recipe(options={"forward": "x"}),
     "bipedal_walker": Recipe(changes={"reward_scale": 0.1, "evaluate_steps": 1600}),
-    "walker": Recipe(options={"alternate": True}, changes={"discount": 0.995}),
+    "walker": Recipe(options={"alternate": True, "top_speed": 3.4}, changes={"discount": 0.995}),
 }

@@ -1,0 +1,107 @@
+"""Tasks: what counts as done, on made-up runs whose verdict is known, and on the shipped policies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pdtui.errors import MapError
+from pdtui.policies.load import load_policy
+from pdtui.policies.units import Stimulation
+from pdtui.robots import make_robot
+from pdtui.robots.types import Attribute, Floats
+from pdtui.tasks import Burst, Trace, Verdict, find_task, judge_seed, tasks_of
+
+WALKER = ("vx", "right foot clearance", "left foot clearance")
+BIPED = ("vx", "height", "pitch")
+
+
+def _trace(names: tuple[str, ...], walked: list[list[float]], values: Floats, *, fell: bool = False) -> Trace:
+    return Trace([Attribute(name, "") for name in names], np.array(walked), values, fell)
+
+
+def _walker(vx: Floats, right: Floats, left: Floats, *, fell: bool = False) -> Trace:
+    return _trace(WALKER, [[4.0, 0.0, 0.0]] * 200, np.stack((vx, right, left), axis=1), fell=fell)
+
+
+def _slow(after: float, *, steps: int = 300, fell: bool = False) -> Verdict:
+    vx = np.concatenate((np.full(90, 4.0), np.full(steps - 90, after)))
+    return find_task("slow down", "walker").judge(_walker(vx, np.zeros(steps), np.zeros(steps), fell=fell))
+
+
+def test_slow_is_under_a_quarter_of_the_speed_and_still_up() -> None:
+    assert _slow(0.9).success
+    assert _slow(-0.9).success
+    assert not _slow(1.1).success
+    assert not _slow(-1.1).success
+    assert not _slow(0.0, steps=250, fell=True).success
+    assert _slow(0.5).score > _slow(1.5).score > _slow(0.0, steps=250, fell=True).score
+
+
+def _hop(right: Floats, left: Floats, vx: float = 2.0) -> Verdict:
+    return find_task("hop", "walker").judge(_walker(np.full(200, vx), right, left))
+
+
+def test_a_hop_keeps_one_foot_up_in_one_stretch() -> None:
+    up, down = np.full(200, 0.1), np.full(200, -0.001)
+    bouncing = np.where(np.arange(200) % 20 < 5, -0.001, 0.1)
+    assert _hop(up, bouncing).success
+    assert _hop(bouncing, up).success
+    assert not _hop(up, bouncing, vx=0.0).success
+    # A runner's feet are each up for most of the time, but in turn.
+    running = np.where(np.arange(200) % 40 < 6, -0.001, 0.1)
+    verdict = _hop(running, np.roll(running, 20))
+    assert not verdict.success
+    assert verdict.figures["share of steps with one foot up"] > 0.8
+    assert not _hop(down, down).success
+
+
+def _biped(task: str, height: Floats, pitch: Floats, vx: Floats, *, fell: bool = False) -> Verdict:
+    trace = _trace(BIPED, [[5.0, 2.0, 0.0]] * 80, np.stack((vx, height, pitch), axis=1), fell=fell)
+    return find_task(task, "bipedal_walker").judge(trace)
+
+
+def test_a_jump_rises_half_a_metre_and_walks_on() -> None:
+    flat, fast = np.zeros(200), np.full(200, 5.0)
+    arc = 2.0 + 0.6 * np.sin(np.linspace(0.0, np.pi, 200))
+    assert _biped("jump", arc, flat, fast).success
+    assert not _biped("jump", 2.0 + (arc - 2.0) / 2, flat, fast).success
+    assert not _biped("jump", arc, flat, fast, fell=True).success
+    assert not _biped("jump", arc, flat, np.linspace(5.0, 0.0, 200)).success
+
+
+def test_a_flip_turns_forward() -> None:
+    fast, height = np.full(200, 5.0), np.full(200, 2.0)
+    over = np.linspace(0.0, 2 * np.pi, 200)
+    landed = _biped("front flip", height, over, fast)
+    assert landed.success
+    assert landed.figures["turned (degrees)"] == pytest.approx(360.0)
+    assert landed.figures["lands"] == 1.0
+    fallen = _biped("front flip", height[:90], over[:190:2][:90] * 0.95, fast[:90], fell=True)
+    assert fallen.figures["lands"] == 0.0
+    assert not _biped("front flip", height, -over, fast).success
+
+
+def test_standing_up_is_walking_at_the_end() -> None:
+    height, pitch = np.full(300, 2.0), np.zeros(300)
+    assert _biped("stand up", height, pitch, np.linspace(0.0, 5.0, 300)).success
+    assert not _biped("stand up", height, pitch, np.zeros(300)).success
+
+
+def test_an_unknown_task_lists_the_robots_own() -> None:
+    with pytest.raises(MapError, match="walker: no task 'fly'; there are slow down, hop"):
+        find_task("fly", "walker")
+    with pytest.raises(MapError, match="ant: no task 'fly'; it has none"):
+        find_task("fly", "ant")
+    assert tasks_of("ant") == ()
+
+
+@pytest.mark.parametrize("robot", ["walker", "bipedal_walker"])
+def test_bursts_of_one_seed_begin_from_the_same_walk(robot: str) -> None:
+    """Judged together or alone, a burst does the same; an empty one is the untouched policy."""
+    world, policy, task = make_robot(robot), load_policy(robot, robot), tasks_of(robot)[0]
+    burst = Burst(Stimulation.of({3: 5.0}), 20)
+    together = judge_seed(world, policy, task, [Burst(), burst, Burst()], 5)
+    assert together[0] == together[2]
+    assert judge_seed(world, policy, task, [burst], 5) == [together[1]]
+    assert together[0] != together[1]
