@@ -203,7 +203,7 @@ def dissect(
     show_default=True,
     help="The search ends, with the best so far, when these are over; every unit is tried all the same.",
 )
-@click.option("--quick", is_flag=True, help="A first look: few units, few outputs of each unit, and hardly a search.")
+@click.option("--quick", is_flag=True, help="A first look: few units, and hardly a search.")
 @click.option(
     "-o",
     "--output",

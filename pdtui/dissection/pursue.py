@@ -58,8 +58,8 @@ class PursuitSizes:
 
 
 QUICK_PURSUIT = PursuitSizes(
-    values=(-4.0, 4.0), screen_units=32, children=4, promoted=2, elite=4, quick_seeds=1, full_seeds=2, most_units=(3,),
-    generations=1, finalists=2, selection_seeds=2, held_out_seeds=4,
+    values=(-4.0, 4.0), screen_units=32, children=4, promoted=2, elite=4, quick_seeds=1, full_seeds=2,
+    most_units=(3,), generations=1, finalists=2, selection_seeds=2, held_out_seeds=4,
 )  # fmt: skip
 
 
