@@ -26,6 +26,8 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         links: what there is to draw.
         starts: states besides the usual one in which `reset` can start, by its option ``start``.
         episode_steps: control steps after which training and scores end an episode.
+        obstacles: upright cylinders in its way, shape (N, 3): x, y and radius, m. They stay where they are
+            until the next `reset` or `restore`.
     """
 
     name: str
@@ -34,6 +36,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     links: tuple[Link, ...]
     starts: tuple[str, ...] = ()
     episode_steps: int = 1000
+    obstacles: Floats = np.empty((0, 3))
 
     @property
     @abstractmethod

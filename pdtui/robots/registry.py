@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 GROUP = "pdtui.robots"
 TRUSTED = "PDTUI_ENVIRONMENT_MODULES"
 ROBOTS: dict[str, str] = {
+    "a1": "pdtui.robots.a1:A1",
     "ant": "pdtui.robots.ant:Ant",
     "bipedal_walker": "pdtui.robots.bipedal_walker:BipedalWalker",
     "walker": "pdtui.robots.walker:Walker",

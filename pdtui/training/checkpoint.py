@@ -89,7 +89,8 @@ def load_checkpoint(
         snapshots = []
         for index, world_rng in enumerate(kept["rng"]):
             prefix = f"worlds.{number}.{index}."
-            extras = tuple(arrays[name] for name in sorted(arrays) if name.startswith(prefix))
+            places = sorted(int(name.removeprefix(prefix)) for name in arrays if name.startswith(prefix))
+            extras = tuple(arrays[f"{prefix}{place}"] for place in places)
             state = arrays[f"states.{number}.{index}"]
             snapshots.append(RobotSnapshot(kept["robot"], state, extras, world_rng))
         group.restore(WorldsState(snapshots, kept["ages"]))

@@ -23,11 +23,13 @@ from pdtui.training.mlp import Params, init_mlp, tanh_mlp
 class PpoConfig:
     """Hyper-parameters; `total_steps` counts control steps over all worlds.
 
-    In the second half, the divergence aimed at falls linearly to `final_divergence` of itself.
+    In the second half, the divergence aimed at falls linearly to `final_divergence` of itself. `processes`
+    puts the worlds into processes of their own, which simulators need that do not let go of Python.
     """
 
     total_steps: int = 2_000_000
     worlds: int = 64
+    processes: bool = False
     chunk: int = 32
     epochs: int = 4
     minibatch: int = 512

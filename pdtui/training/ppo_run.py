@@ -1,4 +1,7 @@
-"""Collecting for PPO: many worlds, stepped by two threads, since MuJoCo lets go of Python while it steps."""
+"""Collecting for PPO: many worlds, stepped by two threads, since MuJoCo lets go of Python while it steps.
+
+Where a simulator does not, each thread waits for a process of worlds.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from numpy.typing import NDArray
 
 from pdtui.training.mlp import Params
 from pdtui.training.ppo import PpoConfig, PpoLearner, PpoState, Rollout, act
+from pdtui.training.remote import RemoteWorlds
 from pdtui.training.run import Run
 from pdtui.training.worlds import Worlds
 
@@ -26,12 +30,16 @@ class PpoRun(Run):
     def __init__(
         self, robot: str, seed: int, folder: Path, config: PpoConfig, command: str, **robot_options: Any
     ) -> None:
-        self.config = config
+        self.config, self._options = config, robot_options
         super().__init__(robot, seed, folder, config, command, **robot_options)
 
     def build(self) -> None:
         share = self.config.worlds // THREADS
-        self.worlds = [Worlds(self.make, share, self.seed * 10 + 1 + n) for n in range(THREADS)]
+        seeds = [self.seed * 10 + 1 + n for n in range(THREADS)]
+        if self.config.processes:
+            self.worlds = [RemoteWorlds(self.robot, self._options, share, seed) for seed in seeds]
+        else:
+            self.worlds = [Worlds(self.make, share, seed) for seed in seeds]
         self.learner = PpoLearner(self.config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self._threads = ThreadPoolExecutor(THREADS)

@@ -100,7 +100,7 @@ class Run(ABC):
     def __init__(
         self, robot: str, seed: int, folder: Path, config: RunConfig, command: str, **robot_options: Any
     ) -> None:
-        self.seed, self.folder, self._config, self.command, self._robot = seed, folder, config, command, robot
+        self.seed, self.folder, self._config, self.command, self.robot = seed, folder, config, command, robot
         self.make: Callable[[], Robot] = lambda: make_robot(robot, **robot_options)
         sample = self.make()
         bounds = sample.action_space
@@ -189,7 +189,7 @@ class Run(ABC):
         fresh = range(REPORT_SEEDS, REPORT_SEEDS + config.evaluate_episodes)
         final = score_actor(self.make, lambda seen: self.to_robot(actor(seen)), fresh, config.evaluate_steps)
         spec = NetworkSpec(
-            robot=self._robot,
+            robot=self.robot,
             observations=self.observations,
             layers=config.layers,
             activation="tanh",

@@ -74,7 +74,9 @@ def _train(folder: Path, config: SacConfig | PpoConfig = SMALL, stop_at: int | N
     return trainer.best_weights
 
 
-@pytest.mark.parametrize("config", [SMALL, SMALL_PPO], ids=["sac", "ppo"])
+@pytest.mark.parametrize(
+    "config", [SMALL, SMALL_PPO, replace(SMALL_PPO, processes=True)], ids=["sac", "ppo", "ppo-processes"]
+)
 def test_a_run_that_was_cut_off_ends_as_one_that_was_not(
     tmp_path: Path, config: SacConfig | PpoConfig
 ) -> None:

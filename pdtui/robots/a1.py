@@ -1,0 +1,253 @@
+"""The Unitree A1 of the paper: a quadruped that feels only its own body, in PyBullet."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.errors import RobotError, SimulationDiverged
+from pdtui.robots.bullet import BulletRobot, add_ground, add_plane, add_trees, data_folder
+from pdtui.robots.geometry import roll_pitch_yaw
+from pdtui.robots.terrain import Ground, rough_ground, scatter_trees
+from pdtui.robots.types import Attribute, Floats
+from pdtui.robots.urdf import links_of_urdf
+
+_LEGS = ("FR", "FL", "RR", "RL")
+_LEG_NAMES = {"FR": "front right", "FL": "front left", "RR": "rear right", "RL": "rear left"}
+_JOINTS = tuple(f"{leg}_{part}" for leg in _LEGS for part in ("hip", "upper", "lower"))
+_STANCE = np.array([0.0, 0.9, -1.8] * 4)
+_REACH = np.array([0.05, 0.5, 0.5] * 4)
+# A right and a left triple of actions, each for a diagonal: FR and RL the right one, FL and RR the left one.
+_DIAGONALS = np.array([0, 1, 2, 3, 4, 5, 3, 4, 5, 0, 1, 2])
+_KP, _KD = 80.0, 0.4
+_DT, _SUBSTEPS, _LATENCY = 0.001, 16, 2
+_START_HEIGHT = 0.28
+_START_NOISE = 0.05
+_LOWEST, _LEAST_UPRIGHT = 0.2, 0.6
+_FRICTION = {"lateralFriction": 1.0, "spinningFriction": 0.01, "rollingFriction": 0.01}
+_NEAR = 0.8
+_APART = 31  # control steps, half a second
+_REMEMBERED = (
+    "_place",
+    "_displacements",
+    "_attitudes",
+    "_targets",
+    "_angles",
+    "_torques",
+    "_contacts",
+    "_untouched",
+)
+_ALIVE, _FALL, _ENERGY = 0.3, 10.0, 0.0005
+
+
+class A1(BulletRobot):
+    """PyBullet's model of the Unitree A1; 16 physics steps of 1 ms in a control step.
+
+    Observation (93), for the last 3 control steps, the newest first: the trunk's displacement in one step
+    in the world (3 × 3), its roll, pitch, yaw and yaw rate (3 × 4), the joints' target angles (3 × 12) and
+    the joints' angles (3 × 12); angles and rates are 2 ms old. Nothing in it tells of the ground or of trees.
+
+    Action (6), each in [−1, 1]: hip, upper and lower joint of one pair of diagonal legs (front right and rear
+    left), then of the other; 0 is standing. A proportional-derivative controller without torque limit moves
+    the joints to these targets.
+
+    Reward: vx in m/s + 0.3 − 0.0005 × the motors' power in W, and −10 for a fall. An episode ends where the
+    trunk is less than 0.2 m above the ground or leans by more than 53°. A cost of 1 counts every tree that
+    the robot runs into; one that it touches again within half a second does not count again.
+
+    Ground, trees and the small differences of the joints at the start are functions of the seed: the same
+    seed gives the same rough ground with and without trees.
+
+    Args:
+        terrain: where it starts unless `reset` says otherwise: on a ``plane``, on ``rough`` ground, or in a
+            ``forest`` on rough ground.
+        roughness: the most by which rough ground rises, m.
+        density: trees of the forest, a square metre.
+    """
+
+    name = "a1"
+    title = "Unitree A1 (PyBullet)"
+    starts = ("plane", "rough", "forest")
+    episode_steps = 400
+
+    def __init__(self, terrain: str = "plane", roughness: float = 0.05, density: float = 0.15) -> None:
+        super().__init__()
+        if terrain not in self.starts:
+            raise RobotError(f"{self.name}: no terrain '{terrain}'; there are {', '.join(self.starts)}")
+        self._terrain, self._roughness, self._density = terrain, roughness, density
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93,), np.float64)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (6,), np.float32)
+        self._urdf = data_folder() / "a1" / "a1.urdf"
+        self.links = links_of_urdf(self._urdf, ("trunk", *_JOINTS))
+        self.renew(0, terrain)
+        limits = [self.bullet.getJointInfo(self.robot_id, joint)[10] for joint in self._joints]
+        self.attributes = (
+            Attribute("vx", "m/s"),
+            Attribute("vy", "m/s"),
+            Attribute("speed", "m/s"),
+            Attribute("yaw", "rad", wraps=True),
+            Attribute("yaw rate", "rad/s"),
+            Attribute("roll", "rad", wraps=True),
+            Attribute("pitch", "rad"),
+            Attribute("height", "m"),
+            Attribute("distance", "m"),
+            *(
+                Attribute(f"{_LEG_NAMES[joint[:2]]} {joint[3:]} torque", "N m", scale=1.0 / limit)
+                for joint, limit in zip(_JOINTS, limits, strict=True)
+            ),
+            *(Attribute(f"{leg} contact", "") for leg in _LEG_NAMES.values()),
+        )
+
+    @property
+    def control_dt(self) -> float:
+        return _DT * _SUBSTEPS
+
+    def build_world(self, seed: int, start: str) -> int:
+        bullet, rng = self.bullet, np.random.default_rng(seed)
+        bullet.setGravity(0, 0, -10)
+        bullet.setTimeStep(_DT)
+        bullet.setPhysicsEngineParameter(numSolverIterations=18, enableConeFriction=0)
+        angles = _STANCE + rng.uniform(-_START_NOISE, _START_NOISE, 12)
+        self.ground: Ground | None = None
+        self.obstacles = np.empty((0, 3))
+        if start == "plane":
+            add_plane(bullet, _FRICTION)
+        else:
+            self.ground = rough_ground(rng, self._roughness)
+            add_ground(bullet, self.ground, _FRICTION)
+        if start == "forest":
+            self.obstacles = scatter_trees(rng, self._density)
+        self._trees = add_trees(bullet, self.obstacles)
+        robot: int = bullet.loadURDF(
+            str(self._urdf), [0, 0, _START_HEIGHT], flags=bullet.URDF_IGNORE_VISUAL_SHAPES
+        )
+        names = {bullet.getJointInfo(robot, j)[12].decode(): j for j in range(bullet.getNumJoints(robot))}
+        self._joints = [names[joint] for joint in _JOINTS]
+        self._shins = [{names[f"{leg}_lower"], names[f"{leg}_toe"]} for leg in _LEGS]
+        self._trunk = -np.array(bullet.getDynamicsInfo(robot, -1)[3])
+        for link in range(-1, bullet.getNumJoints(robot)):
+            bullet.changeDynamics(robot, link, linearDamping=0, angularDamping=0)
+            if link >= 0:  # joints brake by themselves unless told not to
+                bullet.setJointMotorControl2(robot, link, bullet.VELOCITY_CONTROL, targetVelocity=0, force=0)
+        for joint, angle in zip(self._joints, angles.tolist(), strict=True):
+            bullet.resetJointState(robot, joint, angle)
+        return robot
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats, dict[str, Any]]:
+        super().reset(seed=seed)
+        start = self.check_start(str((options or {}).get("start", ""))) or self._terrain
+        self.renew(int(self.np_random.integers(2**31)), start)
+        angles = np.array([state[0] for state in self._joint_states()])
+        self._place = np.array(self._base()[0])
+        self._displacements = np.zeros((3, 3))
+        self._attitudes = np.tile(self._attitude(), (3, 1))
+        self._targets, self._angles = np.tile(_STANCE, (3, 1)), np.tile(angles, (3, 1))
+        self._torques, self._contacts = np.zeros(12), np.zeros(4)
+        self._untouched = np.full(len(self._trees), float(_APART))
+        return self.observe(), {}
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+        bullet, robot = self.bullet, self.robot_id
+        target = _STANCE + _REACH * np.clip(np.asarray(action, np.float64), -1.0, 1.0)[_DIAGONALS]
+        goals, near = target.tolist(), self._near_trees()
+        touched, energy = np.zeros(len(self._trees), bool), 0.0
+        for substep in range(_SUBSTEPS):
+            states = self._joint_states()
+            if substep == _SUBSTEPS - _LATENCY:
+                felt_angles, felt_attitude = [state[0] for state in states], self._attitude()
+            torques = [_KP * (goal - now[0]) - _KD * now[1] for goal, now in zip(goals, states, strict=True)]
+            energy += sum(abs(torque * now[1]) for torque, now in zip(torques, states, strict=True))
+            bullet.setJointMotorControlArray(robot, self._joints, bullet.TORQUE_CONTROL, forces=torques)
+            bullet.stepSimulation()
+            for tree in near:
+                if not touched[tree] and bullet.getContactPoints(robot, self._trees[tree]):
+                    touched[tree] = True
+        place = np.array(self._base()[0])
+        if not np.isfinite(place).all():
+            raise SimulationDiverged(f"{self.name}: the simulation diverged: the trunk's place is not finite")
+        moved, self._place = place - self._place, place
+        self._displacements = np.vstack([moved, self._displacements[:2]])
+        self._attitudes = np.vstack([felt_attitude, self._attitudes[:2]])
+        self._targets = np.vstack([target, self._targets[:2]])
+        self._angles = np.vstack([felt_angles, self._angles[:2]])
+        self._torques, self._contacts = np.array(torques), self._feel_ground()
+        cost = float((touched & (self._untouched >= _APART)).sum())
+        self._untouched = np.where(touched, 0.0, self._untouched + 1.0)
+        reason = self._fallen()
+        reward = float(moved[0]) / self.control_dt + _ALIVE - _ENERGY * energy / _SUBSTEPS
+        info: dict[str, Any] = {"cost": cost}
+        if reason:
+            reward, info["reason"] = reward - _FALL, reason
+        return self.observe(), reward, bool(reason), False, info
+
+    def observe(self) -> Floats:
+        parts = (self._displacements, self._attitudes, self._targets, self._angles)
+        return np.concatenate([part.ravel() for part in parts])
+
+    def read_attributes(self) -> Floats:
+        (x, y, z), (qx, qy, qz, qw) = self._base()
+        vx, vy, _ = self.bullet.getBaseVelocity(self.robot_id)[0]
+        roll, pitch, yaw = roll_pitch_yaw(qw, qx, qy, qz)
+        rate = self._attitude()[3]
+        height = z - self._ground_at(x, y)
+        motion = [vx, vy, math.hypot(vx, vy), yaw, rate, roll, pitch, height, x]
+        return np.array([*motion, *self._torques, *self._contacts])
+
+    def read_poses(self) -> Floats:
+        place, turn = self.bullet.multiplyTransforms(*self._base(), self._trunk.tolist(), [0, 0, 0, 1])
+        links = self.bullet.getLinkStates(self.robot_id, self._joints, computeForwardKinematics=True)
+        poses = np.array([[*place, *turn], *([*link[4], *link[5]] for link in links)])
+        return poses[:, [0, 1, 2, 6, 3, 4, 5]]
+
+    def memory(self) -> tuple[Floats, ...]:
+        return tuple(getattr(self, name) for name in _REMEMBERED)
+
+    def recall(self, memory: tuple[Floats, ...]) -> None:
+        for name, array in zip(_REMEMBERED, memory, strict=True):
+            setattr(self, name, array)
+
+    def simulator_numbers(self) -> tuple[Any, ...]:
+        joints = [state[:2] for state in self._joint_states()]
+        return (self._base(), self.bullet.getBaseVelocity(self.robot_id), joints)
+
+    def _base(self) -> Any:
+        return self.bullet.getBasePositionAndOrientation(self.robot_id)
+
+    def _joint_states(self) -> Any:
+        return self.bullet.getJointStates(self.robot_id, self._joints)
+
+    def _attitude(self) -> list[float]:
+        """Roll, pitch, yaw, and the rate of turning about the trunk's own vertical axis."""
+        x, y, z, w = self._base()[1]
+        wx, wy, wz = self.bullet.getBaseVelocity(self.robot_id)[1]
+        rate = 2 * (x * z + w * y) * wx + 2 * (y * z - w * x) * wy + (1 - 2 * (x * x + y * y)) * wz
+        return [*roll_pitch_yaw(w, x, y, z), rate]
+
+    def _ground_at(self, x: float, y: float) -> float:
+        return 0.0 if self.ground is None else self.ground.height(x, y)
+
+    def _near_trees(self) -> list[int]:
+        """Trees that the robot may touch in this control step."""
+        if not self._trees:
+            return []
+        away = np.hypot(*(self.obstacles[:, :2] - self._place[:2]).T)
+        return [int(index) for index in np.flatnonzero(away - self.obstacles[:, 2] < _NEAR)]
+
+    def _feel_ground(self) -> Floats:
+        links = {point[3] for point in self.bullet.getContactPoints(self.robot_id) if point[9] > 0.0}
+        return np.array([float(bool(links & shin)) for shin in self._shins])
+
+    def _fallen(self) -> str:
+        (x, y, z), (qx, qy, _, _) = self._base()
+        height, upright = z - self._ground_at(x, y), 1.0 - 2.0 * (qx * qx + qy * qy)
+        if upright < _LEAST_UPRIGHT:
+            return f"fell: leans by {math.degrees(math.acos(max(-1.0, upright))):.0f}°"
+        if height < _LOWEST:
+            return f"fell: trunk {height:.2f} m above the ground, under {_LOWEST} m"
+        return ""
