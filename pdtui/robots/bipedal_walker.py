@@ -19,8 +19,9 @@ FINISH = (stock.TERRAIN_LENGTH - stock.TERRAIN_GRASS) * stock.TERRAIN_STEP
 _GROUND = 2000.0
 _JOINTS = ("hip 1", "knee 1", "hip 2", "knee 2")
 _DEPTH = 0.2  # of a leg beside the middle, m: the world is flat, its picture need not be
-# Leg 1 kneels with its shin behind it, leg 2 is stretched out in front: as low as the joints' limits go.
-_SPLIT_HULL, _SPLIT_HIPS, _SPLIT_KNEES = 0.1, (-0.75, 1.05), (-0.8, -0.15)
+# Both hips and knees at their limits, leg 1 in front on its foot, leg 2 behind on its knee: what a flip may
+# end in, and what the shipped policy does not get out of by itself.
+_SPLIT_HULL, _SPLIT_HIPS, _SPLIT_KNEES = 0.48, (1.1, -0.8), (-1.6, -1.6)
 
 
 class FlatBipedalWalker(stock.BipedalWalker):
@@ -79,11 +80,11 @@ class FlatBipedalWalker(stock.BipedalWalker):
 
     def _split(self) -> Any:
         """Spread the legs on the ground, a little differently for every seed."""
-        angle = _SPLIT_HULL + self.np_random.uniform(-0.1, 0.1)
+        angle = _SPLIT_HULL + self.np_random.uniform(-0.03, 0.03)
         poses, lowest = [], 0.0
         for hip, knee in zip(_SPLIT_HIPS, _SPLIT_KNEES, strict=True):
-            thigh = angle + hip + self.np_random.uniform(-0.05, 0.05)
-            shin = thigh + knee + self.np_random.uniform(-0.05, 0.05)
+            thigh = angle + hip + self.np_random.uniform(-0.02, 0.02)
+            shin = thigh + knee + self.np_random.uniform(-0.02, 0.02)
             down = np.array([math.sin(thigh), -math.cos(thigh)]) * stock.LEG_H
             foot = down + np.array([math.sin(shin), -math.cos(shin)]) * stock.LEG_H
             poses += [(down / 2, thigh), ((down + foot) / 2, shin)]

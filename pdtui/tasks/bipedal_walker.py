@@ -30,7 +30,7 @@ def jumps(trace: Trace) -> Verdict:
     rise = float(trace["height"].max()) - height
     walks, speed = _walks(trace, usual, _JUMP_STEPS)
     score = 0.5 * min(1.2, rise / _RISE) + (0.6 if walks else 0.25 * len(trace) / _JUMP_STEPS)
-    figures = {"rise (m)": rise, "lands": float(walks), "vx at the end (m/s)": speed}
+    figures = {"rise (m)": rise, "walks on": float(walks), "vx at the end (m/s)": speed}
     return Verdict(rise >= _RISE and walks, score, figures)
 
 
@@ -39,10 +39,11 @@ def flips(trace: Trace) -> Verdict:
     pitch = trace["pitch"]
     turned = math.degrees(float(np.max(pitch) - pitch[0]))
     usual = float(trace.before("vx")[-50:].mean())
-    lands, _ = _walks(trace, usual, _FLIP_STEPS)
-    lands = lands and turned >= _FLIP
-    score = min(1.2, turned / _FLIP) + (1.0 if lands else 0.2 * len(trace) / _FLIP_STEPS)
-    return Verdict(turned >= _FLIP, score, {"turned (degrees)": turned, "lands": float(lands)})
+    walks, _ = _walks(trace, usual, _FLIP_STEPS)
+    lands = turned >= _FLIP and not trace.fell and len(trace) >= _FLIP_STEPS
+    score = min(1.2, turned / _FLIP) + (1.0 if lands and walks else 0.2 * len(trace) / _FLIP_STEPS)
+    figures = {"turned (degrees)": turned, "lands": float(lands), "walks on": float(lands and walks)}
+    return Verdict(turned >= _FLIP, score, figures)
 
 
 def stands_up(trace: Trace) -> Verdict:

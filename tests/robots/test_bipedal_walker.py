@@ -97,10 +97,11 @@ def test_a_split_has_both_legs_on_the_ground_and_the_hull_above_it(walker: Biped
     standing = _value(walker, "height")
     walker.reset(seed=0, options={"start": "split"})
     assert _value(walker, "height") < 0.75 * standing
+    poses, hull = walker.read_poses(), walker.read_poses()[0]
+    # One leg in front of the hull on its foot, one behind on its knee.
+    assert poses[4, 0] < hull[0] - 0.5 < hull[0] + 0.5 < poses[2, 0]
     ended = [walker.step(np.zeros(4, np.float32))[2] for _ in range(3)]
     assert not any(ended)
-    poses = walker.read_poses()
-    assert poses[2, 0] < poses[0, 0] - 0.5 < poses[0, 0] + 0.5 < poses[4, 0]
 
 
 def test_an_unknown_start_is_refused(walker: BipedalWalker) -> None:
