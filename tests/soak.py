@@ -35,6 +35,9 @@ PATIENCE = 120.0
 _UNSEEN = 20
 """Keys that may be pressed between two frames."""
 
+_STILL = 0.5
+"""Without a frame for so long, nothing changes on the screen; s."""
+
 _QUERY, _ANSWER, _FRAME = b"\x1b[?2026$p", b"\x1b[?2026;2$y", b"\x1b[?2026h"
 """Asked whether frames may be bracketed; asked so, the program brackets them, and they can be counted."""
 
@@ -148,7 +151,8 @@ def soak(
             if not terminal.read_for(max(0.0005, due - time.monotonic())):
                 raise AssertionError(f"the screen ended after {number} keys")
             if number % _UNSEEN == 0:
-                drawn_before, patient = terminal.frames, time.monotonic() + PATIENCE
+                # A paused drive on a screen that is too small draws nothing.
+                drawn_before, patient = terminal.frames, time.monotonic() + _STILL
                 while terminal.frames == drawn_before and time.monotonic() < patient:
                     terminal.read_for(0.01)
             if number % max(1, presses // WINDOWS) == 0:

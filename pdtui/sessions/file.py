@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
+import numpy as np
 import pyarrow as pa
 
 from pdtui.errors import SessionError
@@ -82,6 +83,8 @@ class SessionFile:
             if entity == DRIVE:
                 names = [name for name in batch.schema.names if name not in skip]
                 batch = batch.select([name for name in names if not only or name in (STEP, *only)])
+                # A copy, or what is kept would keep the whole message, activations and all, in memory.
+                batch = batch.take(pa.array(np.arange(batch.num_rows)))
             self._kept += batch.nbytes
             if self._kept > MAX_KEPT:
                 raise SessionError(f"{path}: expected at most {MAX_KEPT >> 20} MiB of rows, there are more")

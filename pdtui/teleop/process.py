@@ -16,7 +16,8 @@ from pdtui.teleop.snapshot import Briefing, Snapshot
 if TYPE_CHECKING:
     from pdtui.teleop.order import DriveOrder
 
-_PATIENCE = 15.0
+_PATIENCE = 60.0
+"""For the end of the recording, on a busy machine: a process that is killed leaves it without one; s."""
 
 
 def _simulate(connection: Connection, order: DriveOrder) -> None:

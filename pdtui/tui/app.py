@@ -67,6 +67,7 @@ class DriveApp(App[str]):
         self.link, self.map, self.fps, self.watching = link, stimulation_map, fps, watching
         self._drive_keys = drive_keys(stimulation_map)
         self._notice_until = 0.0
+        self._help: HelpScreen | None = None
         self.register_theme(THEME)
         self.theme = THEME.name
 
@@ -121,6 +122,9 @@ class DriveApp(App[str]):
         super().set_keymap(dict(keymap))
         if self.is_running:
             self._show_keys()
+            if self._help is not None and self._help is not self.screen:
+                self.uninstall_screen("help")
+                self._help = None
 
     @property
     def keys_now(self) -> dict[str, tuple[str, str]]:
@@ -189,7 +193,13 @@ class DriveApp(App[str]):
 
     def action_help(self) -> None:
         """List all keys."""
-        self.push_screen(HelpScreen(self.map, list(self.keys_now.values())))
+        if isinstance(self.screen, HelpScreen):
+            return
+        # One for all times: Textual keeps what up to 1024 widgets that are gone had drawn.
+        if self._help is None:
+            self._help = HelpScreen(self.map, list(self.keys_now.values()))
+            self.install_screen(self._help, "help")
+        self.push_screen("help")
 
     def action_leave(self) -> None:
         """Quit; whoever made the link then ends the drive."""

@@ -291,3 +291,21 @@ async def test_a_live_loop_is_drawn(policy: Policy, small_map: StimulationMap, m
         units = shown(app.query_one("#units"))
         assert all(address in units for address in ("0:3", "1:7", "1:2"))
         assert "step 18" in shown(app.query_one("#status"))
+
+
+async def test_the_help_is_made_once(make_app: MakeApp) -> None:
+    """Textual keeps what widgets that are gone had drawn: a help made anew would cost 0.7 MB a look."""
+    app, _ = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("question_mark")
+        first = app.screen
+        await pilot.press("question_mark", "question_mark")
+        assert app.screen is first
+        assert len(app.screen_stack) == 2
+        app.action_help()
+        await pilot.pause()
+        assert len(app.screen_stack) == 2
+        await pilot.press("question_mark")
+        app.set_keymap({"pause": "f5"})
+        await pilot.press("question_mark")
+        assert app.screen is not first
