@@ -1,4 +1,4 @@
-"""What is shipped: the Ant's policy, its map and its sample sessions."""
+"""What is shipped: policies, their maps and sample sessions."""
 
 from __future__ import annotations
 
@@ -13,8 +13,12 @@ from pdtui.policies.files import file_hash, find_weights, load_network
 from pdtui.sessions.reader import read_session
 from pdtui.stimulation.library import find_map, shipped_folder
 from pdtui.stimulation.mapfile import load_map
+from pdtui.teleop.drive import build_loop
+from pdtui.teleop.order import DriveOrder
 from pdtui.teleop.replay import replay_session
 
+LEAST = {"walker": {"slow down": 6}, "bipedal_walker": {"jump": 12, "front flip": 10, "stand up": 10}}
+"""Of 20 seeds; the README has what was measured."""
 SAMPLES = sorted((shipped_folder("sessions") / "samples").glob("*.rrd"))
 
 
@@ -42,14 +46,41 @@ def test_a_sample_driven_on_the_screen_replays_bit_for_bit(path: Path) -> None:
     assert result.steps == session.steps
 
 
-def test_the_weights_say_how_they_were_trained_and_the_map_fits_them() -> None:
-    spec = load_network(find_weights("ant")).spec
+@pytest.mark.parametrize(
+    ("robot", "behaviors"),
+    [
+        ("ant", {"stop", "up", "down", "spin left", "spin right"}),
+        ("walker", {"slow down"}),
+        ("bipedal_walker", {"jump", "front flip", "stand up"}),
+    ],
+)
+def test_the_weights_say_how_they_were_trained_and_the_map_fits_them(robot: str, behaviors: set[str]) -> None:
+    spec = load_network(find_weights(robot)).spec
     assert (spec.layers, spec.activation, spec.head) == ((256, 256), "tanh", "squashed_gaussian")
-    assert spec.command.startswith("pdtui train ant --algorithm ppo --seed ")
+    assert spec.command.startswith(f"pdtui train {robot} --algorithm ppo --seed ")
     assert spec.score["episodes"] >= 32
-    shipped = load_map(find_map("ant"))
-    assert {"stop", "up", "down", "spin left", "spin right"} <= shipped.behaviors.keys()
-    shipped.check("ant", spec.layers, file_hash(find_weights("ant")))
+    shipped = load_map(find_map(robot))
+    assert behaviors <= shipped.behaviors.keys()
+    shipped.check(robot, spec.layers, file_hash(find_weights(robot)))
+    build_loop(DriveOrder(robot, shipped, 0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("robot", "least"), [("walker", 4000.0), ("bipedal_walker", 280.0)])
+def test_the_other_policies_earn_what_is_wanted(robot: str, least: float) -> None:
+    figures = _figures("evaluate", robot, "--policy-only", "--seeds", "100-119")
+    assert int(str(figures["finished"])) >= 19
+    assert float(str(figures["mean_return"])) >= least
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["walker", "bipedal_walker"])
+def test_every_task_is_done_as_often_as_the_readme_says(robot: str) -> None:
+    figures = _figures("evaluate", robot, "--seeds", "100-119")
+    rows = {row["task"]: row for row in figures["tasks"]}  # type: ignore[attr-defined]
+    for task, least in LEAST[robot].items():
+        assert rows[task]["done"] >= least, rows[task]
+        assert rows[task]["done"] > rows[task]["by_itself"]
 
 
 @pytest.mark.slow
