@@ -26,6 +26,8 @@ TRUSTED = "PDTUI_ENVIRONMENT_MODULES"
 ROBOTS: dict[str, str] = {
     "a1": "pdtui.robots.a1:A1",
     "ant": "pdtui.robots.ant:Ant",
+    "anymal": "pdtui.robots.anymal:Anymal",
+    "anymal-forward": "pdtui.robots.anymal:AnymalForward",
     "bipedal_walker": "pdtui.robots.bipedal_walker:BipedalWalker",
     "walker": "pdtui.robots.walker:Walker",
 }

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pdtui.training.mlp import Params
 from pdtui.training.ppo import PpoConfig, PpoLearner, PpoState, Rollout, act
+from pdtui.training.recipes import RECIPES
 from pdtui.training.remote import RemoteWorlds
 from pdtui.training.run import Run
 from pdtui.training.worlds import Worlds
@@ -34,9 +35,11 @@ class PpoRun(Run):
         super().__init__(robot, seed, folder, config, command, **robot_options)
 
     def build(self) -> None:
-        share = self.config.worlds // THREADS
+        share, build = self.config.worlds // THREADS, RECIPES[self.robot].worlds
         seeds = [self.seed * 10 + 1 + n for n in range(THREADS)]
-        if self.config.processes:
+        if build is not None:
+            self.worlds = [build(self.config.worlds, seeds[0], self.make().episode_steps)]
+        elif self.config.processes:
             self.worlds = [RemoteWorlds(self.robot, self._options, share, seed) for seed in seeds]
         else:
             self.worlds = [Worlds(self.make, share, seed) for seed in seeds]
@@ -57,7 +60,7 @@ class PpoRun(Run):
     def _collect(self, state: PpoState) -> Rollout:
         observation = np.concatenate([group.observations for group in self.worlds])
         action = act(state, observation, self.rng)
-        shares = np.split(self.to_robot(np.tanh(action)), THREADS)
+        shares = np.split(self.to_robot(np.tanh(action)), len(self.worlds))
         rows = list(self._threads.map(_step, self.worlds, shares))
 
         def joined(column: str) -> NDArray[np.float32]:

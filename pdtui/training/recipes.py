@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,10 +14,33 @@ class Recipe:
     Attributes:
         options: for the robot's class.
         changes: of the algorithm's configuration; those that it does not have are left out.
+        worlds: builds all worlds of a run at once, from their number, the seed and an episode's steps; None
+            makes one robot each.
     """
 
     options: dict[str, Any] = field(default_factory=dict)
     changes: dict[str, Any] = field(default_factory=dict)
+    worlds: Callable[[int, int, int], Any] | None = None
+
+
+def _legged(name: str, commands: int) -> Callable[[int, int, int], Any]:
+    def build(count: int, seed: int, episode: int) -> Any:
+        from pdtui.training.legged_worlds import LeggedWorlds
+
+        return LeggedWorlds(name, commands, count, seed, episode)
+
+    return build
+
+
+_LEGGED = {
+    "worlds": 256,
+    "minibatch": 2048,
+    "layers": (128, 64, 32),
+    "reward_scale": 2.0,
+    "entropy": 0.004,
+    "evaluate_every": 1_000_000,
+    "evaluate_steps": 500,
+}
 
 
 # Falling costs the bipedal walker 100, as much as a third of the way earns.
@@ -37,6 +61,8 @@ RECIPES: dict[str, Recipe] = {
         },
     ),
     "ant": Recipe(options={"forward": "x"}),
+    "anymal": Recipe({"random_commands": True}, _LEGGED, _legged("anymal", 3)),
+    "anymal-forward": Recipe({"random_commands": True}, _LEGGED, _legged("anymal-forward", 1)),
     "bipedal_walker": Recipe(changes={"reward_scale": 0.1, "evaluate_steps": 1600}),
     "walker": Recipe(options={"alternate": True, "top_speed": 3.4}, changes={"discount": 0.995}),
 }
