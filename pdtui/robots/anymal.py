@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import mujoco
@@ -12,7 +13,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from pdtui.errors import RobotError
 from pdtui.robots.geometry import roll_pitch_yaw, rotate
 from pdtui.robots.legged import COMMAND_SCALES, Motion, Rewards, fallen, observations, rewards
 from pdtui.robots.mujoco import MujocoRobot, links_of
@@ -45,7 +45,7 @@ class Anymal(MujocoRobot):
     the command (see `legged.rewards`). An episode ends where the trunk is on the ground or on its side.
 
     Attributes:
-        commands: what the policy can be asked for, of `COMMANDS`; it sees no others.
+        commands: what the policy can be asked for, of `COMMANDS`, m/s and rad/s; it sees no others.
 
     Args:
         random_commands: for training's scores: every reset draws commands, instead of 1 m/s forward.
@@ -53,7 +53,7 @@ class Anymal(MujocoRobot):
 
     name = "anymal"
     title = "ANYmal-C (MuJoCo)"
-    commands: tuple[str, ...] = COMMANDS
+    commands: Mapping[str, float] = MappingProxyType({"forward": 1.0, "lateral": 0.0, "yaw rate": 0.0})
 
     def __init__(self, random_commands: bool = False) -> None:
         self._random_commands = random_commands
@@ -86,19 +86,12 @@ class Anymal(MujocoRobot):
     def control_dt(self) -> float:
         return SUBSTEPS * float(self.model.opt.timestep)
 
-    def set_command(self, name: str, value: float) -> None:
-        """Ask the policy for something from the next step on.
-
-        Args:
-            name: one of `commands`.
-            value: m/s, or rad/s for the yaw rate.
-
-        Raises:
-            RobotError: the robot has no such command.
-        """
-        if name not in self.commands:
-            raise RobotError(f"{self.name}: no command '{name}'; there are {', '.join(self.commands)}")
-        self._command[COMMANDS.index(name)] = value
+    def set_commands(self, values: Mapping[str, float]) -> bool:
+        asked = np.array([values.get(name, 0.0) for name in COMMANDS])
+        if (asked == self._command).all():
+            return False
+        self._command = asked
+        return True
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -148,10 +141,9 @@ class Anymal(MujocoRobot):
         forward, sideways = math.cos(yaw) * vx + math.sin(yaw) * vy, math.cos(yaw) * vy - math.sin(yaw) * vx
         yaw_rate = float(rotate(self.data.qpos[3:7], np.array([a, b, c]))[2])
         commands = [self._command[COMMANDS.index(name)] for name in self.commands]
-        return np.array(
-            [vx, vy, math.hypot(vx, vy), forward, sideways, yaw, yaw_rate, roll, pitch]
-            + [float(self.data.qpos[2]), *commands, *self.data.actuator_force.tolist()]
-        )
+        height, torques = float(self.data.qpos[2]), self.data.actuator_force.tolist()
+        moves = (vx, vy, math.hypot(vx, vy), forward, sideways, yaw, yaw_rate, roll, pitch, height)
+        return np.array([*moves, *commands, *torques])
 
     def _command_units(self) -> list[tuple[str, str]]:
         return [(name, "rad/s" if name == "yaw rate" else "m/s") for name in self.commands]
@@ -189,4 +181,4 @@ class AnymalForward(Anymal):
 
     name = "anymal-forward"
     title = "ANYmal-C, forward only (MuJoCo)"
-    commands = ("forward",)
+    commands = MappingProxyType({"forward": 1.0})

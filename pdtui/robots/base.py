@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType
 
 import gymnasium
 import numpy as np
@@ -25,6 +27,8 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         attributes: what `read_attributes` measures.
         links: what there is to draw.
         starts: states besides the usual one in which `reset` can start, by its option ``start``.
+        commands: what a policy can be asked for and what it is asked for by default, by name; most robots
+            have none.
         episode_steps: control steps after which training and scores end an episode.
         obstacles: upright cylinders in its way, shape (N, 3): x, y and radius, m. They stay where they are
             until the next `reset` or `restore`.
@@ -35,6 +39,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     attributes: tuple[Attribute, ...]
     links: tuple[Link, ...]
     starts: tuple[str, ...] = ()
+    commands: Mapping[str, float] = MappingProxyType({})
     episode_steps: int = 1000
     obstacles: Floats = np.empty((0, 3))
 
@@ -70,6 +75,15 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     @abstractmethod
     def digest(self) -> int:
         """A 63-bit digest of the simulator's state: equal states have equal digests."""
+
+    def set_commands(self, values: Mapping[str, float]) -> bool:
+        """Ask the policy for something, from what it observes next on; returns whether that is new.
+
+        Args:
+            values: one for each of `commands`.
+        """
+        del values
+        return False
 
     def check_start(self, start: str) -> str:
         """Return the name of a start state, empty for the usual one.

@@ -57,7 +57,8 @@ class Motion:
 
 
 def _inverse(quaternion: Floats) -> Floats:
-    return quaternion * np.array([1.0, -1.0, -1.0, -1.0])
+    inverse: Floats = quaternion * np.array([1.0, -1.0, -1.0, -1.0])
+    return inverse
 
 
 def observations(motion: Motion, default: Floats, commands: int) -> Floats:
@@ -66,7 +67,7 @@ def observations(motion: Motion, default: Floats, commands: int) -> Floats:
     Height, velocity × 2, angular velocity × 0.25, gravity's direction, the first `commands` commands, joint
     positions less the default, joint velocities × 0.05, the last action.
     """
-    seen = np.concatenate(
+    seen: Floats = np.concatenate(
         [
             motion.qpos[:, 2:3],
             2.0 * motion.linear,
@@ -79,12 +80,14 @@ def observations(motion: Motion, default: Floats, commands: int) -> Floats:
         ],
         axis=1,
     )
-    return np.clip(seen, -_CLIP, _CLIP)
+    clipped: Floats = np.clip(seen, -_CLIP, _CLIP)
+    return clipped
 
 
 def fallen(motion: Motion) -> NDArray[np.bool_]:
     """Whether the trunk is on the ground or lies on its side, shape (n,)."""
-    return (motion.qpos[:, 2] < _LOWEST) | (motion.up[:, 2] < _UPRIGHT)
+    down: NDArray[np.bool_] = (motion.qpos[:, 2] < _LOWEST) | (motion.up[:, 2] < _UPRIGHT)
+    return down
 
 
 _LOWEST, _UPRIGHT = 0.28, 0.5
@@ -94,7 +97,7 @@ _LOWEST, _UPRIGHT = 0.28, 0.5
 class Rewards:
     """Weights of what is paid each second, as in legged_gym where it has them.
 
-    The last ones work against crouching and shuffling: a height to keep, feet that swing high and do not slip.
+    The last ones work against crouching and shuffling: a height to keep, feet that swing and do not slip.
     """
 
     forward: float = 1.5

@@ -86,6 +86,8 @@ class Latch:
             if behavior.pid is not None
         }
         self._latched: list[_Latched] = []
+        self.commands: dict[str, float] = {}
+        """What the behaviors ask the policy for in this control step; set by `stimulate`."""
 
     @property
     def active(self) -> tuple[ActiveBehavior, ...]:
@@ -156,11 +158,12 @@ class Latch:
     def stimulate(self, attributes: Floats) -> Stimulation:
         """What this control step overwrites; ends the behaviors whose period is over.
 
-        Where two latched behaviors share a unit, the one latched last decides.
+        Where two latched behaviors share a unit or a command, the one latched last decides.
 
         Args:
             attributes: the robot's present values, shape (J,).
         """
+        self.commands = {}
         if not self._latched:
             return NO_STIMULATION
         values: dict[int, float] = {}
@@ -168,6 +171,8 @@ class Latch:
             factor = latched.factor
             if latched.controller is not None:
                 factor *= latched.controller.update(float(attributes[latched.column]))
+            asked = latched.behavior.commands.items()
+            self.commands |= {name: weight * factor for name, weight in asked}
             values |= latched.base
             for unit, weight in latched.weights.items():
                 values[unit] = latched.base.get(unit, 0.0) + weight * factor

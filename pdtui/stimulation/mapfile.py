@@ -142,12 +142,13 @@ def _measured(parent: FieldTable) -> Measured | None:
 
 def _behavior(table: FieldTable, primitives: dict[str, Primitive]) -> Behavior:
     name = table.text("name")
-    magnitudes = table.numbers("magnitudes")
+    magnitudes = table.numbers("magnitudes", {})
     for key in magnitudes:
         if key not in primitives and not ADDRESS.fullmatch(key):
             known = ", ".join(primitives) or "none"
             raise table.error("magnitudes", f"'{key}': neither layer:index nor a primitive ({known})")
-    if not magnitudes:
+    commands = table.numbers("commands", {})
+    if not magnitudes and not commands:
         raise table.error("magnitudes", "expected at least one unit")
     period = table.take("period", NUMBER, None)
     if period is not None and period <= 0:
@@ -189,6 +190,7 @@ def _behavior(table: FieldTable, primitives: dict[str, Primitive]) -> Behavior:
         measured=_measured(table),
         pid=pid,
         task=table.text("task", ""),
+        commands=commands,
     )
     table.done()
     return behavior

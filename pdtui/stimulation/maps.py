@@ -124,6 +124,8 @@ class Behavior:
             that the controller's output multiplies.
         base: in mode ``pid``, outputs v at which the controller's output is 0, by ``layer:index``: its
             operating point, to which weight × output is added. A unit that is not named has 0.
+        commands: what the policy is asked for meanwhile, by the names of the robot's commands; in mode
+            ``pid`` weights that the controller's output multiplies.
         period: activation period T in s; None lasts until another key.
         together: names of behaviors that may stay latched with this one.
         mode: ``fixed`` magnitudes, or ``pid``.
@@ -145,6 +147,7 @@ class Behavior:
     measured: Measured | None = None
     pid: Pid | None = None
     task: str = ""
+    commands: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

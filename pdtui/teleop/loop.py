@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pdtui.errors import EventError, SimulationDiverged
+from pdtui.errors import EventError, MapError, SimulationDiverged
 from pdtui.policies.memory import PolicyState
 from pdtui.policies.runtime import Policy
 from pdtui.robots.base import Robot
@@ -47,6 +47,7 @@ class ControlLoop:
 
     Raises:
         PolicyError: a unit of the map does not exist.
+        MapError: the robot has no command that a behavior of the map sets.
         RobotError: the robot has no such start.
     """
 
@@ -60,6 +61,7 @@ class ControlLoop:
         stochastic: bool = False,
         start: str = "",
     ) -> None:
+        _check_commands(robot, stimulation_map)
         self.robot, self.policy, self.map, self.seed = robot, policy, stimulation_map, seed
         self.start = robot.check_start(start)
         self.step = 0
@@ -114,6 +116,8 @@ class ControlLoop:
         for event in events:
             self._apply(event)
         stimulation = self.latch.stimulate(self.attributes)
+        if self.robot.set_commands({**self.robot.commands, **self.latch.commands}):
+            self._observation = self.robot.observe()
         behaviors = self.latch.active
         acted = self.policy.act(self._observation, stimulation, self._noise)
         diverged, ended, reward, cost, finished = False, "", 0.0, 0.0, False
@@ -229,3 +233,14 @@ class ControlLoop:
         self._observation = self.robot.observe()
         self.attributes = self.robot.read_attributes()
         self._ended = False
+
+
+def _check_commands(robot: Robot, stimulation_map: StimulationMap) -> None:
+    for behavior in stimulation_map.behaviors.values():
+        for name in behavior.commands:
+            if name not in robot.commands:
+                known = f"there are {', '.join(robot.commands)}" if robot.commands else "it has none"
+                raise MapError(
+                    f"{stimulation_map.source}: behavior '{behavior.name}': {robot.name} has no command "
+                    f"'{name}'; {known}"
+                )

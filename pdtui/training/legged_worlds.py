@@ -106,9 +106,7 @@ class LeggedWorlds:
         joints = self._physics[:, 8 : 1 + _NQ], self._physics[:, 1 + _NQ + 6 :]
         torque = np.clip(80.0 * (targets - joints[0]) - 2.0 * joints[1], -80.0, 80.0)
         motion = self._motion(sensors[:, -1], torque)
-        paid, self._air_time = rewards(
-            motion, self._air_time, self._dt, HEIGHT, DEFAULT, self._weights
-        )
+        paid, self._air_time = rewards(motion, self._air_time, self._dt, HEIGHT, DEFAULT, self._weights)
         fell = fallen(motion) | ~np.isfinite(self._physics).all(axis=1)
         self._age += 1
         self.restarted = fell | (self._age >= self._episode)
@@ -170,9 +168,9 @@ class LeggedWorlds:
                 np.zeros(12),
             ]
         )
-        noisy: NDArray[np.float32] = (
-            clean + spread * self._rng.uniform(-1.0, 1.0, clean.shape)
-        ).astype(np.float32)
+        noisy: NDArray[np.float32] = (clean + spread * self._rng.uniform(-1.0, 1.0, clean.shape)).astype(
+            np.float32
+        )
         return noisy
 
     def _start_over(self, which: NDArray[np.bool_]) -> None:
