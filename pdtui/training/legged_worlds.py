@@ -76,6 +76,7 @@ class LeggedWorlds:
         for model, friction in zip(shared, np.linspace(low, high, number), strict=True):
             # MuJoCo takes the larger of the two frictions of a contact.
             model.geom_friction[:, 0] = friction
+        self.frictions = np.resize(np.linspace(low, high, number), count)
         self._models = [shared[index % number] for index in range(count)]
         self._data = [mujoco.MjData(shared[0]) for _ in range(_THREADS)]
         self._dt = SUBSTEPS * float(shared[0].opt.timestep)
