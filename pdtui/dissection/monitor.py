@@ -12,7 +12,7 @@ from pdtui.errors import RobotError, SimulationDiverged
 from pdtui.policies.memory import PolicyState
 from pdtui.policies.runtime import Policy
 from pdtui.robots.base import Robot
-from pdtui.robots.types import Attribute, Floats, RobotSnapshot
+from pdtui.robots.types import Attribute, Floats, RobotSnapshot, unwrapped
 
 Progress = Callable[[int, int], None]
 
@@ -102,10 +102,8 @@ def _record(robot: Robot, policy: Policy, seed: int, steps: int) -> Episode:
             ended = str(info.get("reason", "the episode is over"))
             break
     values = np.array(attributes, np.float64).reshape(-1, len(robot.attributes))
-    for column, attribute in enumerate(robot.attributes):
-        if attribute.wraps:
-            values[:, column] = np.unwrap(values[:, column])
-    return Episode(seed, np.array(activations, np.float32).reshape(-1, policy.units), values, ended)
+    smooth = unwrapped(values, robot.attributes)
+    return Episode(seed, np.array(activations, np.float32).reshape(-1, policy.units), smooth, ended)
 
 
 def collect_starts(

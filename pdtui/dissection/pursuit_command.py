@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import tomlkit
 from rich.console import RenderableType
 from rich.text import Text
@@ -22,7 +21,7 @@ from pdtui.policies.units import Stimulation, parse_unit
 from pdtui.stimulation.mapfile import load_map
 from pdtui.stimulation.maps import StimulationMap
 from pdtui.stimulation.remeasured import change_map, with_behavior
-from pdtui.tasks import Burst, find_task
+from pdtui.tasks import Burst, find_task, mean_figures
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class PursuedBehavior:
                 "walks": len(held),
                 "done": sum(verdict.success for verdict in held),
                 "by_itself": sum(verdict.success for verdict in self.result.untouched),
-                "figures": self._figures(),
+                "figures": mean_figures(held),
             },
             "rollouts": self.result.rollouts,
             "map": str(self.output),
@@ -62,13 +61,6 @@ class PursuedBehavior:
             f"walks that the search did not see, by itself on {held['by_itself']}; {figures}\n"
             f"wrote {self.output} ({told['rollouts']} roll-outs)"
         )
-
-    def _figures(self) -> dict[str, float]:
-        names = dict.fromkeys(name for verdict in self.result.verdicts for name in verdict.figures)
-        return {
-            name: float(np.mean([v.figures[name] for v in self.result.verdicts if name in v.figures]))
-            for name in names
-        }
 
 
 def pursue_into_map(

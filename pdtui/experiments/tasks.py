@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from pdtui.robots.types import Floats
+from pdtui.robots.types import Floats, unwrapped
 from pdtui.sessions.events import Event
 from pdtui.stimulation.maps import Behavior
-from pdtui.tasks import Task, Trace, Verdict, find_task
+from pdtui.tasks import Task, Trace, Verdict, find_task, mean_figures
 from pdtui.tasks.run import walk_of
 from pdtui.teleop.loop import ControlLoop
 
@@ -72,11 +72,8 @@ def run_task(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bo
 
 
 def _judge(task: Task, loop: ControlLoop, rows: Floats, walk: int, fell: bool) -> Verdict:
-    values = rows[walk + 1 :].copy()
-    for column, attribute in enumerate(loop.robot.attributes):
-        if attribute.wraps:
-            values[:, column] = np.unwrap(values[:, column])
-    return task.judge(Trace(loop.robot.attributes, rows[: walk + 1], values, fell))
+    attributes = loop.robot.attributes
+    return task.judge(Trace(attributes, rows[: walk + 1], unwrapped(rows[walk + 1 :], attributes), fell))
 
 
 def summarise_task(
@@ -91,14 +88,6 @@ def summarise_task(
         sum(run.verdict.success for run in runs),
         sum(run.verdict.success for run in untouched),
         sum(run.fell for run in runs),
-        _means(runs),
-        _means(untouched),
+        mean_figures(run.verdict for run in runs),
+        mean_figures(run.verdict for run in untouched),
     )
-
-
-def _means(runs: Iterable[TaskRun]) -> dict[str, float]:
-    found: dict[str, list[float]] = {}
-    for run in runs:
-        for name, value in run.verdict.figures.items():
-            found.setdefault(name, []).append(value)
-    return {name: float(np.mean(values)) for name, values in found.items()}

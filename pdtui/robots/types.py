@@ -84,3 +84,12 @@ def column_of(name: str, attributes: Sequence[Attribute], owner: str) -> int:
             return column
     known = ", ".join(attribute.name for attribute in attributes)
     raise RobotError(f"{owner}: no attribute '{name}'; there are {known}")
+
+
+def unwrapped(values: Floats, attributes: Sequence[Attribute]) -> Floats:
+    """A copy of values by control step, shape (T, J), in which angles do not jump at ±π."""
+    smooth = values.copy()
+    for column, attribute in enumerate(attributes):
+        if attribute.wraps:
+            smooth[:, column] = np.unwrap(smooth[:, column])
+    return smooth

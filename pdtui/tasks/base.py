@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from pdtui.robots.types import Attribute, Floats, column_of
 
@@ -51,6 +53,15 @@ class Verdict:
     success: bool
     score: float
     figures: dict[str, float]
+
+
+def mean_figures(verdicts: Iterable[Verdict]) -> dict[str, float]:
+    """Mean of each figure over the verdicts that have it."""
+    found: dict[str, list[float]] = {}
+    for verdict in verdicts:
+        for name, value in verdict.figures.items():
+            found.setdefault(name, []).append(value)
+    return {name: float(np.mean(values)) for name, values in found.items()}
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pdtui.errors import SimulationDiverged
 from pdtui.policies.runtime import Policy
 from pdtui.policies.units import NO_STIMULATION, Stimulation
 from pdtui.robots.base import Robot
-from pdtui.robots.types import Floats
+from pdtui.robots.types import Floats, unwrapped
 from pdtui.tasks.base import Task, Trace, Verdict
 
 
@@ -72,7 +72,4 @@ def _watch(robot: Robot, policy: Policy, task: Task, burst: Burst, walked: list[
         if fell:
             break
     rows = np.array(values).reshape(-1, len(robot.attributes))
-    for column, attribute in enumerate(robot.attributes):
-        if attribute.wraps:
-            rows[:, column] = np.unwrap(rows[:, column])
-    return Trace(robot.attributes, np.array(walked), rows, bool(fell))
+    return Trace(robot.attributes, np.array(walked), unwrapped(rows, robot.attributes), bool(fell))
