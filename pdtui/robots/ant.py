@@ -10,7 +10,7 @@ from gymnasium.envs.mujoco.ant_v5 import AntEnv
 from numpy.typing import NDArray
 
 from pdtui.robots.geometry import roll_pitch_yaw
-from pdtui.robots.mujoco import MujocoRobot, links_of
+from pdtui.robots.mujoco import GearedMotors, MujocoRobot, links_of
 from pdtui.robots.types import Attribute, Floats
 
 _LEGS = {"1": "front left", "2": "back left", "3": "back right", "4": "front right"}
@@ -35,9 +35,7 @@ class Ant(MujocoRobot, AntEnv):
         super().__init__(include_cfrc_ext_in_observation=False)
         self._forward = forward
         self.links = links_of(self.model)
-        motors = [self.model.actuator(index) for index in range(self.model.nu)]
-        joints = [self.model.joint(int(motor.trnid[0])).name for motor in motors]
-        self._gears = [float(motor.gear[0]) for motor in motors]
+        self._motors = GearedMotors(self.model)
         self.attributes = (
             Attribute("vx", "m/s"),
             Attribute("vy", "m/s"),
@@ -49,7 +47,7 @@ class Ant(MujocoRobot, AntEnv):
             Attribute("height", "m"),
             *(
                 Attribute(f"{_LEGS[joint[-1]]} {joint[:-2]} torque", "N m", scale=1.0 / gear)
-                for joint, gear in zip(joints, self._gears, strict=True)
+                for joint, gear in zip(self._motors.joints, self._motors.gears, strict=True)
             ),
         )
 
@@ -91,10 +89,7 @@ class Ant(MujocoRobot, AntEnv):
         roll, pitch, yaw = roll_pitch_yaw(w, x, y, z)
         # Third row of the rotation matrix: MuJoCo's angular velocity is in the body's frame.
         yaw_rate = 2 * (x * z - w * y) * a + 2 * (y * z + w * x) * b + (1 - 2 * (x * x + y * y)) * c
-        torques = [
-            gear * min(1.0, max(-1.0, command))
-            for gear, command in zip(self._gears, self.data.ctrl.tolist(), strict=True)
-        ]
+        torques = self._motors.torques(self.data)
         return np.array([vx, vy, math.hypot(vx, vy), yaw, yaw_rate, roll, pitch, height, *torques])
 
     def _fallen(self) -> str | None:

@@ -107,6 +107,27 @@ def check_finite(data: mujoco.MjData, owner: str) -> None:
             )
 
 
+class GearedMotors:
+    """Motors that turn joints, commanded between −1 and 1: a command's torque is the motor's gear times it.
+
+    Attributes:
+        joints: names of the joints, in the order of the motors.
+        gears: largest torques, N m.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        motors = [model.actuator(index) for index in range(model.nu)]
+        self.joints = [str(model.joint(int(motor.trnid[0])).name) for motor in motors]
+        self.gears = [float(motor.gear[0]) for motor in motors]
+
+    def torques(self, data: mujoco.MjData) -> list[float]:
+        """Of the present commands, N m."""
+        return [
+            gear * min(1.0, max(-1.0, command))
+            for gear, command in zip(self.gears, data.ctrl.tolist(), strict=True)
+        ]
+
+
 class MujocoRobot(Robot):
     """A robot whose simulator is a pair of `MjModel` and `MjData`."""
 

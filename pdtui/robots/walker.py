@@ -11,7 +11,7 @@ from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv
 from numpy.typing import NDArray
 
 from pdtui.robots.geometry import wrap_angle
-from pdtui.robots.mujoco import MujocoRobot, links_of
+from pdtui.robots.mujoco import GearedMotors, MujocoRobot, links_of
 from pdtui.robots.types import Attribute, Floats
 
 _LONGEST_STRIDE = 0.4
@@ -43,9 +43,7 @@ class Walker(MujocoRobot, Walker2dEnv):
         self._in_air = np.zeros(len(_FEET))
         self.links = links_of(self.model)
         self._feet = [self.model.geom(geom).id for geom in _FEET.values()]
-        motors = [self.model.actuator(index) for index in range(self.model.nu)]
-        joints = [self.model.joint(int(motor.trnid[0])).name.removesuffix("_joint") for motor in motors]
-        self._gears = [float(motor.gear[0]) for motor in motors]
+        self._motors = GearedMotors(self.model)
         self.attributes = (
             Attribute("vx", "m/s"),
             Attribute("speed", "m/s"),
@@ -54,8 +52,8 @@ class Walker(MujocoRobot, Walker2dEnv):
             Attribute("pitch rate", "rad/s"),
             *(Attribute(f"{side} foot clearance", "m") for side in _FEET),
             *(
-                Attribute(f"{_side(joint)} torque", "N m", scale=1.0 / gear)
-                for joint, gear in zip(joints, self._gears, strict=True)
+                Attribute(f"{_side(joint.removesuffix('_joint'))} torque", "N m", scale=1.0 / gear)
+                for joint, gear in zip(self._motors.joints, self._motors.gears, strict=True)
             ),
         )
 
@@ -88,10 +86,7 @@ class Walker(MujocoRobot, Walker2dEnv):
         mujoco.mj_kinematics(self.model, self.data)
         _, height, pitch = self.data.qpos[:3].tolist()
         vx, vz, pitch_rate = self.data.qvel[:3].tolist()
-        torques = [
-            gear * min(1.0, max(-1.0, command))
-            for gear, command in zip(self._gears, self.data.ctrl.tolist(), strict=True)
-        ]
+        torques = self._motors.torques(self.data)
         clearances = [self._clearance(foot) for foot in self._feet]
         return np.array(
             [vx, math.hypot(vx, vz), height, wrap_angle(pitch), pitch_rate, *clearances, *torques]
