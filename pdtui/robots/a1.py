@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.errors import RobotError, SimulationDiverged
 from pdtui.robots.bullet import BulletRobot, add_ground, add_plane, add_trees, data_folder
+from pdtui.robots.depth import nearness
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.terrain import Ground, rough_ground, scatter_trees
 from pdtui.robots.types import Attribute, Floats
@@ -42,6 +43,8 @@ _REMEMBERED = (
     "_untouched",
 )
 _ALIVE, _FALL, _ENERGY = 0.3, 10.0, 0.0005
+_FAN = np.radians(np.linspace(60.0, -60.0, 32))
+_NOSE, _SIGHT = 0.25, 5.0
 
 
 class A1(BulletRobot):
@@ -55,9 +58,10 @@ class A1(BulletRobot):
     left), then of the other; 0 is standing. A proportional-derivative controller without torque limit moves
     the joints to these targets.
 
-    Reward: vx in m/s + 0.3 − 0.0005 × the motors' power in W, and −10 for a fall. An episode ends where the
-    trunk is less than 0.2 m above the ground or leans by more than 53°. A cost of 1 counts every tree that
-    the robot runs into; one that it touches again within half a second does not count again.
+    Reward: vx in m/s, up to `top_speed`, + 0.3 − 0.0005 × the motors' power in W, and −10 for a fall. An
+    episode ends where the trunk is less than 0.2 m above the ground or leans by more than 53°. A cost of 1
+    counts every tree that the robot runs into; one that it touches again within half a second does not
+    count again.
 
     Ground, trees and the small differences of the joints at the start are functions of the seed: the same
     seed gives the same rough ground with and without trees.
@@ -67,6 +71,7 @@ class A1(BulletRobot):
             ``forest`` on rough ground.
         roughness: the most by which rough ground rises, m.
         density: trees of the forest, a square metre.
+        top_speed: more speed than this, m/s, is not rewarded.
     """
 
     name = "a1"
@@ -74,11 +79,18 @@ class A1(BulletRobot):
     starts = ("plane", "rough", "forest")
     episode_steps = 400
 
-    def __init__(self, terrain: str = "plane", roughness: float = 0.05, density: float = 0.15) -> None:
+    def __init__(
+        self,
+        terrain: str = "plane",
+        roughness: float = 0.05,
+        density: float = 0.15,
+        top_speed: float = math.inf,
+    ) -> None:
         super().__init__()
         if terrain not in self.starts:
             raise RobotError(f"{self.name}: no terrain '{terrain}'; there are {', '.join(self.starts)}")
         self._terrain, self._roughness, self._density = terrain, roughness, density
+        self._top_speed = top_speed
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93,), np.float64)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (6,), np.float32)
         self._urdf = data_folder() / "a1" / "a1.urdf"
@@ -180,7 +192,8 @@ class A1(BulletRobot):
         cost = float((touched & (self._untouched >= _APART)).sum())
         self._untouched = np.where(touched, 0.0, self._untouched + 1.0)
         reason = self._fallen()
-        reward = float(moved[0]) / self.control_dt + _ALIVE - _ENERGY * energy / _SUBSTEPS
+        forward = min(float(moved[0]) / self.control_dt, self._top_speed)
+        reward = forward + _ALIVE - _ENERGY * energy / _SUBSTEPS
         info: dict[str, Any] = {"cost": cost}
         if reason:
             reward, info["reason"] = reward - _FALL, reason
@@ -251,3 +264,30 @@ class A1(BulletRobot):
         if height < _LOWEST:
             return f"fell: trunk {height:.2f} m above the ground, under {_LOWEST} m"
         return ""
+
+
+class A1Vision(A1):
+    """The A1 with a depth camera of one row, held level at its nose: for comparison, it sees the trees.
+
+    Observation (125): the A1's, then for 32 rays from 60° on the left to 60° on the right how near the next
+    trunk is, 1 at the camera and 0 from 5 m on. Everything else is the A1's.
+    """
+
+    name = "a1-vision"
+    title = "Unitree A1 with a depth camera (PyBullet)"
+
+    def __init__(
+        self,
+        terrain: str = "forest",
+        roughness: float = 0.05,
+        density: float = 0.15,
+        top_speed: float = math.inf,
+    ) -> None:
+        super().__init__(terrain, roughness, density, top_speed)
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93 + len(_FAN),), np.float64)
+
+    def observe(self) -> Floats:
+        (x, y, _), (qx, qy, qz, qw) = self._base()
+        yaw = roll_pitch_yaw(qw, qx, qy, qz)[2]
+        nose = (x + _NOSE * math.cos(yaw), y + _NOSE * math.sin(yaw))
+        return np.concatenate([super().observe(), nearness(nose, yaw, self.obstacles, _FAN, _SIGHT)])

@@ -25,6 +25,7 @@ GROUP = "pdtui.robots"
 TRUSTED = "PDTUI_ENVIRONMENT_MODULES"
 ROBOTS: dict[str, str] = {
     "a1": "pdtui.robots.a1:A1",
+    "a1-vision": "pdtui.robots.a1:A1Vision",
     "ant": "pdtui.robots.ant:Ant",
     "anymal": "pdtui.robots.anymal:Anymal",
     "anymal-forward": "pdtui.robots.anymal:AnymalForward",

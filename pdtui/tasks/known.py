@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pdtui.errors import MapError
-from pdtui.tasks import bipedal_walker, walker
+from pdtui.tasks import a1, bipedal_walker, walker
 from pdtui.tasks.base import Task
 
-TASKS: tuple[Task, ...] = (*walker.TASKS, *bipedal_walker.TASKS)
+TASKS: tuple[Task, ...] = (*a1.TASKS, *walker.TASKS, *bipedal_walker.TASKS)
 
 
 def tasks_of(robot: str) -> tuple[Task, ...]:

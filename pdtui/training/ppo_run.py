@@ -13,14 +13,17 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.policies.files import find_weights, load_network
+from pdtui.training.graft import actor_of, graft
 from pdtui.training.mlp import Params
 from pdtui.training.ppo import PpoConfig, PpoLearner, PpoState, Rollout, act
 from pdtui.training.recipes import RECIPES
 from pdtui.training.remote import RemoteWorlds
-from pdtui.training.run import Run
+from pdtui.training.run import Run, numpy_actor
 from pdtui.training.worlds import Worlds
 
 THREADS = 2
+_FIRST_LOOK = 200
 
 
 class PpoRun(Run):
@@ -46,6 +49,8 @@ class PpoRun(Run):
         self.learner = PpoLearner(self.config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self._threads = ThreadPoolExecutor(THREADS)
+        if RECIPES[self.robot].begin and not self.checkpoint.exists():
+            self._begin_from(find_weights(RECIPES[self.robot].begin))
 
     def advance(self) -> int:
         on_host: PpoState = jax.tree.map(np.asarray, self.state)
@@ -56,6 +61,18 @@ class PpoRun(Run):
 
     def kept_actor(self) -> Params:
         return self.learner.folded_actor(self.state)
+
+    def _begin_from(self, weights: Path) -> None:
+        actor = actor_of(load_network(weights))
+        act, inputs = numpy_actor(actor, None), actor[0]["w"].shape[0]
+        seen = []
+        for _ in range(_FIRST_LOOK):
+            observations = np.concatenate([group.observations for group in self.worlds])
+            seen.append(observations)
+            actions = self.to_robot(act(observations[:, :inputs]))
+            shares = np.split(actions, len(self.worlds))
+            list(self._threads.map(_step, self.worlds, shares))
+        self.state = graft(self.learner, self.state, actor, np.concatenate(seen))
 
     def _collect(self, state: PpoState) -> Rollout:
         observation = np.concatenate([group.observations for group in self.worlds])
