@@ -82,6 +82,37 @@ def test_a_flip_turns_forward() -> None:
     assert not _biped("front flip", height, -over, fast).success
 
 
+def _a1(task: str, rate: float, speed: Floats, *, fell: bool = False) -> Verdict:
+    names = ("vx", "speed", "yaw", "pitch")
+    steps = len(speed)
+    yaw = rate * 0.016 * np.arange(steps)
+    values = np.stack((speed, np.abs(speed), yaw, np.zeros(steps)), axis=1)
+    return find_task(task, "a1").judge(_trace(names, [[2.0, 2.0, 0.0, 0.0]] * 90, values, fell=fell))
+
+
+def test_the_a1_turns_while_it_walks() -> None:
+    walking = np.full(150, 1.5)
+    assert _a1("left", 0.2, walking).success
+    assert _a1("right", -0.2, walking).success
+    assert _a1("left", 0.2, walking).figures["yaw rate (rad/s)"] == pytest.approx(0.2)
+    assert not _a1("left", 0.1, walking).success
+    assert not _a1("left", -0.2, walking).success
+    assert not _a1("right", 0.2, walking).success
+    assert not _a1("left", 0.2, np.full(150, 0.1)).success
+    assert not _a1("left", 0.2, walking, fell=True).success
+    assert _a1("left", 0.6, walking).score > _a1("left", 0.2, walking).score > 1.0
+
+
+def test_the_a1_stops_on_its_feet_and_goes_faster() -> None:
+    braking = np.concatenate((np.linspace(2.0, 0.1, 60), np.full(90, 0.1)))
+    assert _a1("stop", 0.0, braking).success
+    assert not _a1("stop", 0.0, braking[:100], fell=True).success
+    assert not _a1("stop", 0.0, np.full(150, 0.4)).success
+    assert _a1("forward", 0.0, np.full(150, 2.3)).success
+    assert not _a1("forward", 0.0, np.full(150, 2.1)).success
+    assert not _a1("forward", 0.0, np.full(150, 2.3), fell=True).success
+
+
 def test_standing_up_is_walking_at_the_end() -> None:
     height, pitch = np.full(300, 2.0), np.zeros(300)
     assert _biped("stand up", height, pitch, np.linspace(0.0, 5.0, 300)).success
