@@ -34,11 +34,16 @@ Result = TypeVar("Result")
 
 def _start_worker(robot: str, policy: str, choices: PolicyChoices) -> None:
     global _worker  # noqa: PLW0603  (a process's own robot is its global state)
+    obey_parent()
+    world = make_robot(robot)
+    _worker = (world, _load(policy, world, choices))
+
+
+def obey_parent() -> None:
+    """Called first in a worker process: it ends when its parent ends, and leaves Ctrl-C to it."""
     # Ctrl-C reaches the whole process group; only the parent answers it, or every worker prints a traceback.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    world = make_robot(robot)
-    _worker = (world, _load(policy, world, choices))
 
 
 def _load(policy: str | Path, world: Robot, choices: PolicyChoices) -> Policy:

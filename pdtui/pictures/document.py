@@ -17,7 +17,7 @@ def document(dissection: Dissection) -> str:
     """Everything that the terminal prints about a dissection, and what it was made from."""
     summary = summarise(dissection)
     parts = [f"# Dissection of {summary['policy']} on {summary['robot']}", _origin(dissection, summary)]
-    parts += [_table(table) for table in tables(summary)]
+    parts += [markdown_of(table) for table in tables(summary)]
     parts += ["## Remarks", "\n".join(f"- {line}" for line in remarks(summary))]
     return "\n\n".join(parts) + "\n"
 
@@ -41,7 +41,8 @@ def _origin(dissection: Dissection, summary: dict[str, Any]) -> str:
     return _markdown(["", ""], rows)
 
 
-def _table(table: Table) -> str:
+def markdown_of(table: Table) -> str:
+    """A table that the terminal prints, with its title, as Markdown."""
     headers = [str(column.header) for column in table.columns]
     columns = [[str(cell) for cell in column.cells] for column in table.columns]
     return f"## {table.title}\n\n" + _markdown(headers, list(zip(*columns, strict=True)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,11 +11,9 @@ import numpy as np
 import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
-from rerun.recording_stream import is_enabled
 
 from pdtui.dissection.findings import Dissection
 from pdtui.dissection.summary import summarise
-from pdtui.errors import PictureError
 from pdtui.pictures.axes import Axes, Axis, Log
 from pdtui.pictures.charts import (
     EffectCurve,
@@ -30,6 +27,7 @@ from pdtui.pictures.charts import (
 from pdtui.pictures.document import document
 from pdtui.pictures.layout import SIDE_EFFECTS, SUMMARY, layout, matrix_size, part_of, value_part
 from pdtui.pictures.palette import GREEN, ORANGE, SKY, Color, diverging
+from pdtui.pictures.recording import recording_to
 from pdtui.robots.types import Floats
 from pdtui.sessions.versions import environment_versions
 
@@ -46,25 +44,8 @@ def write_report(path: Path, dissection: Dissection) -> None:
     Raises:
         PictureError: the file cannot be written.
     """
-    partial = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        recording = rr.RecordingStream(APP)
-        if not is_enabled(recording):
-            raise PictureError(f"{path}: cannot be written: the environment says RERUN=off")
-        recording.set_sinks(rr.FileSink(partial), default_blueprint=layout(dissection))
-        try:
-            _write(recording, dissection)
-        finally:
-            recording.disconnect()
-        partial.replace(path)
-    except OSError as error:
-        raise PictureError(f"{path}: cannot be written: {error.strerror}") from error
-    except RuntimeError as error:
-        raise PictureError(f"{path}: cannot be written: {error}") from error
-    finally:
-        with suppress(OSError):
-            partial.unlink()
+    with recording_to(path, APP, layout(dissection)) as recording:
+        _write(recording, dissection)
 
 
 def _write(recording: rr.RecordingStream, dissection: Dissection) -> None:

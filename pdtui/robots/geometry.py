@@ -18,6 +18,12 @@ def wrap_angle(angle: float) -> float:
     return float(np.pi if wrapped == -np.pi else wrapped)
 
 
+def wrap_angles(angles: Floats) -> Floats:
+    """The same angles in [−π, π), rad, of any shape; NaN stays."""
+    wrapped: Floats = np.mod(angles + np.pi, 2.0 * np.pi) - np.pi
+    return wrapped
+
+
 def multiply_quaternions(a: Floats, b: Floats) -> Floats:
     """Hamilton product, shapes (..., 4): the rotation b followed by a."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
