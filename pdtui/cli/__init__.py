@@ -13,6 +13,7 @@ from pdtui.cli.drawing import figure
 from pdtui.cli.driving import drive, pick_and_drive, replay
 from pdtui.cli.measuring import bench, convert, dissect, evaluate, pursue, train
 from pdtui.cli.sessions import sessions
+from pdtui.cli.tuning import tune
 
 
 @click.group(cls=OneLineErrors, invoke_without_command=True)
@@ -27,5 +28,5 @@ def main(ctx: click.Context) -> None:
         pick_and_drive()
 
 
-for command in (drive, replay, sessions, evaluate, dissect, pursue, figure, convert, train, bench):
+for command in (drive, replay, sessions, evaluate, dissect, pursue, tune, figure, convert, train, bench):
     main.add_command(command)

@@ -21,6 +21,7 @@ from pdtui.cli.common import (
     show_result,
     workers_option,
 )
+from pdtui.cli.experiments import EXPERIMENTS, Asked
 from pdtui.errors import MapError
 from pdtui.policies.choices import PolicyChoices, Spaces
 from pdtui.sessions.schema import ACTIVATIONS_KEPT, ActivationsKept
@@ -28,10 +29,26 @@ from pdtui.sessions.schema import ACTIVATIONS_KEPT, ActivationsKept
 
 @click.command()
 @click.argument("robot")
+@click.argument("others", nargs=-1, metavar="[MAP.toml]...")
 @map_option
 @policy_options
 @force_option
 @click.option("--seeds", type=Seeds(), default="100-119", show_default=True)
+@click.option(
+    "--experiment",
+    type=click.Choice(list(EXPERIMENTS)),
+    help="One of the paper's experiments; it may compare several maps.",
+)
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    metavar="FILE.png|.rrd",
+    help="Draw the experiment; may be given again.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace a picture that exists already.")
 @click.option(
     "--target", metavar="ATTRIBUTE", help="Measure how precisely a target of this attribute is held."
 )
@@ -47,31 +64,49 @@ from pdtui.sessions.schema import ACTIVATIONS_KEPT, ActivationsKept
 @json_option
 def evaluate(
     robot: str,
+    others: tuple[str, ...],
     map_name: str | None,
     policy: str,
     choices: PolicyChoices,
     force: bool,
     seeds: range,
+    experiment: str | None,
+    outputs: tuple[Path, ...],
+    overwrite: bool,
     target: str | None,
     policy_only: bool,
     update: bool,
     workers: int | None,
     as_json: bool,
 ) -> None:
-    """Measure what every behavior of ROBOT's map does, against the default."""
+    """Measure what every behavior of ROBOT's map does, against the default.
+
+    ROBOT may be the file of a map.
+    """
     from pdtui.experiments import evaluate as behaviors
-    from pdtui.experiments import tables, tracking, walking
+    from pdtui.experiments import steering_tables, tables, tracking, walking
     from pdtui.stimulation.remeasured import update_map
 
     if update and (policy_only or target is not None):
         raise MapError(
             "--update writes what was measured of behaviors; --target and --policy-only measure none"
         )
+    if experiment is None and (others or outputs):
+        raise click.UsageError(f"{'more than one map' if others else '-o'} needs --experiment")
+    if experiment is not None and (policy_only or target is not None or update):
+        raise click.UsageError("--experiment goes with neither --target, --policy-only nor --update")
+    if others and (map_name or policy):
+        raise click.UsageError("maps that are compared name their policies: --map and --policy are for one")
     order = order_of_drive(robot, map_name, policy, choices, force=force)
-    if target is not None:
+    if experiment is not None:
+        rest = [order_of_drive(other, None, "", choices, force=force) for other in others]
+        EXPERIMENTS[experiment](Asked((order, *rest), seeds, workers, as_json, outputs, overwrite))
+    elif target is not None:
         with progress_bar_or_none("holding targets", quiet=as_json) as advance:
-            tracked = tracking.evaluate_tracking(order, target, seeds, progress=advance)
-        show_result(asdict(tracked), as_json, lambda: tables.tracking_table(tracked))
+            tracked = tracking.evaluate_tracking(
+                order, target, seeds, workers=cores(workers), progress=advance
+            )
+        show_result(asdict(tracked), as_json, lambda: steering_tables.tracking_table(tracked))
     elif policy_only:
         with progress_bar_or_none("walking", quiet=as_json) as advance:
             walked = walking.evaluate_walking(order, seeds, progress=advance)

@@ -10,18 +10,17 @@ from pdtui.experiments.bench_dissect import DissectBench
 from pdtui.experiments.bench_record import MemoryBench, RecordBench
 from pdtui.experiments.bench_screen import ScreenBench
 from pdtui.experiments.evaluate import Evaluation
-from pdtui.experiments.tracking import Tracking
 from pdtui.experiments.walking import Walking
 
 
-def _table(title: str, *columns: str) -> Table:
+def new_table(title: str, *columns: str) -> Table:
     table = Table(title=title, title_justify="left")
     for number, column in enumerate(columns):
         table.add_column(column, justify="left" if number == 0 else "right", no_wrap=number == 0)
     return table
 
 
-def _seeds(seeds: tuple[int, ...]) -> str:
+def seeds_of(seeds: tuple[int, ...]) -> str:
     return f"{len(seeds)} seeds, {seeds[0]}–{seeds[-1]}"
 
 
@@ -32,8 +31,8 @@ def behavior_table(result: Evaluation) -> Group:
 
 
 def _task_table(result: Evaluation) -> Table:
-    table = _table(
-        f"{result.robot}, policy {result.policy}, {_seeds(result.seeds)}",
+    table = new_table(
+        f"{result.robot}, policy {result.policy}, {seeds_of(result.seeds)}",
         *("behavior", "wanted", "done", "by itself", "falls", "measured (by itself)"),
     )
     count = len(result.seeds)
@@ -54,8 +53,8 @@ def _task_table(result: Evaluation) -> Table:
 
 
 def _aim_table(result: Evaluation) -> Table:
-    table = _table(
-        f"{result.robot}, policy {result.policy}, {_seeds(result.seeds)}",
+    table = new_table(
+        f"{result.robot}, policy {result.policy}, {seeds_of(result.seeds)}",
         *("behavior", "measure", "with it", "default", "effect [95 %]", "right", "falls"),
     )
     count = len(result.seeds)
@@ -72,24 +71,11 @@ def _aim_table(result: Evaluation) -> Table:
     return table
 
 
-def tracking_table(result: Tracking) -> Table:
-    """One row a target, and the mean."""
-    unit = result.unit
-    table = _table(
-        f"{result.behavior}: {result.attribute} ({unit}), {_seeds(result.seeds)}, falls {result.falls}",
-        *(f"target ({unit})", "mean |error|", "last 25 steps"),
-    )
-    for row in result.targets:
-        table.add_row(f"{row.target:+.2f}", f"{row.error:.3f}", f"{row.settled:.3f}")
-    table.add_section()
-    table.add_row("mean", f"{result.error:.3f} [{result.low:.3f}, {result.high:.3f}]", "")
-    table.add_row("without control", f"{result.default_error:.3f}", "")
-    return table
-
-
 def walking_table(result: Walking) -> Table:
     """The policy alone."""
-    table = _table(f"the policy alone, {_seeds(result.seeds)}, {result.steps} steps each", "measure", "value")
+    table = new_table(
+        f"the policy alone, {seeds_of(result.seeds)}, {result.steps} steps each", "measure", "value"
+    )
     for name, speed in (("mean speed (m/s)", result.mean_speed), ("net speed (m/s)", result.net_speed)):
         if speed is not None:
             table.add_row(name, f"{speed:.2f}")
@@ -100,7 +86,7 @@ def walking_table(result: Walking) -> Table:
 
 def bench_table(result: LoopBench) -> Table:
     """Steps a second, and each share of the bare simulator."""
-    table = _table("control loop", "part", "steps/s", "of bare")
+    table = new_table("control loop", "part", "steps/s", "of bare")
     for name in ("bare", "policy", "stimulated", "recorded"):
         rate = float(getattr(result, name))
         table.add_row(name, f"{rate:.0f}", f"{rate / result.bare:.0%}")
@@ -113,7 +99,7 @@ def bench_table(result: LoopBench) -> Table:
 
 def dissect_table(result: DissectBench) -> Group:
     """Matching against the loop, its growth, its memory, and probing on two workers."""
-    speed = _table(result.recorded, "preset", "matching", "loop", "times as fast", "ranking", "ties")
+    speed = new_table(result.recorded, "preset", "matching", "loop", "times as fast", "ranking", "ties")
     for one in result.compared:
         speed.add_row(
             one.preset,
@@ -127,12 +113,12 @@ def dissect_table(result: DissectBench) -> Group:
         "loop: librosa.stft for each series, numpy.linalg.norm for each pair; largest difference of a "
         f"discrepancy {max(one.largest_difference for one in result.compared):.0e} of the largest"
     )
-    growth = _table("time of matching", "grows", "size: ms", "ms = fixed + each · size", "off by at most")
+    growth = new_table("time of matching", "grows", "size: ms", "ms = fixed + each · size", "off by at most")
     for curve in result.curves:
         points = "  ".join(f"{size}: {ms:.1f}" for size, ms in zip(curve.sizes, curve.ms, strict=True))
         line = f"{curve.fixed_ms:.1f} + {curve.each_ms:.3g} · size"
         growth.add_row(curve.grows, points, line, f"{curve.deviation:.0%}")
-    rest = _table("memory and probing", "measure", "value")
+    rest = new_table("memory and probing", "measure", "value")
     rest.add_row(
         f"{result.memory_units} units: peak memory, {result.memory_data_gb:.2f} GB of it data",
         f"{result.memory_peak_gb:.2f} GB",
@@ -146,7 +132,9 @@ def dissect_table(result: DissectBench) -> Group:
 
 def record_table(result: RecordBench) -> Table:
     """What each way to record costs at 50 Hz."""
-    table = _table(f"recording, 50 Hz, {result.units} units", "activations", "drive", "of one core", "MB/min")
+    table = new_table(
+        f"recording, 50 Hz, {result.units} units", "activations", "drive", "of one core", "MB/min"
+    )
     for one in result.costs:
         table.add_row(one.activations, one.driven, f"{one.cpu_share:.1%}", f"{one.mb_a_minute:.2f}")
     return table
@@ -154,7 +142,7 @@ def record_table(result: RecordBench) -> Table:
 
 def memory_table(result: MemoryBench) -> Table:
     """Resident memory over a long drive, in tenths of it."""
-    table = _table(f"memory, {result.steps} steps", "part", "done", "MB")
+    table = new_table(f"memory, {result.steps} steps", "part", "done", "MB")
     for part, sizes in result.resident.items():
         for number, size in enumerate(sizes, start=1):
             table.add_row(part, f"{number * 10} %", f"{size / 1e6:.0f}")
@@ -166,7 +154,7 @@ def memory_table(result: MemoryBench) -> Table:
 
 def screen_table(result: ScreenBench) -> Table:
     """What the screen costs."""
-    table = _table("screen, 160×48", "measure", "value")
+    table = new_table("screen, 160×48", "measure", "value")
     table.add_row("first frame", f"{result.first_frame:.2f} s")
     table.add_row("first state of the robot", f"{result.first_state:.2f} s")
     table.add_row(

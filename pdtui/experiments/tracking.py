@@ -1,7 +1,4 @@
-"""`pdtui evaluate --target yaw`: how precisely a PID on hidden units holds a target.
-
-The paper's control-precision experiment (section 4), for any attribute that a map can hold.
-"""
+"""`pdtui evaluate --target yaw`: how precisely a PID holds an attribute, any that a map can hold."""
 
 from __future__ import annotations
 
@@ -11,16 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.errors import MapError
-from pdtui.experiments.evaluate import STIMULATED_FROM, confidence_interval
-from pdtui.robots.geometry import wrap_angle
-from pdtui.sessions.events import Event
-from pdtui.teleop.drive import build_loop
-from pdtui.teleop.loop import ControlLoop
+from pdtui.experiments.evaluate import confidence_interval
+from pdtui.experiments.following import Drive, Followed, Followers
+from pdtui.experiments.response import Responses
+from pdtui.robots.types import Floats
+from pdtui.stimulation.maps import Behavior
 from pdtui.teleop.order import DriveOrder
 
-TARGETS = (0.0, 0.4, 0.9, 1.2, 0.9, 0.4, 0.0, -0.4, -0.9, -1.2, -0.9, -0.4, 0.0)
-STEPS_EACH = 100
+HEADINGS = (0.0, 0.4, 0.9, 1.2, 0.9, 0.4, 0.0, -0.4, -0.9, -1.2, -0.9, -0.4, 0.0)
+"""Targets of an angle, rad: the paper's."""
 SETTLED = 25
+_PART = 0.1
+_SIZES = (0, 1, 2, 1, 0, -1, -2, -1, 0)
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class TargetError:
 
 @dataclass(frozen=True)
 class Tracking:
-    """How well a target is held.
+    """How well a target is held. A drive counts until its end or its fall.
 
     Attributes:
         behavior: the behavior of mode ``pid``.
@@ -42,8 +41,10 @@ class Tracking:
         seeds: of the drives.
         targets: in the order in which they were set.
         error, low, high: mean |error| over seeds with its 95 % interval.
-        default_error: the same without the controller, on the same targets.
+        settled: the same over the last 25 steps of each target.
+        responses: rise time and overshoot over all steps of the target and all seeds.
         falls: seeds on which the robot fell.
+        default_error: mean |error| without the controller, on the same targets; None where not measured.
     """
 
     behavior: str
@@ -54,8 +55,10 @@ class Tracking:
     error: float
     low: float
     high: float
-    default_error: float
+    settled: float
+    responses: Responses
     falls: int
+    default_error: float | None = None
 
 
 def evaluate_tracking(
@@ -63,88 +66,107 @@ def evaluate_tracking(
     attribute: str,
     seeds: Sequence[int],
     *,
-    targets: Sequence[float] = TARGETS,
+    targets: Sequence[float] = (),
+    workers: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Tracking:
-    """Set the targets one after the other, 100 control steps each, on every seed.
+    """Set the targets one after the other, 100 control steps each, on every seed; and once without control.
 
-    As with fixed behaviors, the policy walks for `STIMULATED_FROM` steps before it is touched.
+    Args:
+        order: robot, map and policy; its seed is not used.
+        attribute: what is to be held.
+        seeds: of the resets.
+        targets: in the attribute's unit; empty takes `targets_of`.
+        workers: processes.
+        progress: called with drives done and drives in all.
 
     Raises:
         MapError: the map has no behavior of mode ``pid`` for the attribute.
         PdtuiError: robot or policy cannot be had.
     """
-    name = held_by(order, attribute)
-    built = build_loop(order)
-    column = built.robot.attribute_index(attribute)
-    errors: list[np.ndarray] = []
-    untouched: list[np.ndarray] = []
-    falls = 0
-    for done, seed in enumerate(seeds, start=1):
-        followed, fell = _follow(built, name, column, seed, targets)
-        errors.append(followed)
-        falls += fell
-        untouched.append(_follow(built, "", column, seed, targets)[0])
-        if progress is not None:
-            progress(done, len(seeds))
-    table = np.array(errors)
-    means = np.nanmean(table, axis=(1, 2))
-    low, high = confidence_interval(means)
+    behavior = held_by(order, attribute)
+    with Followers(order, workers) as followers:
+        targets = tuple(targets) or targets_of(followers, behavior, seeds[:3])
+        drives = [
+            Drive(attribute, name, seed, tuple(targets)) for name in (behavior.name, "") for seed in seeds
+        ]
+        total = len(drives)
+        followed = followers.run(drives, progress and (lambda done: progress(done, total)))
+        unit = followers.attribute(attribute).unit
+    untouched = known_mean(seed_errors(followed[len(seeds) :]))
+    return summarise(followed[: len(seeds)], unit, untouched)
+
+
+def summarise(followed: Sequence[Followed], unit: str, default_error: float | None = None) -> Tracking:
+    """Figures of one behavior's drives, one a seed, all to the same targets."""
+    drive = followed[0].drive
+    table = np.abs(np.array([one.errors for one in followed]))
+    means = seed_errors(followed)
+    low, high = confidence_interval(means[np.isfinite(means)])
     return Tracking(
-        name,
-        attribute,
-        built.robot.attributes[column].unit,
-        tuple(seeds),
+        drive.behavior,
+        drive.attribute,
+        unit,
+        tuple(one.drive.seed for one in followed),
         tuple(
-            TargetError(target, float(np.nanmean(table[:, row])), float(np.nanmean(table[:, row, -SETTLED:])))
-            for row, target in enumerate(targets)
+            TargetError(target, known_mean(table[:, row]), known_mean(table[:, row, -SETTLED:]))
+            for row, target in enumerate(drive.targets)
         ),
-        float(means.mean()),
+        known_mean(means),
         low,
         high,
-        float(np.nanmean(np.array(untouched))),
-        falls,
+        known_mean(table[:, :, -SETTLED:]),
+        Responses.of([response for one in followed for response in one.responses]),
+        sum(one.fell for one in followed),
+        default_error,
     )
 
 
-def held_by(order: DriveOrder, attribute: str) -> str:
-    """Name of the behavior that holds an attribute.
+def seed_errors(followed: Sequence[Followed]) -> Floats:
+    """Mean |error| of each drive, shape (seeds,); NaN for one that fell before the first target."""
+    return np.array([one.error for one in followed])
+
+
+def known_mean(values: Floats) -> float:
+    """Mean of what is no NaN; NaN where nothing is."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else float("nan")
+
+
+def targets_of(followers: Followers, behavior: Behavior, seeds: Sequence[int]) -> tuple[float, ...]:
+    """Targets that fit an attribute: the paper's headings for an angle, else steps about its natural value.
+
+    A step is a tenth of what the attribute is when nobody touches the policy, and no less than one press of
+    an arrow key.
+
+    Args:
+        followers: drive untouched to measure that.
+        behavior: holds the attribute.
+        seeds: of these drives.
+    """
+    assert behavior.pid is not None
+    name = behavior.pid.attribute
+    if followers.attribute(name).wraps:
+        return HEADINGS
+    untouched = followers.run([Drive(name, "", seed, (0.0, 0.0)) for seed in seeds])
+    natural = known_mean(np.array([one.values for one in untouched]))
+    if not np.isfinite(natural):
+        raise MapError(f"behavior '{behavior.name}': the robot fell untouched on seeds {list(seeds)}")
+    size = max(_PART * abs(natural), behavior.pid.step)
+    return tuple(float(f"{natural + count * size:.4g}") for count in _SIZES)
+
+
+def held_by(order: DriveOrder, attribute: str) -> Behavior:
+    """The behavior that holds an attribute; of several, the first.
 
     Raises:
         MapError: there is none.
     """
-    held = {
-        behavior.pid.attribute: behavior.name
-        for behavior in order.stimulation_map.behaviors.values()
-        if behavior.pid is not None
-    }
-    if attribute not in held:
-        known = ", ".join(held) or "none"
-        raise MapError(
-            f"{order.stimulation_map.source}: no behavior of mode pid holds '{attribute}'; held are: {known}"
-        )
-    return held[attribute]
-
-
-def _follow(
-    built: ControlLoop, name: str, column: int, seed: int, targets: Sequence[float]
-) -> tuple[np.ndarray, bool]:
-    """|error| by target and step, NaN after a fall; an empty name leaves the policy alone."""
-    loop = ControlLoop(built.robot, built.policy, built.map, seed)
-    wraps = built.robot.attributes[column].wraps
-    for _ in range(STIMULATED_FROM):
-        if loop.advance().ended:
-            return np.full((len(targets), STEPS_EACH), np.nan), True
-    errors = np.full((len(targets), STEPS_EACH), np.nan)
-    for row, target in enumerate(targets):
-        for column_step in range(STEPS_EACH):
-            events = []
-            if name and column_step == 0:
-                events = [Event(loop.step, "behavior", name)] if row == 0 else []
-                events.append(Event(loop.step, "target", name, target))
-            record = loop.advance(events)
-            error = target - float(record.attributes[column])
-            errors[row, column_step] = abs(wrap_angle(error) if wraps else error)
-            if record.ended:
-                return errors, True
-    return errors, False
+    holding = [one for one in order.stimulation_map.behaviors.values() if one.pid is not None]
+    for behavior in holding:
+        if behavior.pid is not None and behavior.pid.attribute == attribute:
+            return behavior
+    known = ", ".join(one.pid.attribute for one in holding if one.pid is not None) or "none"
+    raise MapError(
+        f"{order.stimulation_map.source}: no behavior of mode pid holds '{attribute}'; held are: {known}"
+    )

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import tomlkit
 
 from pdtui.errors import MapError
 from pdtui.stimulation.mapfile import parse_map
-from pdtui.stimulation.maps import Measured
+from pdtui.stimulation.maps import Measured, Pid
+
+Value = TypeVar("Value")
 
 
 def measured_table(measured: Measured) -> tomlkit.items.InlineTable:
@@ -34,14 +36,44 @@ def with_measured(text: str, measured: Mapping[str, Measured], source: str) -> s
     Raises:
         MapError: the text is no map, or has no such behavior.
     """
+
+    def write(table: Any, value: Measured) -> None:
+        table["measured"] = measured_table(value)
+
+    return _with_fields(text, measured, write, source)
+
+
+def with_gains(text: str, gains: Mapping[str, Pid], source: str) -> str:
+    """The map's text with other gains and limits of behaviors of mode ``pid``; everything else stays.
+
+    Args:
+        text: of a map.
+        gains: controllers by the names of behaviors.
+        source: of the text, for messages.
+
+    Raises:
+        MapError: as `with_measured`, or a behavior of another mode.
+    """
+
+    def write(table: Any, pid: Pid) -> None:
+        if "pid" not in table:
+            raise MapError(f"{source}: behavior '{table['name']}': expected mode pid, found fixed")
+        table["pid"].update({name: getattr(pid, name) for name in ("kp", "ki", "kd", "limit")})
+
+    return _with_fields(text, gains, write, source)
+
+
+def _with_fields(
+    text: str, values: Mapping[str, Value], write: Callable[[Any, Value], None], source: str
+) -> str:
     known = parse_map(text, source).behaviors
-    missing = [name for name in measured if name not in known]
+    missing = [name for name in values if name not in known]
     if missing:
         raise MapError(f"{source}: no behavior '{missing[0]}'; there are {', '.join(known)}")
     document = tomlkit.parse(text)
     for table in document.get("behaviors", []):
-        if table["name"] in measured:
-            table["measured"] = measured_table(measured[table["name"]])
+        if table["name"] in values:
+            write(table, values[table["name"]])
     changed = tomlkit.dumps(document)
     parse_map(changed, source)
     return changed

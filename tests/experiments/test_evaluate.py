@@ -67,7 +67,7 @@ def test_tracking_measures_the_wrapped_error(order: DriveOrder) -> None:
     assert loop.attributes[loop.attribute_index("yaw")].wraps
     assert 0.0 <= result.error <= np.pi
     assert result.targets[0].error == pytest.approx(result.error)
-    assert held_by(order, "yaw") == "hold heading"
+    assert held_by(order, "yaw").name == "hold heading"
     with pytest.raises(MapError, match="no behavior of mode pid holds 'speed'; held are: yaw"):
         held_by(order, "speed")
 

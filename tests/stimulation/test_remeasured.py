@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from pdtui.errors import MapError
-from pdtui.stimulation.mapfile import load_map
-from pdtui.stimulation.maps import Measured
-from pdtui.stimulation.remeasured import update_map, with_measured
+from pdtui.stimulation.mapfile import load_map, parse_map
+from pdtui.stimulation.maps import Measured, Pid
+from pdtui.stimulation.remeasured import update_map, with_gains, with_measured
 
 EDITED = "# my own remark\n"
 FIGURES = {"push": Measured(1.23456, 1.0, 1.5, 2, 20)}
@@ -34,3 +34,15 @@ def test_measuring_again_replaces_only_the_figure(map_text: str) -> None:
 def test_a_behavior_that_the_map_does_not_have_is_named(map_text: str) -> None:
     with pytest.raises(MapError, match=r"m\.toml: no behavior 'dance'; there are push, twitch, hold heading"):
         with_measured(map_text, {"dance": FIGURES["push"]}, "m.toml")
+
+
+def test_gains_come_in_and_comments_stay(map_text: str) -> None:
+    text = EDITED + map_text.replace('mode = "pid"', 'mode = "pid"  # it holds')
+    changed = with_gains(text, {"hold heading": Pid("yaw", 5.0, 0.25, 0.5, 1.5, 9.0)}, "mine")
+    assert parse_map(changed, "mine").behaviors["hold heading"].pid == Pid("yaw", 5.0, 0.25, 0.5, 1.5, 0.1)
+    old, new = text.splitlines(), changed.splitlines()
+    assert [line for line in new if "pid = " not in line] == [line for line in old if "pid = " not in line]
+    with pytest.raises(MapError, match="mine: behavior 'push': expected mode pid, found fixed"):
+        with_gains(text, {"push": Pid("yaw", 1.0, 0.0, 0.0, 1.0, 0.1)}, "mine")
+    with pytest.raises(MapError, match="mine: no behavior 'hop'"):
+        with_gains(text, {"hop": Pid("yaw", 1.0, 0.0, 0.0, 1.0, 0.1)}, "mine")

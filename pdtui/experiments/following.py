@@ -1,0 +1,195 @@
+"""Drives that follow targets: one behavior of mode ``pid``, one seed, one target after the other."""
+
+from __future__ import annotations
+
+import multiprocessing
+import multiprocessing.pool
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from types import TracebackType
+
+import numpy as np
+
+from pdtui.dissection.workers import obey_parent
+from pdtui.experiments.response import Response, step_response
+from pdtui.robots.geometry import wrap_angle, wrap_angles
+from pdtui.robots.types import Attribute, Floats
+from pdtui.sessions.events import Event
+from pdtui.stimulation.maps import Pid
+from pdtui.teleop.drive import build_loop
+from pdtui.teleop.loop import ControlLoop
+from pdtui.teleop.order import DriveOrder
+
+UNTOUCHED = 100
+"""Control steps that the policy walks by itself before the first target."""
+STEPS_EACH = 100
+"""Control steps that every target is held."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One drive.
+
+    Attributes:
+        attribute: what is to follow.
+        behavior: the one that holds it; empty leaves the policy alone.
+        seed: of the reset.
+        targets: in the attribute's unit.
+        pid: other gains than the map's; None for those.
+    """
+
+    attribute: str
+    behavior: str
+    seed: int
+    targets: tuple[float, ...]
+    pid: Pid | None = None
+
+
+@dataclass(frozen=True)
+class Followed:
+    """How a drive went.
+
+    Attributes:
+        drive: it.
+        values: the attribute after each control step by target, shape (targets, `STEPS_EACH`); NaN after a
+            fall. An angle does not jump at ±π.
+        errors: target − value, the shorter way round for an angle; of the same shape.
+        responses: to every step of the target; the first target is none.
+        fell: whether the robot fell.
+    """
+
+    drive: Drive
+    values: Floats
+    errors: Floats
+    responses: tuple[Response, ...]
+    fell: bool
+
+    @property
+    def error(self) -> float:
+        """Mean |error| until the end or the fall; NaN for a robot that fell before the first target."""
+        known = np.abs(self.errors[np.isfinite(self.errors)])
+        return float(known.mean()) if known.size else float("nan")
+
+
+class Followers:
+    """Runs drives on one robot and policy; with one worker in this process, else in others.
+
+    The results do not depend on the number of workers: each drive begins with a reset from its seed.
+
+    Args:
+        order: robot, map and policy, or a loop of them, which stays in this process; the seed is not used.
+        workers: processes, started by the first call of `run`.
+
+    Raises:
+        PdtuiError: robot, policy or map cannot be had.
+    """
+
+    def __init__(self, order: DriveOrder | ControlLoop, workers: int = 1) -> None:
+        self.loop = build_loop(order) if isinstance(order, DriveOrder) else order
+        self._order = order if isinstance(order, DriveOrder) and workers > 1 else None
+        self._workers = workers
+        self._pool: multiprocessing.pool.Pool | None = None
+
+    def __enter__(self) -> Followers:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if self._pool is not None:
+            self._pool.terminate()
+            self._pool.join()
+            self._pool = None
+
+    def attribute(self, name: str) -> Attribute:
+        """The attribute of a name.
+
+        Raises:
+            RobotError: the robot has none.
+        """
+        return self.loop.robot.attributes[self.loop.robot.attribute_index(name)]
+
+    def run(self, drives: Sequence[Drive], done: Callable[[int], None] | None = None) -> list[Followed]:
+        """Drive them all; results in their order.
+
+        Args:
+            drives: what to drive.
+            done: called with the number of drives finished so far.
+        """
+        results: list[Followed] = []
+        for followed in self._results(drives):
+            results.append(followed)
+            if done is not None:
+                done(len(results))
+        return results
+
+    def _results(self, drives: Sequence[Drive]) -> Iterable[Followed]:
+        if self._order is None:
+            return (follow(self.loop, drive) for drive in drives)
+        if self._pool is None:
+            context = multiprocessing.get_context("spawn")
+            self._pool = context.Pool(self._workers, _start_worker, (self._order,))
+        return self._pool.imap(_follow_in_worker, drives)
+
+
+_loop: ControlLoop | None = None
+
+
+def _start_worker(order: DriveOrder) -> None:
+    global _loop  # noqa: PLW0603  (a process's own robot is its global state)
+    obey_parent()
+    _loop = build_loop(order)
+
+
+def _follow_in_worker(drive: Drive) -> Followed:
+    assert _loop is not None
+    return follow(_loop, drive)
+
+
+def follow(built: ControlLoop, drive: Drive) -> Followed:
+    """Drive once; the loop given stays as it is but for its robot's and policy's state."""
+    wanted = built.map
+    if drive.pid is not None:
+        changed = replace(wanted.behaviors[drive.behavior], pid=drive.pid)
+        wanted = replace(wanted, behaviors={**wanted.behaviors, drive.behavior: changed})
+    loop = ControlLoop(built.robot, built.policy, wanted, drive.seed)
+    column = built.robot.attribute_index(drive.attribute)
+    path = np.full(1 + len(drive.targets) * STEPS_EACH, np.nan)
+    fell = any(loop.advance().ended for _ in range(UNTOUCHED))
+    if not fell:
+        path[0] = loop.attributes[column]
+        for number in range(len(path) - 1):
+            record = loop.advance(_events(loop.step, drive, number))
+            path[number + 1] = record.attributes[column]
+            fell = bool(record.ended)
+            if fell:
+                break
+    return _summed_up(drive, path, fell, built.robot.attributes[column].wraps, built.robot.control_dt)
+
+
+def _events(step: int, drive: Drive, number: int) -> list[Event]:
+    """What happens before a control step, counted from the first target."""
+    if not drive.behavior or number % STEPS_EACH:
+        return []
+    target = Event(step, "target", drive.behavior, drive.targets[number // STEPS_EACH])
+    return [Event(step, "behavior", drive.behavior), target] if number == 0 else [target]
+
+
+def _summed_up(drive: Drive, path: Floats, fell: bool, wraps: bool, dt: float) -> Followed:
+    smooth = np.unwrap(path) if wraps else path
+    values = smooth[1:].reshape(len(drive.targets), STEPS_EACH)
+    errors = np.array(drive.targets)[:, None] - values
+    if wraps:
+        errors = wrap_angles(errors)
+    responses = []
+    for row in range(1, len(drive.targets)):
+        step, start = drive.targets[row] - drive.targets[row - 1], float(values[row - 1, -1])
+        if step == 0.0 or np.isnan(start):
+            continue
+        way = drive.targets[row] - start
+        aim = start + (wrap_angle(way) if wraps else way)
+        responses.append(step_response(start, values[row], aim, step, dt))
+    return Followed(drive, values, errors, tuple(responses), fell)
