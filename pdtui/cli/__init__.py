@@ -8,10 +8,12 @@ from __future__ import annotations
 import click
 
 from pdtui import __version__
+from pdtui.cli.benching import bench
 from pdtui.cli.common import OneLineErrors
 from pdtui.cli.drawing import figure
 from pdtui.cli.driving import drive, pick_and_drive, replay
-from pdtui.cli.measuring import bench, convert, dissect, evaluate, pursue, train
+from pdtui.cli.evaluating import evaluate
+from pdtui.cli.making import convert, dissect, pursue, train
 from pdtui.cli.sessions import sessions
 from pdtui.cli.tuning import tune
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from pdtui.cli.common import cores, progress_bar_or_none, show_result
+from pdtui.cli.forest import evaluate_in_forest
 
 if TYPE_CHECKING:
     from pdtui.experiments.precision import Precision
@@ -28,6 +29,7 @@ class Asked:
         as_json: print JSON.
         outputs: pictures to write.
         overwrite: whether they may replace files.
+        forest: options of the forest that were given, by name.
     """
 
     orders: Sequence[DriveOrder]
@@ -36,6 +38,7 @@ class Asked:
     as_json: bool
     outputs: tuple[Path, ...] = ()
     overwrite: bool = False
+    forest: Mapping[str, Any] = field(default_factory=dict)
 
 
 def _tracking(asked: Asked) -> None:
@@ -79,5 +82,5 @@ def _headings(result: Precision) -> Headings:
     )
 
 
-EXPERIMENTS: dict[str, Callable[[Asked], None]] = {"tracking": _tracking}
+EXPERIMENTS: dict[str, Callable[[Asked], None]] = {"tracking": _tracking, "forest": evaluate_in_forest}
 """By the name that ``--experiment`` takes."""

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from pdtui.experiments.built import built_once
 from pdtui.experiments.tasks import TaskResult, TaskRun, run_task, summarise_task
 from pdtui.robots.types import Floats
 from pdtui.sessions.events import Event
@@ -26,7 +27,6 @@ from pdtui.teleop.order import DriveOrder
 STEPS = 400
 STIMULATED_FROM = 100
 WINDOW = 200
-_LOOPS: dict[str, Any] = {}
 
 
 @dataclass(frozen=True)
@@ -148,18 +148,10 @@ _Job = tuple[DriveOrder, str, int, str]
 
 def _run_job(job: _Job) -> _Run | TaskRun:
     order, name, seed, kind = job
-    loop = _build_once(order)
+    loop = built_once(order)
     if kind == "aim":
         return run_behavior(loop, name, seed)
     return run_task(loop, loop.map.behaviors[name], seed, untouched=kind == "untouched")
-
-
-def _build_once(order: DriveOrder) -> ControlLoop:
-    """A worker keeps the loop it built: a seed's reset starts it over."""
-    if _LOOPS.get("order") != order:
-        _LOOPS.update(order=order, loop=build_loop(order))
-    loop: ControlLoop = _LOOPS["loop"]
-    return loop
 
 
 def run_behavior(built: ControlLoop, name: str, seed: int) -> _Run:

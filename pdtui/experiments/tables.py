@@ -10,6 +10,7 @@ from pdtui.experiments.bench_dissect import DissectBench
 from pdtui.experiments.bench_record import MemoryBench, RecordBench
 from pdtui.experiments.bench_screen import ScreenBench
 from pdtui.experiments.evaluate import Evaluation
+from pdtui.experiments.forest import Forest, Spread
 from pdtui.experiments.walking import Walking
 
 
@@ -82,6 +83,37 @@ def walking_table(result: Walking) -> Table:
     table.add_row("return", f"{result.mean_return:.0f} ± {result.std_return:.0f}")
     table.add_row("episodes without a fall", f"{result.finished}/{len(result.seeds)}")
     return table
+
+
+def forest_table(result: Forest) -> Group:
+    """One row a condition, figures per episode; then what was left out."""
+    measured = f", {seeds_of(result.seeds)} in {result.repeats} repeats" if result.seeds else ""
+    table = new_table(
+        f"{result.robot} in the forest, {result.steps} steps ({result.seconds:g} s) at most{measured}",
+        *("condition", "policy", "reward", "along x (m)", "collisions", "falls", "crossed"),
+        *("keys", "steps with a key"),
+    )
+    for row in result.conditions:
+        table.add_row(
+            row.condition,
+            row.policy,
+            _spread(row.reward, 0),
+            _spread(row.distance, 2),
+            _spread(row.collisions, 2),
+            f"{row.falls}/{row.episodes}",
+            f"{row.crossed}/{row.episodes}",
+            _spread(row.presses, 1),
+            _spread(row.involvement, 1),
+        )
+    said = ["mean ± standard deviation of the repeats; an episode ends at a fall or the forest's far end"]
+    if result.sessions:
+        said.append("a person's sessions: the first episode of each is a repeat")
+    said += [f"left out: {name}: {why}" for name, why in result.left_out.items()]
+    return Group(table, *said)
+
+
+def _spread(figure: Spread, digits: int) -> str:
+    return f"{figure.mean:.{digits}f} ± {figure.std:.{digits}f}"
 
 
 def bench_table(result: LoopBench) -> Table:

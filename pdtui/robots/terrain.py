@@ -10,7 +10,9 @@ from pdtui.robots.types import Floats
 
 CELL = 0.25
 """Distance between two heights, m."""
-_BEHIND, _AHEAD, _BESIDE = 4.0, 60.0, 10.0
+AHEAD = 60.0
+"""How far rough ground and forest reach along x, m."""
+_BEHIND, _BESIDE = 4.0, 10.0
 _CLEARING = 0.75
 _TRUNKS = (0.08, 0.18)
 _APART = 1.1
@@ -43,7 +45,7 @@ class Ground:
 
 def rough_ground(rng: np.random.Generator, roughness: float) -> Ground:
     """Heights uniform between 0 and `roughness` m, on 64 × 20 m; level where the robot starts."""
-    x = np.arange(-_BEHIND, _AHEAD + CELL / 2, CELL)
+    x = np.arange(-_BEHIND, AHEAD + CELL / 2, CELL)
     y = np.arange(-_BESIDE, _BESIDE + CELL / 2, CELL)
     heights = rng.uniform(0.0, roughness, (len(x), len(y)))
     heights[np.hypot(x[:, None], y[None, :]) < _CLEARING] = 0.0
@@ -61,7 +63,7 @@ def scatter_trees(rng: np.random.Generator, density: float) -> Floats:
     Returns:
         x, y and radius of each, m, shape (N, 3), sorted by x.
     """
-    low, high = np.array([_FIRST_TREE, -_BESIDE + 1.0]), np.array([_AHEAD - 1.0, _BESIDE - 1.0])
+    low, high = np.array([_FIRST_TREE, -_BESIDE + 1.0]), np.array([AHEAD - 1.0, _BESIDE - 1.0])
     wanted = round(density * float(np.prod(high - low)))
     trees = np.empty((0, 3))
     for _ in range(_TRIES * wanted):

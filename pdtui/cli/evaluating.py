@@ -1,0 +1,123 @@
+"""`pdtui evaluate`: what behaviors do, how well targets are held, what a policy does, and experiments."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from pdtui.cli.common import (
+    Seeds,
+    cores,
+    force_option,
+    json_option,
+    map_option,
+    order_of_drive,
+    policy_options,
+    progress_bar_or_none,
+    show_result,
+    workers_option,
+)
+from pdtui.cli.experiments import EXPERIMENTS, Asked
+from pdtui.cli.forest import forest_options
+from pdtui.errors import MapError
+from pdtui.policies.choices import PolicyChoices
+
+
+@click.command()
+@click.argument("robot")
+@click.argument("others", nargs=-1, metavar="[MAP.toml]...")
+@map_option
+@policy_options
+@force_option
+@click.option("--seeds", type=Seeds(), default="100-119", show_default=True)
+@click.option(
+    "--experiment",
+    type=click.Choice(list(EXPERIMENTS)),
+    help="One of the paper's experiments; it may compare several maps.",
+)
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    metavar="FILE.png|.rrd",
+    help="Draw the experiment; may be given again.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace a picture that exists already.")
+@forest_options
+@click.option(
+    "--target", metavar="ATTRIBUTE", help="Measure how precisely a target of this attribute is held."
+)
+@click.option(
+    "--policy-only", is_flag=True, help="Measure the policy without any behavior: 1000 steps a seed."
+)
+@click.option(
+    "--update",
+    is_flag=True,
+    help="Write what was measured of the behaviors into the map; its comments stay.",
+)
+@workers_option
+@json_option
+def evaluate(
+    robot: str,
+    others: tuple[str, ...],
+    map_name: str | None,
+    policy: str,
+    choices: PolicyChoices,
+    force: bool,
+    seeds: range,
+    experiment: str | None,
+    outputs: tuple[Path, ...],
+    overwrite: bool,
+    forest: dict[str, Any],
+    target: str | None,
+    policy_only: bool,
+    update: bool,
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """Measure what every behavior of ROBOT's map does, against the default.
+
+    ROBOT may be the file of a map.
+    """
+    from pdtui.experiments import evaluate as behaviors
+    from pdtui.experiments import steering_tables, tables, tracking, walking
+    from pdtui.stimulation.remeasured import update_map
+
+    if update and (policy_only or target is not None):
+        raise MapError(
+            "--update writes what was measured of behaviors; --target and --policy-only measure none"
+        )
+    if experiment is None and (others or outputs):
+        raise click.UsageError(f"{'more than one map' if others else '-o'} needs --experiment")
+    if experiment is not None and (policy_only or target is not None or update):
+        raise click.UsageError("--experiment goes with neither --target, --policy-only nor --update")
+    if forest and experiment != "forest":
+        raise click.UsageError(f"--{next(iter(forest)).removesuffix('s')} needs --experiment forest")
+    if others and (map_name or policy):
+        raise click.UsageError("maps that are compared name their policies: --map and --policy are for one")
+    order = order_of_drive(robot, map_name, policy, choices, force=force)
+    if experiment is not None:
+        rest = [order_of_drive(other, None, "", choices, force=force) for other in others]
+        asked = Asked((order, *rest), seeds, workers, as_json, outputs, overwrite, forest)
+        EXPERIMENTS[experiment](asked)
+    elif target is not None:
+        with progress_bar_or_none("holding targets", quiet=as_json) as advance:
+            tracked = tracking.evaluate_tracking(
+                order, target, seeds, workers=cores(workers), progress=advance
+            )
+        show_result(asdict(tracked), as_json, lambda: steering_tables.tracking_table(tracked))
+    elif policy_only:
+        with progress_bar_or_none("walking", quiet=as_json) as advance:
+            walked = walking.evaluate_walking(order, seeds, progress=advance)
+        show_result(asdict(walked), as_json, lambda: tables.walking_table(walked))
+    else:
+        with progress_bar_or_none("evaluating", quiet=as_json) as advance:
+            result = behaviors.evaluate_map(order, seeds, workers=cores(workers), progress=advance)
+        if update:
+            update_map(Path(order.stimulation_map.source), result.measured())
+        show_result(result.as_dict(), as_json, lambda: tables.behavior_table(result))

@@ -1,0 +1,116 @@
+"""An operator that is a program: it sees the trees, reacts late, and presses no faster than a person."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from pdtui.errors import MapError
+from pdtui.experiments.planning import Planner
+from pdtui.experiments.steering import Place, Response, predict
+from pdtui.robots.types import Floats
+from pdtui.stimulation.maps import StimulationMap
+
+REACTION = 0.3
+"""What it sees is at least this old when it acts, s."""
+PRESSES = 3
+"""At most so many key presses in any second."""
+DEFAULT = "default"
+WANTED = ("left", "right", "stop")
+"""Behaviors that it needs; it takes ``forward``, too, where a map has it."""
+_THINKS_EVERY = 5
+_LOOKS_BACK = 16
+
+
+def operator_keys(stimulation_map: StimulationMap) -> dict[str, str]:
+    """The keys that it may press, by what they do; the default key comes first.
+
+    Raises:
+        MapError: the map lacks a behavior that it needs.
+    """
+    behaviors = stimulation_map.behaviors
+    missing = [name for name in WANTED if name not in behaviors]
+    if missing:
+        known = ", ".join(behaviors) or "none"
+        raise MapError(
+            f"{stimulation_map.source}: the operator needs the behaviors {', '.join(WANTED)}; missing are "
+            f"{', '.join(missing)}, there are {known}"
+        )
+    names = [*WANTED, *(["forward"] if "forward" in behaviors else [])]
+    return {DEFAULT: stimulation_map.default_key} | {name: behaviors[name].key for name in names}
+
+
+class Operator:
+    """Decides which key to press from what it saw `REACTION` ago and from its own presses since.
+
+    It predicts where the robot is by now, and where each of some hundred schedules of keys would lead
+    (`Planner`). It remembers nothing but what it saw and pressed, so that the same sight gives the same keys.
+
+    Args:
+        responses: what each key does, by name, the default first.
+        trees: x, y and radius, m, shape (N, 3).
+        dt: s per control step.
+        periods: control steps after which a behavior ends by itself, by name.
+    """
+
+    def __init__(
+        self,
+        responses: Mapping[str, Response],
+        trees: Floats,
+        dt: float,
+        periods: Mapping[str, int] | None = None,
+    ) -> None:
+        self._names, self._responses = tuple(responses), tuple(responses.values())
+        self._planner = Planner(self._responses, trees)
+        self._dt, self._periods = dt, dict(periods or {})
+        self._delay = math.ceil(REACTION / dt - 1e-9)
+        self._second = math.ceil(1.0 / dt - 1e-9)
+        self._seen: list[tuple[float, float, float]] = []
+        self._latched: list[int] = []
+        self._pressed: list[int] = []
+
+    def look(self, x: float, y: float, heading: float) -> str:
+        """See where the robot is before the next control step, and say which key to press before it.
+
+        Returns:
+            Name of the key's behavior, ``default`` for the default key, or nothing.
+        """
+        step = len(self._seen)
+        self._seen.append((x, y, heading))
+        now = self._still_latched(step)
+        choice = self._decide(step, now)
+        self._latched.append(choice)
+        if choice == now:
+            return ""
+        self._pressed.append(step)
+        return self._names[choice]
+
+    def _decide(self, step: int, now: int) -> int:
+        old = step - self._delay
+        if old < 1 or step % _THINKS_EVERY:
+            return now
+        if len(self._pressed) >= PRESSES and step - self._pressed[-PRESSES] < self._second:
+            return now
+        return self._planner.choose(self._guess(old), now)
+
+    def _guess(self, old: int) -> Place:
+        """Where the robot is now, from how it moved up to step `old` and what was pressed since."""
+        places = np.array(self._seen[max(0, old - _LOOKS_BACK) : old + 1])
+        passed = (len(places) - 1) * self._dt
+        speed = float(np.hypot(*(places[-1, :2] - places[0, :2]))) / passed
+        x, y, heading = places[-1].tolist()
+        seen = Place(x, y, heading, speed)
+        since = np.array([self._latched[old:]])
+        there, speeds = predict(self._responses, seen, since, self._dt)
+        x, y, heading = there[0, -1].tolist()
+        return Place(x, y, heading, float(speeds[0]))
+
+    def _still_latched(self, step: int) -> int:
+        if not self._latched:
+            return 0
+        latched = self._latched[-1]
+        period = self._periods.get(self._names[latched])
+        over = period is not None and step - self._pressed[-1] >= period
+        return 0 if over else latched
