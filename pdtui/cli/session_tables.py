@@ -77,16 +77,37 @@ def show_table(session: Session, summary: SessionSummary) -> Any:
     for name, value in (
         ("length", f"{summary.steps} steps, {summary.seconds:g} s"),
         ("episodes", f"{summary.episodes}, of which {summary.falls} ended by themselves"),
-        ("human involvement", f"{summary.involvement} steps with a key"),
+        ("human involvement", _keyed(summary.involvement, summary.steps)),
         ("stimulated", f"{summary.stimulated} steps"),
         ("return", f"{summary.total_reward:.2f}"),
-        ("cost", f"{summary.total_cost:.2f}"),
+        ("collisions" if info.obstacles else "cost", f"{summary.total_cost:.{0 if info.obstacles else 2}f}"),
     ):
         figures.add_row(Text(name, "dim"), value)
     attributes = _table("attribute", "mean", "std", "unit", left=("attribute", "unit"))
     for row in summary.attributes:
         attributes.add_row(_cell(row.attribute), f"{row.mean:.3f}", f"{row.std:.3f}", _cell(row.unit))
-    return Group(facts, "", figures, "", attributes, "", _happened(session))
+    parts: list[Any] = [facts, figures, attributes, *_episodes(summary), _happened(session)]
+    return Group(parts[0], *(one for part in parts[1:] for one in ("", part)))
+
+
+def _keyed(involvement: int, steps: int) -> str:
+    return f"{involvement} steps with a key ({100.0 * involvement / max(1, steps):.1f} %)"
+
+
+def _episodes(summary: SessionSummary) -> list[Table]:
+    """One row an episode, as the screen counted it; for a robot with a way to go or obstacles."""
+    tallies = summary.tallies
+    far, hits = (
+        any(getattr(tally, name) is not None for tally in tallies) for name in ("distance", "collisions")
+    )
+    if not (far or hits):
+        return []
+    columns = ["distance"] * far + ["collisions"] * hits
+    table = _table("episode", "steps", *columns, "human involvement")
+    for tally in tallies:
+        cells = [f"{tally.distance:.2f} m"] * far + [f"{tally.collisions:g}"] * hits
+        table.add_row(str(tally.episode), str(tally.steps), *cells, _keyed(tally.involvement, tally.steps))
+    return [table]
 
 
 def _happened(session: Session) -> Table:

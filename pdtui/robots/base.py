@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.errors import RobotError
-from pdtui.robots.types import Attribute, Floats, Link, RobotSnapshot, column_of
+from pdtui.robots.types import NO_OBSTACLES, Attribute, Floats, Link, RobotSnapshot, column_of
 
 
 class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
@@ -31,7 +31,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
             have none.
         episode_steps: control steps after which training and scores end an episode.
         obstacles: upright cylinders in its way, shape (N, 3): x, y and radius, m. They stay where they are
-            until the next `reset` or `restore`.
+            until the next `reset` or `restore`; other obstacles are another array.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     starts: tuple[str, ...] = ()
     commands: Mapping[str, float] = MappingProxyType({})
     episode_steps: int = 1000
-    obstacles: Floats = np.empty((0, 3))
+    obstacles: Floats = NO_OBSTACLES
 
     @property
     @abstractmethod

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pdtui.errors import RobotError
 
 Floats = NDArray[np.float64]
+NO_OBSTACLES: Floats = np.empty((0, 3))
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ from pdtui.sessions.schema import (
     EVENTS,
     HEAT_MAP,
     MAGNITUDES,
+    OBSTACLES,
+    OBSTACLES_ABOVE,
     PATH,
     REWARD_COST_ACTION,
     ROBOT,
@@ -94,9 +96,9 @@ def _robot(info: DriveInfo, content: Content) -> rrb.Vertical:
         for timeline in (TIME, STEP)
     ]
     robot = rrb.Spatial3DView(
-        contents=[ROBOT, PATH],
+        contents=[ROBOT, PATH, OBSTACLES],
         name=f"Robot {info.robot}, policy {info.policy}; its path in the colors of the behaviors",
-        # Only the path leaves a trail; the robot is where it is.
+        # Only the path leaves a trail; the robot and the obstacles are where they are.
         overrides={
             PATH: [rr.LineStrips3D.from_fields(radii=0.02).visualizer(), rrb.VisibleTimeRanges(trails)]
         },
@@ -106,10 +108,14 @@ def _robot(info: DriveInfo, content: Content) -> rrb.Vertical:
         line_grid=True,
     )
     above = rrb.Spatial2DView(
-        contents=[PATH],
+        contents=[OBSTACLES_ABOVE, PATH],
         name="Path from above",
-        overrides={PATH: [rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(1.5)).visualizer()]},
-        time_ranges=trails,
+        overrides={
+            PATH: [
+                rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(1.5)).visualizer(),
+                rrb.VisibleTimeRanges(trails),
+            ]
+        },
         visual_bounds=_bounds(content),
     )
     return rrb.Vertical(robot, rrb.Horizontal(above, keys, column_shares=[3, 4]), row_shares=[3, 2])

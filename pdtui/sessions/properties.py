@@ -35,6 +35,7 @@ def info_to_properties(info: DriveInfo, created: str) -> dict[str, Any]:
         "policy_hash": info.policy_hash,
         "stochastic": info.stochastic,
         "start": info.start,
+        "obstacles": info.obstacles,
         "dt": info.dt,
         "layers": list(info.layers),
         "activations": info.activations,
@@ -88,8 +89,9 @@ def info_from_properties(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo
         links=_listed(properties, "links", _link),
         layers=tuple(layers),
         activations=kept,
-        # Sessions of robots with one start only were written without it.
+        # Sessions from before robots had several starts, or obstacles, do not say.
         start=_one(properties, "start", str) if "start" in properties else "",
+        obstacles=_one(properties, "obstacles", bool) if "obstacles" in properties else False,
     )
     return info, _one(properties, "created", str)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.policies.units import Stimulation
-from pdtui.robots.types import Attribute, Floats, Link
+from pdtui.robots.types import NO_OBSTACLES, Attribute, Floats, Link
 from pdtui.sessions.events import Event
 from pdtui.sessions.schema import ActivationsKept
 from pdtui.stimulation.latch import ActiveBehavior
@@ -30,6 +30,7 @@ class DriveInfo:
         dt: simulated time of a control step, s.
         attributes, links, layers: of robot and policy.
         activations: how they are recorded; no part of the run.
+        obstacles: whether there are any where the first episode starts.
     """
 
     robot: str
@@ -44,6 +45,7 @@ class DriveInfo:
     layers: tuple[int, ...]
     activations: ActivationsKept = "all"
     start: str = ""
+    obstacles: bool = False
 
 
 class StepRecord(NamedTuple):
@@ -65,6 +67,8 @@ class StepRecord(NamedTuple):
         ended: why the episode ended with this step, empty if it did not.
         diverged: whether the simulation cannot go on.
         finished: whether the robot's task is done, though it can go on.
+        obstacles: in the robot's way, as `Robot.obstacles`, shape (N, 3): the same array in every step of a
+            world, which is not recorded.
     """
 
     step: int
@@ -83,3 +87,4 @@ class StepRecord(NamedTuple):
     ended: str = ""
     diverged: bool = False
     finished: bool = False
+    obstacles: Floats = NO_OBSTACLES

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.sessions.reader import Session
+from pdtui.sessions.tally import Tallies, Tally
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class SessionSummary:
         involvement: control steps in which a key was pressed.
         total_reward, total_cost: sums over all steps, rewound ones included.
         stimulated: control steps in which units were overwritten.
+        tallies: of the episodes, in the order of their numbers.
         attributes: of the robot, in its order; an angle that wraps has no mean that means something.
     """
 
@@ -43,22 +45,33 @@ class SessionSummary:
     total_reward: float
     total_cost: float
     stimulated: int
+    tallies: tuple[Tally, ...]
     attributes: tuple[AttributeSummary, ...]
 
 
 def summarize(session: Session) -> SessionSummary:
     """Sum a session up."""
+    keyed = {event.step for event in session.events if event.key}
     return SessionSummary(
         steps=session.steps,
         seconds=session.seconds,
         episodes=int(session.episodes.max(initial=-1)) + 1,
         falls=len(session.endings),
-        involvement=len({event.step for event in session.events if event.key}),
+        involvement=len(keyed),
         total_reward=float(session.rewards.sum()),
         total_cost=float(session.costs.sum()),
         stimulated=sum(bool(stimulation.units) for stimulation in session.stimulations),
+        tallies=_tallies(session, keyed),
         attributes=_attributes(session),
     )
+
+
+def _tallies(session: Session, keyed: set[int]) -> tuple[Tally, ...]:
+    tallies = Tallies(session.info)
+    steps = zip(session.episodes.tolist(), session.costs.tolist(), session.attributes, strict=True)
+    for step, (episode, cost, attributes) in enumerate(steps):
+        tallies.add(episode, keyed=step in keyed, cost=cost, attributes=attributes)
+    return tallies.all
 
 
 def _attributes(session: Session) -> tuple[AttributeSummary, ...]:

@@ -19,6 +19,7 @@ from pdtui.sessions.blueprint import Content
 from pdtui.sessions.columns import lines, rows, texts
 from pdtui.sessions.curves import Color, Curves, HeatMap, LogStatic, Send
 from pdtui.sessions.legend import Legend
+from pdtui.sessions.obstacles import Obstacles
 from pdtui.sessions.record import DriveInfo, StepRecord
 from pdtui.sessions.schema import BEHAVIORS, HEAT_MAP, MAGNITUDES, PATH, ROBOT, TARGETS, UNITS
 from pdtui.sessions.shapes import Shapes
@@ -56,6 +57,7 @@ class Views:
         )
         self._targets: Curves[str] = Curves(TARGETS, str, self._legend.color, ("target",), send, log_static)
         self._magnitudes: Curves[str] = Curves(MAGNITUDES, str, self._legend.color, ("",), send, log_static)
+        self._obstacles = Obstacles(send, log_static)
         self._shown_units: dict[str, tuple[int, ...]] = {}
         self._left_out = False
         self._states: dict[str, tuple[str, ...]] = {name: (name,) for name in self._legend.names}
@@ -74,6 +76,7 @@ class Views:
     def add(self, records: Sequence[StepRecord]) -> None:
         """Take in control steps."""
         self._pending += len(records)
+        self._obstacles.add(records)
         for record in records:
             self._last, behaviors, stimulation = record.step, record.behaviors, record.stimulation
             state = " + ".join([behavior.name for behavior in behaviors]) if behaviors else ""
@@ -122,7 +125,8 @@ class Views:
             curves.write()
 
     def write_changes(self) -> None:
-        """Write at which steps other behaviors became active."""
+        """Write at which steps other behaviors became active, and other obstacles stood around."""
+        self._obstacles.write()
         if self._new_state:
             colors = [self._color(state) for state in self._states]
             self._log_static(BEHAVIORS, rr.StateConfiguration(values=list(self._states), colors=colors))

@@ -89,6 +89,7 @@ class ControlLoop:
             attributes=self.robot.attributes,
             links=self.robot.links,
             layers=self.policy.layers,
+            obstacles=len(self.robot.obstacles) > 0,
         )
 
     @property
@@ -147,6 +148,7 @@ class ControlLoop:
             ended,
             diverged,
             finished,
+            self.robot.obstacles,
         )
         self.step += 1
         self.latch.tick()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pdtui.robots.types import NO_OBSTACLES, Floats
 from pdtui.sessions.record import StepRecord
+from pdtui.sessions.tally import Tallies
 from pdtui.stimulation.latch import ActiveBehavior
 from pdtui.teleop.loop import ControlLoop
 from pdtui.teleop.snapshot import Snapshot, UnitView
@@ -27,6 +29,8 @@ class Observer:
         self._restarted = False
         self._episode = 0
         self._involvement = 0
+        self._tallies = Tallies(loop.info)
+        self._obstacles: Floats = NO_OBSTACLES
         self._last: StepRecord | None = None
         self.notice = ""
 
@@ -41,7 +45,9 @@ class Observer:
         if len(record.poses):
             self._path.append((float(record.poses[0, 0]), float(record.poses[0, 1]), float(row)))
         del self._history[:-_ROWS_KEPT], self._path[:-_ROWS_KEPT]
-        self._involvement += any(event.key for event in record.events)
+        keyed = any(event.key for event in record.events)
+        self._involvement += keyed
+        self._tallies.add(record.episode, keyed=keyed, cost=record.cost, attributes=record.attributes)
         for event in record.events:
             if event.kind == "rewind":
                 self.notice = f"rewound to step {int(event.value)}"
@@ -62,6 +68,8 @@ class Observer:
             stimulated = zip(last.stimulation.units, last.natural, last.stimulation.values, strict=True)
             units = tuple(UnitView(*view) for view in stimulated)
         size = len(loop.robot.attributes)
+        others = loop.robot.obstacles is not self._obstacles
+        self._obstacles = loop.robot.obstacles
         snapshot = Snapshot(
             step=loop.step,
             time=loop.step * loop.robot.control_dt,
@@ -81,6 +89,8 @@ class Observer:
             recorded_bytes=recorded_bytes,
             notice=self.notice,
             finished=finished,
+            tally=self._tallies.of(loop.episode),
+            obstacles=self._obstacles if others else None,
         )
         self._history, self._path, self._restarted, self.notice = [], [], False, ""
         return snapshot

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from pdtui.sessions.tally import NO_TALLY, Tally
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -70,6 +72,8 @@ class Snapshot:
         recorded_bytes: size of the recording.
         notice: what the user should read now (a fall, a rewind, a key that does nothing), empty if nothing.
         finished: why the drive is over, empty while it goes on.
+        tally: how the present episode stands.
+        obstacles: as `Robot.obstacles`, where they are others than in the snapshot before; else None.
     """
 
     step: int
@@ -90,3 +94,5 @@ class Snapshot:
     recorded_bytes: int = 0
     notice: str = ""
     finished: str = ""
+    tally: Tally = NO_TALLY
+    obstacles: Floats | None = None

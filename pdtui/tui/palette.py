@@ -40,6 +40,7 @@ class Palette:
         title: names of things.
         primary, accent, good, warn, bad: the theme's colours.
         alert: what must be read at once.
+        obstacle: what stands in the robot's way.
         key: a key cap that is not latched.
         behaviors: by row in the map, modulo their number.
         caps: key caps of latched behaviors, in the same order.
@@ -58,6 +59,7 @@ class Palette:
     warn: Style
     bad: Style
     alert: Style
+    obstacle: Style
     key: Style
     behaviors: tuple[Style, ...]
     caps: tuple[Style, ...]
@@ -110,6 +112,7 @@ def _palette(
         warn=style(Color.parse(warning)),
         bad=style(Color.parse(error)),
         alert=style(back, bold=True, on=Color.parse(error)),
+        obstacle=style(Color.parse(success), bold=True),
         key=style(front, bold=True, on=back.blend(front, 0.16)),
         behaviors=tuple(style(color) for color in colors),
         caps=tuple(style(back, bold=True, on=color) for color in colors),

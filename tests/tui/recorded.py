@@ -15,6 +15,8 @@ from pdtui.stimulation.maps import Aim, Behavior, Pid, Primitive, StimulationMap
 from pdtui.teleop.snapshot import Briefing, Snapshot, UnitView
 
 ARRAYS = ("activations", "attributes", "poses", "history", "path")
+ABSENT = ("obstacles", "tally")
+"""The Ant has none to show."""
 
 
 def drive_map(policy: str = "ant_sac", policy_hash: str = "0" * 64) -> StimulationMap:
@@ -48,7 +50,7 @@ def drive_map(policy: str = "ant_sac", policy_hash: str = "0" * 64) -> Stimulati
 def save(path: Path, briefing: Briefing, snapshots: list[Snapshot]) -> None:
     """Write a drive: arrays as they are, everything else as JSON."""
     plain = [
-        {name: value for name, value in vars(snapshot).items() if name not in ARRAYS}
+        {name: value for name, value in vars(snapshot).items() if name not in (*ARRAYS, *ABSENT)}
         | {"active": [asdict(view) for view in snapshot.active], "units": [asdict(u) for u in snapshot.units]}
         for snapshot in snapshots
     ]

@@ -10,24 +10,41 @@ from textual.reactive import reactive
 from textual.strip import Strip
 
 from pdtui.robots.geometry import capsule_ends, place_links, root_body, rotate
+from pdtui.robots.types import NO_OBSTACLES
+from pdtui.teleop.snapshot import Snapshot
 from pdtui.tui.camera import Camera, Floats, round_length
 from pdtui.tui.canvas import Canvas
 from pdtui.tui.panel import Panel
+from pdtui.tui.scenery import draw_from_above, draw_from_side
 from pdtui.tui.text import Row, number
 
 View = Literal["side", "above"]
 _ELEVATION: dict[View, float] = {"side": 14.0, "above": 90.0}
-_GROUND, _AXIS, _SHADOW, _HEADING, _LABEL, _FIRST_SHADE = range(6)
+_GROUND, _AXIS, _SHADOW, _HEADING, _LABEL, _OBSTACLE, _FIRST_SHADE = range(7)
 _FARTHEST = 0.55
+_AHEAD, _ASIDE = 16.0, 8.0
+"""Length and width of what is seen from above among obstacles, in extents of the robot."""
+_FORWARD = 0.27
+"""Where the middle of that picture is before the robot, in its lengths."""
+_EASING = 0.12
+"""Share of a turn that the picture follows in a frame: a gait that sways must not shake it."""
+_ARROW = 0.5
+"""Size of the heading's arrow where the picture reaches farther than the robot, in halves of what is seen."""
 _BOX_EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1]
 
 
 class RobotView(Panel):
-    """The robot from the side (x to the right, z up) or from above (x to the right, y up)."""
+    """The robot from the side (x to the right, z up) or from above (x to the right, y up).
+
+    Among obstacles, the view from above is the first, reaches farther and shows more of what is ahead.
+    """
 
     view: reactive[View] = reactive("side", init=False, repaint=False)
 
     _extent = 0.0
+    _obstacles: Floats = NO_OBSTACLES
+    _ahead: Floats | None = None
+    _looked = False
 
     def watch_view(self) -> None:
         """Look from elsewhere."""
@@ -37,6 +54,17 @@ class RobotView(Panel):
     def on_mount(self) -> None:
         """Name the panel."""
         self.border_title = f"robot · {self.view}"
+
+    def remember(self, snapshot: Snapshot) -> None:
+        if snapshot.obstacles is not None:
+            self._obstacles = snapshot.obstacles
+            if len(snapshot.obstacles) and not self._looked:
+                self._looked, self.view = True, "above"
+        if self.briefing is not None and len(self._obstacles) and len(snapshot.poses):
+            ahead = _heading(snapshot.poses[root_body(self.briefing.links)])
+            if self._ahead is None or snapshot.restarted:
+                self._ahead = ahead
+            self._ahead = self._ahead + _EASING * (ahead - self._ahead)
 
     def paint(self, width: int, height: int) -> list[Strip]:
         if self.briefing is None:
@@ -53,8 +81,14 @@ class RobotView(Panel):
         camera = self._camera(canvas, root, ends)
         self._draw_ground(canvas, camera, root)
         self._draw_shadow(canvas, camera, ends)
+        if self.view == "above":
+            draw_from_above(canvas, camera, self._obstacles, _OBSTACLE)
+        else:
+            draw_from_side(canvas, camera, self._obstacles, _OBSTACLE, behind=True)
         self._draw_heading(canvas, camera, root)
         self._draw_links(canvas, camera, placed, ends)
+        if self.view == "side":
+            draw_from_side(canvas, camera, self._obstacles, _OBSTACLE, behind=False)
         place = f"x {number(float(root[0]))}  y {number(float(root[1]))}  z {number(float(root[2]))} m"
         canvas.text(width - len(place), height - 1, place, _LABEL)
         return canvas.strips(self._styles())
@@ -82,6 +116,7 @@ class RobotView(Panel):
             palette.faint,
             palette.accent,
             palette.muted,
+            palette.obstacle,
             *palette.depth,
         ]
 
@@ -91,11 +126,16 @@ class RobotView(Panel):
         radii = np.array([_radius(link.size) for link in self.briefing.links])
         stretch = np.linalg.norm(ends - root[:3], axis=-1).max(axis=-1) + radii
         self._extent = max(self._extent, float(stretch.max()))
-        extent = self._extent
+        extent, centre = self._extent, (canvas.width / 2, canvas.height / 2)
+        if self.view == "above" and len(self._obstacles) and self._ahead is not None:
+            zoom = min(canvas.width / _AHEAD, canvas.height / _ASIDE) / extent
+            seen = np.array([canvas.width, canvas.height]) / zoom
+            x, y = root[:2] + _FORWARD * seen * self._ahead
+            return Camera((float(x), float(y), 0.0), 90.0, _AHEAD / 2 * extent, zoom, centre)
         if self.view == "above":
             zoom = min(canvas.width, canvas.height) / (2.5 * extent)
             middle = (float(root[0]), float(root[1]), 0.0)
-            return Camera(middle, 90.0, extent, zoom, (canvas.width / 2, canvas.height / 2))
+            return Camera(middle, 90.0, extent, zoom, centre)
         zoom = min(canvas.width / (2.15 * extent), canvas.height / (1.5 * extent))
         middle = (float(root[0]), float(root[1]), 0.45 * extent)
         return Camera(middle, _ELEVATION["side"], extent, zoom, (canvas.width / 2, canvas.height * 0.47))
@@ -126,16 +166,16 @@ class RobotView(Panel):
 
     def _draw_heading(self, canvas: Canvas, camera: Camera, root: Floats) -> None:
         """Where the robot's own x axis points, as an arrow on the ground."""
-        ahead = rotate(root[3:], np.array([1.0, 0.0, 0.0])) * np.array([1.0, 1.0, 0.0])
-        length = float(np.linalg.norm(ahead))
-        if length < 1e-6:
+        x, y = _heading(root)
+        if not (x or y):
             return
-        ahead /= length
-        left = np.array([-ahead[1], ahead[0], 0.0])
+        ahead, left = np.array([x, y, 0.0]), np.array([-y, x, 0.0])
         start = root[:3] * np.array([1.0, 1.0, 0.0])
-        tip = start + ahead * camera.extent * 1.12
-        barbs = [tip - (ahead * 0.2 + side * left * 0.14) * camera.extent for side in (1, -1)]
-        lines = np.array([[start + ahead * camera.extent * 0.8, tip], [tip, barbs[0]], [tip, barbs[1]]])
+        size = max(self._extent, _ARROW * camera.extent)
+        tail = start + ahead * self._extent * 0.8
+        tip = tail + ahead * size * 0.32
+        barbs = [tip - (ahead * 0.2 + side * left * 0.14) * size for side in (1, -1)]
+        lines = np.array([[tail, tip], [tip, barbs[0]], [tip, barbs[1]]])
         dots, _, before = camera.project(lines)
         if before.all():
             canvas.segments(dots[:, 0], dots[:, 1], _HEADING)
@@ -146,7 +186,7 @@ class RobotView(Panel):
         dots, magnification, before = camera.project(ends)
         depth = camera.depth(ends.mean(axis=-2))
         shades = len(self.palette.depth)
-        shade = np.clip((0.5 - depth / camera.extent * 0.8) * shades, 0, shades - 1).astype(int)
+        shade = np.clip((0.5 - depth / self._extent * 0.8) * shades, 0, shades - 1).astype(int)
         for row in np.argsort(-depth, kind="stable"):
             if not before[row].all():
                 continue
@@ -165,6 +205,13 @@ class RobotView(Panel):
         if before.all():
             edges = np.array(_BOX_EDGES)
             canvas.segments(dots[edges[:, 0]], dots[edges[:, 1]], ink)
+
+
+def _heading(root: Floats) -> Floats:
+    """Where a pose's own x axis points on the ground, shape (2,); zeros where it points up or down."""
+    ahead: Floats = rotate(root[3:], np.array([1.0, 0.0, 0.0]))[:2]
+    length = float(np.linalg.norm(ahead))
+    return ahead / length if length > 1e-6 else np.zeros(2)
 
 
 def _radius(size: tuple[float, ...]) -> float:

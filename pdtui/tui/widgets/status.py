@@ -9,9 +9,10 @@ from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
+from pdtui.sessions.tally import NO_TALLY
 from pdtui.text import plain, size_of
 from pdtui.tui.panel import Panel
-from pdtui.tui.text import Row, number
+from pdtui.tui.text import Row, fit, number
 
 _NAME = 40
 Part = tuple[str, Style]
@@ -90,15 +91,37 @@ class NoticeLine(Panel):
 
     def paint(self, width: int, height: int) -> list[Strip]:
         del height
-        row = Row(width)
+        palette, row, counters = self.palette, Row(width), self._counters()
         finished = self.snapshot.finished if self.snapshot is not None else ""
         if finished:
-            row.add(f" ■ the drive is over: {plain(finished)}   {self.hints} ", self.palette.alert)
+            said, style = f" ■ the drive is over: {plain(finished)}   {self.hints} ", palette.alert
         elif self.notice:
-            row.add(" ▌ ", self.palette.warn).add(plain(self.notice), self.palette.title)
+            row.add(" ▌ ", palette.warn)
+            said, style = plain(self.notice), palette.title
         else:
-            row.add(" ▌ ", self.palette.faint).add(self._summary(), self.palette.muted)
+            row.add(" ▌ ", palette.faint)
+            said, style = self._summary(), palette.muted
+        room = row.left - cell_len(counters) - 2
+        urgent = bool(finished or self.notice)
+        if counters and (not urgent or cell_len(said) <= room):
+            said = said if urgent else fit(said, room)
+            row.add(said, style).add(" " * (room - cell_len(said) + 1), palette.text)
+            row.add(counters, palette.text)
+        else:
+            row.add(said, style)
         return [row.strip()]
+
+    def _counters(self) -> str:
+        """How the episode stands, for a robot with a way to go or obstacles to run into."""
+        tally = self.snapshot.tally if self.snapshot is not None else NO_TALLY
+        shown = [] if tally.distance is None else [f"{number(tally.distance)} m"]
+        if tally.collisions is not None:
+            shown.append(f"{tally.collisions:g} collision{'' if tally.collisions == 1.0 else 's'}")
+        if not shown:
+            return ""
+        steps = "1 step" if tally.involvement == 1 else f"{tally.involvement} steps"
+        keyed = f"{steps} with a key ({100.0 * tally.share:.1f} %)"
+        return f"episode {tally.episode}: {' · '.join([*shown, keyed])}"
 
     def _summary(self) -> str:
         """What is there to say when nothing happened."""
@@ -106,6 +129,8 @@ class NoticeLine(Panel):
             return "pdtui is ready when the policy is"
         briefing = self.briefing
         place = plain(briefing.recording) or "not recorded"
+        if self._counters():
+            return f"seed {briefing.seed} · {place}"
         share = 100.0 * self.snapshot.involvement / max(1, self.snapshot.step)
         keyed = f"{self.snapshot.involvement} steps with a key ({share:.1f} %)"
         return f"seed {briefing.seed} · episode {self.snapshot.episode} · {keyed} · {place}"

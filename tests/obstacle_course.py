@@ -1,0 +1,76 @@
+"""A small world with obstacles, other ones in every episode, to be seen and counted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from pdtui.policies.decoders import decoder_for
+from pdtui.policies.network import NetworkSpec, PolicyNetwork
+from pdtui.policies.runtime import Policy
+from pdtui.robots.base import Robot
+from pdtui.robots.types import Attribute, Floats, Link, RobotSnapshot
+from pdtui.stimulation.maps import Behavior, StimulationMap
+from pdtui.teleop.loop import ControlLoop
+
+COUNT = 4
+_PACE = 0.25
+
+
+class Course(Robot):
+    """A ball that rolls along x through posts which stand in a row, and counts those that it reaches."""
+
+    name = "course"
+    title = "Course"
+    attributes = (Attribute("vx", "m/s"), Attribute("distance", "m"))
+    links = (Link("ball", 0, "sphere", (0.1,), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),)
+    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float64)
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,))
+    control_dt = 0.05
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Floats, dict[str, Any]]:
+        super().reset(seed=seed, options=options)
+        self.x = 0.0
+        x = 1.0 + np.arange(COUNT) + self.np_random.uniform(0.0, 0.5, COUNT)
+        self.obstacles = np.column_stack([x, np.zeros(COUNT), self.np_random.uniform(0.1, 0.2, COUNT)])
+        return self.observe(), {}
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+        del action
+        before, self.x = self.x, self.x + _PACE
+        reached = (self.obstacles[:, 0] > before) & (self.obstacles[:, 0] <= self.x)
+        return self.observe(), 1.0, False, False, {"cost": float(reached.sum())}
+
+    def observe(self) -> Floats:
+        return np.array([self.x])
+
+    def read_attributes(self) -> Floats:
+        return np.array([_PACE / self.control_dt, self.x])
+
+    def read_poses(self) -> Floats:
+        return np.array([[self.x, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0]])
+
+    def snapshot(self) -> RobotSnapshot:
+        return RobotSnapshot(self.name, self.observe(), (self.obstacles,), self.np_random.bit_generator.state)
+
+    def restore(self, snapshot: RobotSnapshot) -> None:
+        self.x, (self.obstacles,) = float(snapshot.state[0]), snapshot.extras
+        self.np_random.bit_generator.state = snapshot.rng
+
+    def digest(self) -> int:
+        return int(self.x * 1000) + int(self.obstacles.sum() * 1e9)
+
+
+def course_loop(seed: int = 3) -> ControlLoop:
+    """A drive of it, with one behavior on the key w."""
+    torch.manual_seed(1)
+    network = PolicyNetwork(NetworkSpec("course", 1, (8,), "tanh", 1, "squashed_gaussian", (-1.0,), (1.0,)))
+    policy = Policy(network, 1, decode=decoder_for(network), name="small")
+    push = Behavior("push", "w", "pushes", {"0:3": 1.0})
+    return ControlLoop(
+        Course(), policy, StimulationMap("course", "small", "", "space", {}, {"push": push}), seed
+    )
