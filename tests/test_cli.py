@@ -156,6 +156,25 @@ def test_a_map_of_another_policy_needs_force(
     assert run("drive", "ant", "--map", other, "--headless", "--steps", 5, "--force").exit_code == 0
 
 
+def test_a_robot_without_a_map_is_driven_by_its_policy_alone(tmp_path: Path) -> None:
+    policy = Path(__file__).parent / "fixtures" / "sb3-pendulum.zip"
+    keys, session = tmp_path / "keys.txt", tmp_path / "out.rrd"
+    keys.write_text("5 space\n12 r\n")
+    drive = ("drive", "Pendulum-v1", "--headless", "--steps", 20, "--keys", keys, "--record", session)
+    refused = run(*drive)
+    assert refused.exit_code == 1
+    assert "no map 'Pendulum-v1'" in refused.output
+    alone = run(*drive, "--policy", policy)
+    assert alone.exit_code == 0, alone.output
+    assert "no map 'Pendulum-v1'" in alone.stderr
+    assert "driving without behaviors" in alone.stderr
+    assert "steps with a key 2" in alone.stdout
+    assert "identical: 20 steps" in run("replay", session).output
+    measured = run("evaluate", "Pendulum-v1", "--policy", policy, "--seeds", "1", "--workers", 1)
+    assert measured.exit_code == 1
+    assert "no map 'Pendulum-v1'" in measured.output
+
+
 def test_a_divergence_is_one_line_and_leaves_the_session(
     map_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

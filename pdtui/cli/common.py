@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pdtui.errors import PdtuiError
+from pdtui.errors import MapError, PdtuiError
 from pdtui.policies.choices import ACTIVATION_NAMES, NO_CHOICES, SQUASH_NAMES, PolicyChoices
 from pdtui.text import plain
 
 if TYPE_CHECKING:
+    from pdtui.stimulation.maps import StimulationMap
     from pdtui.teleop.order import DriveOrder
 
 
@@ -121,8 +122,10 @@ def order_of_drive(
     choices: PolicyChoices = NO_CHOICES,
     *,
     seed: int = 0,
+    without_map: bool = False,
     **options: Any,
 ) -> DriveOrder:
+    """The drive that the options ask for; `without_map`: of a policy alone, where its robot has no map."""
     from pdtui.robots import check_robot, file_stem, trust_module
     from pdtui.stimulation.library import find_map
     from pdtui.stimulation.mapfile import load_map
@@ -136,8 +139,25 @@ def order_of_drive(
         # Typed by the user, unlike the name inside a map.
         trust_module(robot)
         check_robot(robot)
-        stimulation_map = load_map(find_map(map_name or file_stem(robot)))
+        stimulation_map = _map_of(
+            robot, map_name or file_stem(robot), policy if without_map and map_name is None else ""
+        )
     return DriveOrder(check_robot(robot), settle(stimulation_map, policy, choices), seed, **options)
+
+
+def _map_of(robot: str, name: str, policy: str) -> StimulationMap:
+    """The map of this name; none needs to be there for a policy that is to drive alone."""
+    from pdtui.stimulation.library import bare_map, find_map
+    from pdtui.stimulation.mapfile import load_map
+
+    try:
+        path = find_map(name)
+    except MapError as error:
+        if not policy:
+            raise
+        click.echo(plain(f"{error}; driving without behaviors"), err=True)
+        return bare_map(robot, policy)
+    return load_map(path)
 
 
 def cores(workers: int | None) -> int:

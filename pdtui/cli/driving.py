@@ -95,6 +95,7 @@ def drive(
         stochastic=stochastic,
         start=start,
         activations=activations,
+        without_map=True,
     )
     if record is not None and record.exists():
         raise SessionError(f"{record}: exists already; a drive is recorded into a new file")

@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import tomlkit
+
 from pdtui.errors import MapError
-from pdtui.stimulation.mapfile import load_map
-from pdtui.stimulation.maps import StimulationMap
+from pdtui.stimulation.mapfile import load_map, parse_map
+from pdtui.stimulation.maps import SCHEMA, StimulationMap
 
 
 def shipped_folder(kind: str) -> Path:
@@ -39,6 +41,12 @@ def find_map(name: str) -> Path:
             return folder / f"{name}.toml"
     known = ", ".join(sorted({path.stem for path in _all_paths()})) or "none"
     raise MapError(f"no map '{name}'; there are {known}")
+
+
+def bare_map(robot: str, policy: str) -> StimulationMap:
+    """A map without behaviors, for a robot that has none yet: the policy is on its own."""
+    text = tomlkit.dumps({"schema": SCHEMA, "robot": robot, "policy": {"name": policy, "sha256": ""}})
+    return parse_map(text, f"the map of {robot} without behaviors")
 
 
 @dataclass(frozen=True)

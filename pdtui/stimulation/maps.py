@@ -195,13 +195,15 @@ class StimulationMap:
         """See that the map fits a policy.
 
         Raises:
-            MapError: another robot, another policy (unless forced), or a unit that does not exist.
+            MapError: another robot, another policy (unless forced), or a unit that does not exist. Without
+                behaviors, a map need not say which policy it is for.
         """
         from pdtui.errors import PolicyError
 
         if self.robot != robot:
             raise MapError(f"{self.source}: made for robot '{self.robot}', not for '{robot}'")
-        if self.policy_hash != policy_hash and not force:
+        said = self.policy_hash or self.behaviors
+        if said and self.policy_hash != policy_hash and not force:
             raise MapError(
                 f"{self.source}: made for a policy with SHA-256 {self.policy_hash[:12]}…, "
                 f"the policy here has {policy_hash[:12]}…; --force drives all the same"

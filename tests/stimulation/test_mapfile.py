@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from pdtui.errors import MapError
-from pdtui.stimulation.library import find_map, list_maps
+from pdtui.stimulation.library import bare_map, find_map, list_maps
 from pdtui.stimulation.mapfile import load_map, parse_map
 from pdtui.stimulation.maps import Aim, Measured, Pid, StimulationMap
 
@@ -106,3 +107,14 @@ def test_mistakes_in_a_table_of_its_own_lines_are_named(map_text: str) -> None:
     text = map_text.replace('magnitudes = { "1:2" = -3.0 }\nperiod = 0.5\ntogether = ["push"]\n', lines)
     with pytest.raises(MapError, match="'0:2': expected a finite number, found 'x'"):
         parse_map(text, "m")
+
+
+def test_only_a_map_without_behaviors_may_leave_its_policy_open(small_map: StimulationMap) -> None:
+    bare = bare_map("my robot", 'runs/"best".safetensors')
+    assert (bare.robot, bare.policy) == ("my robot", 'runs/"best".safetensors')
+    bare.check("my robot", (16, 16), "f" * 64)
+    with pytest.raises(MapError, match="made for robot 'my robot'"):
+        bare.check("ant", (16, 16), "f" * 64)
+    for kept in (replace(bare, policy_hash="0" * 64), replace(small_map, policy_hash="")):
+        with pytest.raises(MapError, match="made for a policy with SHA-256"):
+            kept.check(kept.robot, (16, 16), "f" * 64)

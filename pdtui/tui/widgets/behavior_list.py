@@ -30,6 +30,8 @@ class BehaviorList(Panel):
     def paint(self, width: int, height: int) -> list[Strip]:
         active = {view.name: view for view in self.snapshot.active} if self.snapshot is not None else {}
         behaviors = list(self.map.behaviors.values())
+        if not behaviors:
+            return [Row(width).add("none: the map has no behaviors", self.palette.faint).strip()]
         names = [plain(behavior.name) for behavior in behaviors]
         keys = [key_name(behavior.key) for behavior in behaviors]
         key_width = max((cell_len(key) for key in keys), default=0) + 2
