@@ -43,4 +43,5 @@ def draw_from_side(canvas: Canvas, camera: Camera, obstacles: Floats, ink: int, 
 
 
 def _on_ground(obstacles: Floats) -> Floats:
-    return obstacles * np.array([1.0, 1.0, 0.0])
+    places: Floats = obstacles * np.array([1.0, 1.0, 0.0])
+    return places

@@ -69,7 +69,8 @@ async def test_a_drive_among_obstacles_begins_from_above(
         await pilot.press("v")
         link.messages.append(replace(rest[2], obstacles=ahead + 1.0))
         await played(pilot, link)
-        assert robot.view == "side", "what the user chose stays"
+        chosen: str = robot.view
+        assert chosen == "side", "what the user chose stays"
 
 
 @pytest.mark.parametrize("size", [(80, 24), (160, 48)])
