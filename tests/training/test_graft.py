@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import torch
@@ -25,7 +26,7 @@ def test_it_acts_the_same_whatever_the_new_inputs_are() -> None:
     state = graft(learner, learner.init(1), actor_of(network), seen)
     mean = np.tanh(network(torch.from_numpy(seen[:, :3])).detach().numpy()[:, :2])
     assert np.abs(numpy_actor(learner.folded_actor(state), None)(seen) - mean).max() < 1e-4
-    still = state._replace(log_std=np.full(2, -30.0))
+    still = state._replace(log_std=jnp.full(2, -30.0))
     assert np.abs(np.tanh(act(still, seen, np.random.default_rng(0))) - mean).max() < 1e-4
     spec = NetworkSpec("x", 5, (8, 6), "tanh", 2, "squashed_gaussian", (-1.0, -1.0), (1.0, 1.0))
     saved = to_network(learner.folded_actor(state), spec)
