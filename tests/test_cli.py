@@ -96,7 +96,7 @@ def test_bench_prints_all_parts(map_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["drive", "qqqqqqqq"], "pdtui: unknown robot 'qqqqqqqq'; there are a1, ant"),
+        (["drive", "qqqqqqqq"], "pdtui: unknown robot 'qqqqqqqq'; there are a1, a1-vision"),
         (["drive", "ant", "--map", "nowhere.toml"], "pdtui: nowhere.toml: no such map"),
         (
             ["drive", "ant", "--map", "MAP"],

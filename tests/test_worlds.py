@@ -176,7 +176,7 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
     assert "shape (17,)" in unfit.output
     assert "shape (11,)" in unfit.output
     trained = run("train", "Hopper-v5", "--folder", tmp_path / "runs")
-    assert "pdtui: expected one of pdtui's own robots (a1, ant, anymal, " in trained.output
+    assert "pdtui: expected one of pdtui's own robots (a1, a1-vision, ant, anymal, " in trained.output
 
 
 def test_a_map_does_not_choose_modules_to_import(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
