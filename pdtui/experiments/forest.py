@@ -9,14 +9,13 @@ from __future__ import annotations
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from pdtui.errors import PdtuiError, PolicyError, SessionError
 from pdtui.experiments.built import built_once
+from pdtui.experiments.forest_results import Forest, summarise
 from pdtui.experiments.forest_runs import (
     FOREST,
     ROUGH,
@@ -46,78 +45,6 @@ PERSON = "state with a person"
 STEPS, REPEATS = 1000, 5
 TRIED_SEEDS, TRIED_STEPS = tuple(range(900, 906)), 700
 """Of the drives on rough ground from which the operator learns what its keys do."""
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Mean over repeats, and their standard deviation (n − 1); NaN for a single repeat."""
-
-    mean: float
-    std: float
-
-
-@dataclass(frozen=True)
-class ConditionResult:
-    """One condition over all repeats; figures are per episode.
-
-    Attributes:
-        condition: in words.
-        policy: name of the weights.
-        reward: return.
-        distance: along x, m.
-        collisions: trees that the robot ran into.
-        presses: keys pressed.
-        involvement: control steps before which a key was pressed.
-        falls: episodes that ended with a fall, of `episodes`.
-        crossed: episodes that reached the forest's far end.
-        episodes: in all.
-        runs: every episode.
-    """
-
-    condition: str
-    policy: str
-    reward: Spread
-    distance: Spread
-    collisions: Spread
-    presses: Spread
-    involvement: Spread
-    falls: int
-    crossed: int
-    episodes: int
-    runs: tuple[ForestRun, ...]
-
-
-@dataclass(frozen=True)
-class Forest:
-    """All conditions that were measured.
-
-    Attributes:
-        robot: that was driven.
-        seeds: of the forests; empty where only sessions were scored.
-        repeats: into which the seeds are divided in their order.
-        steps: control steps an episode lasts at most.
-        seconds: the same in simulated time.
-        conditions: in the order in which they are printed.
-        left_out: conditions that were not measured, and why.
-        keys: what the operator found out about its keys; empty without it.
-        key_seeds: on which.
-        sessions: files that were scored.
-    """
-
-    robot: str
-    seeds: tuple[int, ...]
-    repeats: int
-    steps: int
-    seconds: float
-    conditions: tuple[ConditionResult, ...]
-    left_out: dict[str, str]
-    keys: dict[str, Response]
-    key_seeds: tuple[int, ...]
-    sessions: tuple[str, ...]
-
-    def as_dict(self) -> dict[str, Any]:
-        """The form that ``--json`` prints."""
-        return asdict(self)
 
 
 def evaluate_forest(
@@ -184,10 +111,10 @@ def evaluate_forest(
             for run in run_all(_run_episode, jobs):
                 runs[condition].append(run)
                 done = _tell(progress, done, total)
-    measured = [_summarise(CONDITIONS[one], orders[one].policy or policy, runs[one], repeats) for one in runs]
+    measured = [summarise(CONDITIONS[one], orders[one].policy or policy, runs[one], repeats) for one in runs]
     if people:
         driven = ", ".join(sorted({session_policy for _, _, session_policy in people}))
-        measured.append(_summarise(PERSON, driven, [run for _, run, _ in people], len(people)))
+        measured.append(summarise(PERSON, driven, [run for _, run, _ in people], len(people)))
     return Forest(
         name,
         tuple(seeds) if conditions else (),
@@ -266,23 +193,3 @@ def _tell(progress: Callable[[int, int], None] | None, done: int, total: int) ->
     if progress is not None:
         progress(done + 1, total)
     return done + 1
-
-
-def _summarise(condition: str, policy: str, runs: Sequence[ForestRun], repeats: int) -> ConditionResult:
-    def spread(name: str) -> Spread:
-        values = np.array([float(getattr(run, name)) for run in runs]).reshape(repeats, -1).mean(axis=1)
-        return Spread(float(values.mean()), float(values.std(ddof=1)) if repeats > 1 else float("nan"))
-
-    return ConditionResult(
-        condition,
-        policy,
-        spread("reward"),
-        spread("distance"),
-        spread("collisions"),
-        spread("presses"),
-        spread("pressed_steps"),
-        sum(run.fell for run in runs),
-        sum(run.crossed for run in runs),
-        len(runs),
-        tuple(runs),
-    )

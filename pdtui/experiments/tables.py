@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from rich.console import Group
 from rich.table import Table
 
@@ -10,7 +12,7 @@ from pdtui.experiments.bench_dissect import DissectBench
 from pdtui.experiments.bench_record import MemoryBench, RecordBench
 from pdtui.experiments.bench_screen import ScreenBench
 from pdtui.experiments.evaluate import Evaluation
-from pdtui.experiments.forest import Forest, Spread
+from pdtui.experiments.forest_results import Forest, Spread
 from pdtui.experiments.walking import Walking
 
 
@@ -86,25 +88,21 @@ def walking_table(result: Walking) -> Table:
 
 
 def forest_table(result: Forest) -> Group:
-    """One row a condition, figures per episode; then what was left out."""
+    """One column a condition, figures per episode; then what was left out."""
     measured = f", {seeds_of(result.seeds)} in {result.repeats} repeats" if result.seeds else ""
+    rows = result.conditions
     table = new_table(
         f"{result.robot} in the forest, {result.steps} steps ({result.seconds:g} s) at most{measured}",
-        *("condition", "policy", "reward", "along x (m)", "collisions", "falls", "crossed"),
-        *("keys", "steps with a key"),
+        *("per episode", *(row.condition for row in rows)),
     )
-    for row in result.conditions:
-        table.add_row(
-            row.condition,
-            row.policy,
-            _spread(row.reward, 0),
-            _spread(row.distance, 2),
-            _spread(row.collisions, 2),
-            f"{row.falls}/{row.episodes}",
-            f"{row.crossed}/{row.episodes}",
-            _spread(row.presses, 1),
-            _spread(row.involvement, 1),
-        )
+    table.add_row("policy", *(row.policy for row in rows))
+    table.add_row("reward", *(_spread(row.reward, 0) for row in rows))
+    table.add_row("distance along x (m)", *(_spread(row.distance, 2) for row in rows))
+    table.add_row("collisions", *(_spread(row.collisions, 2) for row in rows))
+    table.add_row("keys", *(_spread(row.presses, 1) for row in rows))
+    table.add_row("steps with a key", *(_spread(row.involvement, 1) for row in rows))
+    table.add_row("falls", *(f"{row.falls}/{row.episodes}" for row in rows))
+    table.add_row("crossed the forest", *(f"{row.crossed}/{row.episodes}" for row in rows))
     said = ["mean ± standard deviation of the repeats; an episode ends at a fall or the forest's far end"]
     if result.sessions:
         said.append("a person's sessions: the first episode of each is a repeat")
@@ -113,7 +111,8 @@ def forest_table(result: Forest) -> Group:
 
 
 def _spread(figure: Spread, digits: int) -> str:
-    return f"{figure.mean:.{digits}f} ± {figure.std:.{digits}f}"
+    spread = "" if math.isnan(figure.std) else f" ± {figure.std:.{digits}f}"
+    return f"{figure.mean:.{digits}f}{spread}"
 
 
 def bench_table(result: LoopBench) -> Table:

@@ -1,0 +1,106 @@
+"""What the forest experiment found: figures of each condition, over repeats."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from pdtui.experiments.forest_runs import ForestRun
+from pdtui.experiments.steering import Response
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean over repeats, and their standard deviation (n − 1); NaN for a single repeat."""
+
+    mean: float
+    std: float
+
+
+@dataclass(frozen=True)
+class ConditionResult:
+    """One condition over all repeats; figures are per episode.
+
+    Attributes:
+        condition: in words.
+        policy: name of the weights.
+        reward: return.
+        distance: along x, m.
+        collisions: trees that the robot ran into.
+        presses: keys pressed.
+        involvement: control steps before which a key was pressed.
+        falls: episodes that ended with a fall, of `episodes`.
+        crossed: episodes that reached the forest's far end.
+        episodes: in all.
+        runs: every episode.
+    """
+
+    condition: str
+    policy: str
+    reward: Spread
+    distance: Spread
+    collisions: Spread
+    presses: Spread
+    involvement: Spread
+    falls: int
+    crossed: int
+    episodes: int
+    runs: tuple[ForestRun, ...]
+
+
+@dataclass(frozen=True)
+class Forest:
+    """All conditions that were measured.
+
+    Attributes:
+        robot: that was driven.
+        seeds: of the forests; empty where only sessions were scored.
+        repeats: into which the seeds are divided in their order.
+        steps: control steps an episode lasts at most.
+        seconds: the same in simulated time.
+        conditions: in the order in which they are printed.
+        left_out: conditions that were not measured, and why.
+        keys: what the operator found out about its keys; empty without it.
+        key_seeds: on which.
+        sessions: files that were scored.
+    """
+
+    robot: str
+    seeds: tuple[int, ...]
+    repeats: int
+    steps: int
+    seconds: float
+    conditions: tuple[ConditionResult, ...]
+    left_out: dict[str, str]
+    keys: dict[str, Response]
+    key_seeds: tuple[int, ...]
+    sessions: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The form that ``--json`` prints."""
+        return asdict(self)
+
+
+def summarise(condition: str, policy: str, runs: Sequence[ForestRun], repeats: int) -> ConditionResult:
+    """The figures of one condition; consecutive runs make a repeat."""
+
+    def spread(name: str) -> Spread:
+        values = np.array([float(getattr(run, name)) for run in runs]).reshape(repeats, -1).mean(axis=1)
+        return Spread(float(values.mean()), float(values.std(ddof=1)) if repeats > 1 else float("nan"))
+
+    return ConditionResult(
+        condition,
+        policy,
+        spread("reward"),
+        spread("distance"),
+        spread("collisions"),
+        spread("presses"),
+        spread("pressed_steps"),
+        sum(run.fell for run in runs),
+        sum(run.crossed for run in runs),
+        len(runs),
+        tuple(runs),
+    )
