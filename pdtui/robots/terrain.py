@@ -14,8 +14,8 @@ AHEAD = 60.0
 """How far rough ground and forest reach along x, m."""
 _BEHIND, _BESIDE = 4.0, 10.0
 _CLEARING = 0.75
-_TRUNKS = (0.08, 0.18)
-_APART = 1.1
+_TRUNKS = (0.15, 0.35)
+_GAP = 0.9
 _FIRST_TREE = 2.5
 _TRIES = 30
 
@@ -54,7 +54,7 @@ def rough_ground(rng: np.random.Generator, roughness: float) -> Ground:
 
 
 def scatter_trees(rng: np.random.Generator, density: float) -> Floats:
-    """Trees on the rough ground from 2.5 m ahead of the start on, no two closer than 1.1 m.
+    """Trees on the rough ground from 2.5 m ahead of the start on, with at least 0.9 m between any two.
 
     Args:
         rng: draws them.
@@ -69,7 +69,7 @@ def scatter_trees(rng: np.random.Generator, density: float) -> Floats:
     for _ in range(_TRIES * wanted):
         if len(trees) == wanted:
             break
-        place = rng.uniform(low, high)
-        if (np.hypot(*(trees[:, :2] - place).T) >= _APART).all():
-            trees = np.vstack([trees, [*place, rng.uniform(*_TRUNKS)]])
+        place, radius = rng.uniform(low, high), rng.uniform(*_TRUNKS)
+        if (np.hypot(*(trees[:, :2] - place).T) - trees[:, 2] - radius >= _GAP).all():
+            trees = np.vstack([trees, [*place, radius]])
     return trees[np.argsort(trees[:, 0])]
