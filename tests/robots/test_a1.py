@@ -176,7 +176,7 @@ def test_a_forest_is_rough_ground_with_trees_that_it_does_not_feel() -> None:
         np.testing.assert_array_equal(rough.step(action)[0], forest.step(action)[0])
     apart = np.hypot(*(forest.obstacles[1:, None, :2] - forest.obstacles[None, :, :2]).T)
     radii = forest.obstacles[:, 2]
-    gaps = apart - radii[1:, None] - radii[None, :]
+    gaps = apart - radii[:, None] - radii[None, 1:]
     assert gaps[apart > 0].min() > 0.89
     before = forest.obstacles
     forest.reset(seed=12)
