@@ -115,6 +115,11 @@ def judging_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return judged
 
 
+start_option = click.option(
+    "--start", default="", metavar="STATE", help="Where episodes start, for a robot with several states."
+)
+
+
 def order_of_drive(
     robot: str,
     map_name: str | None,

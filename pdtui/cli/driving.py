@@ -17,6 +17,7 @@ from pdtui.cli.common import (
     order_of_drive,
     policy_options,
     progress_bar_or_none,
+    start_option,
 )
 from pdtui.errors import EventError, ScreenError, SessionError
 from pdtui.policies.choices import PolicyChoices
@@ -37,9 +38,7 @@ if TYPE_CHECKING:
 @click.option(
     "--stochastic", is_flag=True, help="Draw actions from the policy's distribution instead of its mean."
 )
-@click.option(
-    "--start", default="", metavar="STATE", help="Where episodes start, for a robot with several states."
-)
+@start_option
 @click.option(
     "--record", type=click.Path(path_type=Path), help="Session file; default: a new one in ./sessions."
 )

@@ -18,6 +18,7 @@ from pdtui.cli.common import (
     policy_options,
     progress_bar_or_none,
     show_result,
+    start_option,
     workers_option,
 )
 from pdtui.cli.experiments import EXPERIMENTS, Asked
@@ -53,8 +54,9 @@ from pdtui.policies.choices import PolicyChoices
     "--target", metavar="ATTRIBUTE", help="Measure how precisely a target of this attribute is held."
 )
 @click.option(
-    "--policy-only", is_flag=True, help="Measure the policy without any behavior: 1000 steps a seed."
+    "--policy-only", is_flag=True, help="Measure the policy without any behavior, an episode a seed."
 )
+@start_option
 @click.option(
     "--update",
     is_flag=True,
@@ -76,6 +78,7 @@ def evaluate(
     forest: dict[str, Any],
     target: str | None,
     policy_only: bool,
+    start: str,
     update: bool,
     workers: int | None,
     as_json: bool,
@@ -98,9 +101,11 @@ def evaluate(
         raise click.UsageError("--experiment goes with neither --target, --policy-only nor --update")
     if forest and experiment != "forest":
         raise click.UsageError(f"--{next(iter(forest)).removesuffix('s')} needs --experiment forest")
+    if start and not policy_only:
+        raise click.UsageError("--start needs --policy-only; tasks and experiments choose theirs")
     if others and (map_name or policy):
         raise click.UsageError("maps that are compared name their policies: --map and --policy are for one")
-    order = order_of_drive(robot, map_name, policy, choices, force=force)
+    order = order_of_drive(robot, map_name, policy, choices, force=force, start=start)
     if experiment is not None:
         rest = [order_of_drive(other, None, "", choices, force=force) for other in others]
         asked = Asked((order, *rest), seeds, workers, as_json, outputs, overwrite, forest)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +57,16 @@ def _tracking(asked: Asked) -> None:
         click.echo(f"wrote {', '.join(pictures)}")
 
 
+def _commands(asked: Asked) -> None:
+    from pdtui.experiments.commands import evaluate_commands
+    from pdtui.experiments.tables import commands_table
+
+    for order in asked.orders:
+        with progress_bar_or_none("following commands", quiet=asked.as_json) as advance:
+            result = evaluate_commands(order, asked.seeds, progress=advance)
+        show_result(result.as_dict(), asked.as_json, partial(commands_table, result))
+
+
 def _headings(result: Precision) -> Headings:
     """What pictures show of it."""
     import numpy as np
@@ -82,5 +93,9 @@ def _headings(result: Precision) -> Headings:
     )
 
 
-EXPERIMENTS: dict[str, Callable[[Asked], None]] = {"tracking": _tracking, "forest": evaluate_in_forest}
+EXPERIMENTS: dict[str, Callable[[Asked], None]] = {
+    "tracking": _tracking,
+    "forest": evaluate_in_forest,
+    "commands": _commands,
+}
 """By the name that ``--experiment`` takes."""

@@ -11,6 +11,7 @@ from pdtui.experiments.bench import LoopBench
 from pdtui.experiments.bench_dissect import DissectBench
 from pdtui.experiments.bench_record import MemoryBench, RecordBench
 from pdtui.experiments.bench_screen import ScreenBench
+from pdtui.experiments.commands import Following
 from pdtui.experiments.evaluate import Evaluation
 from pdtui.experiments.forest_results import Forest, Spread
 from pdtui.experiments.walking import Walking
@@ -84,6 +85,24 @@ def walking_table(result: Walking) -> Table:
             table.add_row(name, f"{speed:.2f}")
     table.add_row("return", f"{result.mean_return:.0f} ± {result.std_return:.0f}")
     table.add_row("episodes without a fall", f"{result.finished}/{len(result.seeds)}")
+    return table
+
+
+def commands_table(result: Following) -> Table:
+    """How closely each command is followed."""
+    table = new_table(
+        f"{result.robot}, policy {result.policy}, {seeds_of(result.seeds)}, {result.steps} steps each",
+        *("command", "asked", "mean |error| [95 %]", "without the gait", "falls"),
+    )
+    count = len(result.seeds)
+    for row in result.commands:
+        table.add_row(
+            f"{row.command} ({row.unit})",
+            f"{min(row.asked):+.2f} to {max(row.asked):+.2f}",
+            f"{row.error:.3f} [{row.low:.3f}, {row.high:.3f}]",
+            f"{row.bias:.3f}",
+            f"{count - result.finished}/{count}",
+        )
     return table
 
 

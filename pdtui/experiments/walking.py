@@ -53,7 +53,7 @@ def evaluate_walking(
     column = names.index("speed") if "speed" in names else None
     speeds, net_speeds, returns, finished = [], [], [], 0
     for done, seed in enumerate(seeds, start=1):
-        loop = ControlLoop(built.robot, built.policy, built.map, seed)
+        loop = ControlLoop(built.robot, built.policy, built.map, seed, start=order.start)
         total, ended = 0.0, ""
         start = loop.robot.read_poses()[:1, :2]
         for _ in range(steps):

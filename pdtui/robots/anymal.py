@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pdtui.robots.geometry import roll_pitch_yaw, rotate
 from pdtui.robots.legged import COMMAND_SCALES, Motion, Rewards, fallen, observations, rewards
 from pdtui.robots.mujoco import MujocoRobot, links_of
-from pdtui.robots.types import Attribute, Floats
+from pdtui.robots.types import Attribute, CommandRange, Floats
 
 MODEL = Path(__file__).parent / "models" / "anymal_c.xml"
 LEGS = ("LF", "LH", "RF", "RH")
@@ -54,6 +54,13 @@ class Anymal(MujocoRobot):
     name = "anymal"
     title = "ANYmal-C (MuJoCo)"
     commands: Mapping[str, float] = MappingProxyType({"forward": 1.0, "lateral": 0.0, "yaw rate": 0.0})
+    command_ranges = MappingProxyType(
+        {
+            "forward": CommandRange("forward", -0.3, 1.4),
+            "lateral": CommandRange("sideways", -0.3, 0.3),
+            "yaw rate": CommandRange("yaw rate", -1.0, 1.0),
+        }
+    )
 
     def __init__(self, random_commands: bool = False) -> None:
         self._random_commands = random_commands
@@ -110,7 +117,8 @@ class Anymal(MujocoRobot):
         self._action, self._last_action = np.zeros(12), np.zeros(12)
         self._air_time = np.zeros((1, 4))
         if self._random_commands:
-            drawn = rng.uniform((-0.3, -0.3, -1.0), (1.4, 0.3, 1.0))
+            low, high = zip(*((one.low, one.high) for one in self.command_ranges.values()), strict=True)
+            drawn = rng.uniform(low, high)
             self._command[:] = np.where(np.arange(3) < len(self.commands), drawn, 0.0)
         mujoco.mj_forward(self.model, self.data)
         return self.observe(), {}

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.errors import RobotError
-from pdtui.robots.types import NO_OBSTACLES, Attribute, Floats, Link, RobotSnapshot, column_of
+from pdtui.robots.types import NO_OBSTACLES, Attribute, CommandRange, Floats, Link, RobotSnapshot, column_of
 
 
 class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
@@ -29,6 +29,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         starts: states besides the usual one in which `reset` can start, by its option ``start``.
         commands: what a policy can be asked for and what it is asked for by default, by name; most robots
             have none.
+        command_ranges: in which the policy was trained to follow them.
         episode_steps: control steps after which training and scores end an episode.
         obstacles: upright cylinders in its way, shape (N, 3): x, y and radius, m. They stay where they are
             until the next `reset` or `restore`; other obstacles are another array.
@@ -40,6 +41,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     links: tuple[Link, ...]
     starts: tuple[str, ...] = ()
     commands: Mapping[str, float] = MappingProxyType({})
+    command_ranges: Mapping[str, CommandRange] = MappingProxyType({})
     episode_steps: int = 1000
     obstacles: Floats = NO_OBSTACLES
 

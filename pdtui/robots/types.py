@@ -35,6 +35,20 @@ class Attribute:
 
 
 @dataclass(frozen=True)
+class CommandRange:
+    """What a policy was trained to be asked for by one command.
+
+    Attributes:
+        attribute: the one that is to become the command.
+        low, high: in the attribute's unit.
+    """
+
+    attribute: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class Link:
     """One primitive shape of the robot, fixed to a body.
 

@@ -20,6 +20,7 @@ from pdtui.robots.anymal import (
     HEIGHT,
     MODEL,
     SUBSTEPS,
+    Anymal,
     feet_of,
 )
 from pdtui.robots.legged import Motion, Rewards, fallen, observations, rewards
@@ -40,7 +41,6 @@ class Randomisation:
         push_every: control steps between pushes.
         push: largest change of the horizontal velocity, m/s.
         command_every: control steps between new commands.
-        forward, lateral, yaw: ranges of the commands, m/s and rad/s.
         standing: share of worlds whose command is zero.
         noise: standard deviation of what is observed, for each kind: height, velocity, angular velocity,
             gravity, joint positions, joint velocities, before scaling.
@@ -50,9 +50,6 @@ class Randomisation:
     push_every: int = 400
     push: float = 0.8
     command_every: int = 250
-    forward: tuple[float, float] = (-0.3, 1.4)
-    lateral: tuple[float, float] = (-0.3, 0.3)
-    yaw: tuple[float, float] = (-1.0, 1.0)
     standing: float = 0.1
     noise: tuple[float, ...] = (0.01, 0.05, 0.1, 0.03, 0.01, 0.5)
 
@@ -194,7 +191,7 @@ class LeggedWorlds:
     def _ask(self, which: NDArray[np.bool_]) -> None:
         """New commands."""
         count, random = int(which.sum()), self._random
-        ranges = (random.forward, random.lateral, random.yaw)
+        ranges = [(one.low, one.high) for one in Anymal.command_ranges.values()]
         asked = np.zeros((count, len(COMMANDS)))
         for column in range(self._commands):
             asked[:, column] = self._rng.uniform(*ranges[column], count)
