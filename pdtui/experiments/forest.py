@@ -27,7 +27,8 @@ from pdtui.experiments.forest_runs import (
     try_keys,
 )
 from pdtui.experiments.operator import operator_keys
-from pdtui.experiments.steering import DrivenSteps, Response, fit_responses
+from pdtui.experiments.steering import DrivenSteps, Response
+from pdtui.experiments.steering_fit import fit_responses
 from pdtui.policies.files import find_weights
 from pdtui.robots import check_robot, file_stem
 from pdtui.stimulation.maps import StimulationMap
@@ -43,7 +44,7 @@ CONDITIONS: dict[Condition, str] = {
 }
 PERSON = "state with a person"
 STEPS, REPEATS = 1000, 5
-TRIED_SEEDS, TRIED_STEPS = tuple(range(900, 906)), 700
+TRIED_SEEDS, TRIED_STEPS = tuple(range(900, 908)), 900
 """Of the drives on rough ground from which the operator learns what its keys do."""
 
 

@@ -8,8 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from pdtui.errors import MapError
+from pdtui.experiments.escape import WATCHED, Escape
 from pdtui.experiments.planning import Planner
-from pdtui.experiments.steering import Place, Response, predict
+from pdtui.experiments.steering import LOOKS_BACK, Place, Response, predict, see
 from pdtui.robots.types import Floats
 from pdtui.stimulation.maps import StimulationMap
 
@@ -21,7 +22,6 @@ DEFAULT = "default"
 WANTED = ("left", "right", "stop")
 """Behaviors that it needs; it takes ``forward``, too, where a map has it."""
 _THINKS_EVERY = 5
-_LOOKS_BACK = 16
 
 
 def operator_keys(stimulation_map: StimulationMap) -> dict[str, str]:
@@ -46,7 +46,8 @@ class Operator:
     """Decides which key to press from what it saw `REACTION` ago and from its own presses since.
 
     It predicts where the robot is by now, and where each of some hundred schedules of keys would lead
-    (`Planner`). It remembers nothing but what it saw and pressed, so that the same sight gives the same keys.
+    (`Planner`); where a tree holds the robot, it turns it away first (`Escape`). Nothing is left to chance,
+    so that the same sight gives the same keys.
 
     Args:
         responses: what each key does, by name, the default first.
@@ -63,7 +64,7 @@ class Operator:
         periods: Mapping[str, int] | None = None,
     ) -> None:
         self._names, self._responses = tuple(responses), tuple(responses.values())
-        self._planner = Planner(self._responses, trees)
+        self._planner, self._escape = Planner(self._responses, trees), Escape(trees, dt)
         self._dt, self._periods = dt, dict(periods or {})
         self._delay = math.ceil(REACTION / dt - 1e-9)
         self._second = math.ceil(1.0 / dt - 1e-9)
@@ -93,19 +94,18 @@ class Operator:
             return now
         if len(self._pressed) >= PRESSES and step - self._pressed[-PRESSES] < self._second:
             return now
-        return self._planner.choose(self._guess(old), now)
+        place = self._guess(old)
+        lately = self._latched[max(0, old - round(WATCHED / self._dt)) : old]
+        halted = self._names.index("stop") in lately
+        turn = self._escape.turn(np.array(self._seen[: old + 1]), place.heading, halted)
+        if turn:
+            return self._names.index("left" if turn > 0 else "right")
+        return self._planner.choose(place, now)
 
     def _guess(self, old: int) -> Place:
         """Where the robot is now, from how it moved up to step `old` and what was pressed since."""
-        places = np.array(self._seen[max(0, old - _LOOKS_BACK) : old + 1])
-        passed = (len(places) - 1) * self._dt
-        speed = float(np.hypot(*(places[-1, :2] - places[0, :2]))) / passed
-        x, y, heading = places[-1].tolist()
-        seen = Place(x, y, heading, speed)
-        since = np.array([self._latched[old:]])
-        there, speeds = predict(self._responses, seen, since, self._dt)
-        x, y, heading = there[0, -1].tolist()
-        return Place(x, y, heading, float(speeds[0]))
+        seen = see(np.array(self._seen[max(0, old - LOOKS_BACK) : old + 1]), self._dt)
+        return predict(self._responses, seen, np.array([self._latched[old:]]), self._dt)[1]
 
     def _still_latched(self, step: int) -> int:
         if not self._latched:

@@ -1,25 +1,27 @@
-"""How keys steer a robot: a first-order model of its heading and speed, fitted to drives.
+"""How keys steer a robot: a model of how its heading, speed and course follow what is latched.
 
-What a key does differs from map to map, so that whoever drives may not rely on numbers written down here. A
-few drives with random keys give them: for each, ``heading' = pull − hold · heading`` and
-``speed' = drive − drag · speed``. A policy that turns on and on has no hold; one that sees its heading and
-comes back to it has.
+Every key pulls at the rate of turning, the speed and the drift (direction of motion less heading), and each
+follows with a lag: a legged robot turns on for a while after the key is gone, and slides on in its old
+direction when it turns. With the heading h against +x, ``rate' = (pull − hold · h − rate) / lag`` and
+``h' = rate``; ``speed' = drive − drag · speed``; ``drift' = (slip − drift) / settle``. A policy that turns
+on and on has no hold; one that sees its heading and comes back to it has.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.errors import RobotError
 from pdtui.robots.geometry import wrap_angle
 from pdtui.robots.types import Floats
 
-_WINDOW = 12
-_LEAST = 8
+LOOKS_BACK = 16
+"""Steps over which speed, course and rate of turning are seen: about one of its strides."""
+_MOVING = 0.3
 
 
 @dataclass(frozen=True)
@@ -27,17 +29,19 @@ class Response:
     """What the robot does while one key is latched.
 
     Attributes:
-        pull, hold: of the heading against +x, rad/s and 1/s.
+        pull, hold, lag: of the heading against +x, rad/s, 1/s and s.
         drive, drag: of the speed, m/s² and 1/s.
-        slip: direction of motion less heading, rad.
+        slip, settle: of the direction of motion less heading, rad and s.
         falls: of the drives, for each press.
     """
 
     pull: float
     hold: float
+    lag: float
     drive: float
     drag: float
     slip: float
+    settle: float
     falls: float
 
 
@@ -58,72 +62,40 @@ class DrivenSteps:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a robot is: x and y in m, heading in rad, speed in m/s."""
+    """Where a robot is and how it moves: x and y in m, heading in rad, speed in m/s, rate of turning in
+    rad/s, direction of motion less heading in rad."""
 
     x: float
     y: float
     heading: float
     speed: float
+    rate: float = 0.0
+    drift: float = 0.0
 
 
-def fit_responses(drives: Sequence[DrivenSteps], names: Sequence[str], dt: float) -> dict[str, Response]:
-    """Least squares over all windows in which one choice is latched.
+def see(places: Floats, dt: float) -> Place:
+    """Where a robot is and how it moves, from its last places.
 
     Args:
-        drives: with every choice in some of them.
-        names: of the choices, by their numbers.
-        dt: s per control step.
-
-    Raises:
-        RobotError: the robot fell before enough was seen of a choice.
+        places: x, y and heading, the newest last, shape (N, 3) with N ≥ 2; at most `LOOKS_BACK` + 1 count.
+        dt: s between them.
     """
-    return {name: _fit(drives, number, name, dt) for number, name in enumerate(names)}
-
-
-def _fit(drives: Sequence[DrivenSteps], number: int, name: str, dt: float) -> Response:
-    headings, turns, speeds, gains, slips = [], [], [], [], []
-    presses = falls = 0
-    for drive in drives:
-        latched = drive.choices == number
-        presses += int((latched & np.diff(drive.choices, prepend=-1).astype(bool)).sum())
-        falls += bool(drive.fell and latched[-1])
-        heading = np.unwrap(drive.places[:, 2])
-        heading += wrap_angle(heading[0]) - heading[0]
-        for first in range(0, len(latched) - 2 * _WINDOW, _WINDOW // 2):
-            middle, last = first + _WINDOW, first + 2 * _WINDOW
-            if not latched[first:last].all():
-                continue
-            before, after = (drive.places[[middle, last], :2] - drive.places[[first, middle], :2]) / (
-                _WINDOW * dt
-            )
-            speed, later = np.hypot(*before), np.hypot(*after)
-            headings.append(heading[first : last + 1].mean())
-            turns.append((heading[last] - heading[first]) / (2 * _WINDOW * dt))
-            speeds.append((speed + later) / 2)
-            gains.append((later - speed) / (_WINDOW * dt))
-            slips.append(later * wrap_angle(np.arctan2(after[1], after[0]) - heading[middle:last].mean()))
-    if len(turns) < _LEAST:
-        raise RobotError(
-            f"'{name}': the robot was seen with it for {len(turns)} stretches of {2 * _WINDOW} steps, "
-            f"expected were {_LEAST}; it fell {falls} times in {presses} presses"
-        )
-    pull, hold = _line(np.array(headings), np.array(turns))
-    drive_, drag = _line(np.array(speeds), np.array(gains))
-    slip = float(np.sum(slips) / max(np.sum(speeds), 1e-9))
-    return Response(pull, hold, drive_, drag, slip, falls / presses)
-
-
-def _line(values: Floats, changes: Floats) -> tuple[float, float]:
-    """``changes = a − b · values`` with b ≥ 0."""
-    spread = values - values.mean()
-    slope = float(spread @ changes / max(float(spread @ spread), 1e-12))
-    back = max(0.0, -slope)
-    return float(changes.mean() + back * values.mean()), back
+    places = places[-LOOKS_BACK - 1 :]
+    headings = np.unwrap(places[:, 2])
+    times = (np.arange(len(places)) - len(places) + 1) * dt
+    spread = times - times.mean()
+    rate = float(spread @ headings / (spread @ spread))
+    heading = float(headings.mean() - rate * times.mean())
+    forth, aside = ((places[-1, :2] - places[0, :2]) / -times[0]).tolist()
+    speed = math.hypot(forth, aside)
+    drift = float(wrap_angle(math.atan2(aside, forth) - headings.mean())) if speed > _MOVING else 0.0
+    x, y = places[-1, :2].tolist()
+    return Place(x, y, float(wrap_angle(heading)), speed, rate, drift)
 
 
 def predict(
     responses: Sequence[Response], start: Place, schedule: NDArray[np.int64], dt: float
-) -> tuple[Floats, Floats]:
+) -> tuple[Floats, Place]:
     """Where C schedules lead.
 
     Args:
@@ -133,18 +105,57 @@ def predict(
         dt: s per step of the schedule.
 
     Returns:
-        x, y and heading after each step, shape (C, T, 3); and the last speed, shape (C,).
+        x, y and heading after each step, shape (C, T, 3); and where the first schedule ends.
     """
-    table = np.array([[one.pull, one.hold, one.drive, one.drag, one.slip] for one in responses])
-    count, steps = schedule.shape
-    places = np.empty((count, steps, 3))
-    x, y = np.full(count, start.x), np.full(count, start.y)
-    heading, speed = np.full(count, wrap_angle(start.heading)), np.full(count, start.speed)
-    for step in range(steps):
-        pull, hold, drive, drag, slip = table[schedule[:, step]].T
-        heading = heading + (pull - hold * heading) * dt
-        speed = np.maximum(0.0, speed + (drive - drag * speed) * dt)
-        x = x + speed * np.cos(heading + slip) * dt
-        y = y + speed * np.sin(heading + slip) * dt
-        places[:, step] = np.stack([x, y, heading], axis=1)
-    return places, speed
+    table = np.array([astuple(one) for one in responses])[:, :7]
+    count = len(schedule)
+    latched = table[schedule.T]
+    headings, rates = roll_heading(
+        latched[..., :3], np.full(count, wrap_angle(start.heading)), np.full(count, start.rate), dt
+    )
+    speeds = roll_speed(latched[..., 3:5], np.full(count, start.speed), dt)
+    drifts = roll_drift(latched[..., 5:7], np.full(count, start.drift), dt)
+    x = start.x + np.cumsum(speeds * np.cos(headings + drifts) * dt, axis=0)
+    y = start.y + np.cumsum(speeds * np.sin(headings + drifts) * dt, axis=0)
+    last = (float(values[-1, 0]) for values in (x, y, headings, speeds, rates, drifts))
+    return np.stack([x.T, y.T, headings.T], axis=2), Place(*last)
+
+
+def roll_heading(latched: Floats, heading: Floats, rate: Floats, dt: float) -> tuple[Floats, Floats]:
+    """Headings in rad and rates of turning in rad/s after each of T steps, shapes (T, C).
+
+    Args:
+        latched: pull, hold and lag in each step, shape (T, C, 3).
+        heading, rate: before the first, shapes (C,).
+        dt: s per step.
+    """
+    pull, hold, lag = np.moveaxis(latched, -1, 0)
+    kept = np.exp(-dt / lag)
+    headings, rates = np.empty(pull.shape), np.empty(pull.shape)
+    for step in range(len(pull)):
+        aim = pull[step] - hold[step] * heading
+        rate = aim + kept[step] * (rate - aim)
+        heading = heading + rate * dt
+        headings[step], rates[step] = heading, rate
+    return headings, rates
+
+
+def roll_speed(latched: Floats, speed: Floats, dt: float) -> Floats:
+    """Speeds in m/s after each of T steps, shape (T, C), from drive and drag in each, shape (T, C, 2)."""
+    drive, drag = np.moveaxis(latched, -1, 0)
+    speeds = np.empty(drive.shape)
+    for step in range(len(drive)):
+        speed = np.maximum(0.0, speed + (drive[step] - drag[step] * speed) * dt)
+        speeds[step] = speed
+    return speeds
+
+
+def roll_drift(latched: Floats, drift: Floats, dt: float) -> Floats:
+    """Drifts in rad after each of T steps, shape (T, C), from slip and settle in each, shape (T, C, 2)."""
+    slip, settle = np.moveaxis(latched, -1, 0)
+    kept = np.exp(-dt / settle)
+    drifts = np.empty(slip.shape)
+    for step in range(len(slip)):
+        drift = slip[step] + kept[step] * (drift - slip[step])
+        drifts[step] = drift
+    return drifts

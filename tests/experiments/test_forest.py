@@ -43,12 +43,12 @@ says = "does something"
 magnitudes = {{ "0:3" = {value} }}
 """
 QUICK = ((7,), 450)
-SWAY = Response(0.5, 1.0, 2.5, 0.8, 0.0, 0.0)
+SWAY = Response(0.5, 1.0, 0.1, 6.0, 0.8, 0.0, 0.2, 0.0)
 RESPONSES = {
-    DEFAULT: Response(0.0, 1.4, 2.5, 0.8, 0.0, 0.0),
+    DEFAULT: Response(0.0, 1.4, 0.1, 6.0, 0.8, 0.0, 0.2, 0.0),
     "left": SWAY,
-    "right": Response(-0.5, 1.0, 2.5, 0.8, 0.0, 0.0),
-    "stop": Response(0.0, 1.0, 0.1, 0.8, 0.0, 0.0),
+    "right": Response(-0.5, 1.0, 0.1, 6.0, 0.8, 0.0, 0.2, 0.0),
+    "stop": Response(0.0, 1.0, 0.1, 0.1, 0.8, 0.0, 0.2, 0.0),
 }
 """What the operator is told, though this robot only stands: so it has reason to press keys."""
 
@@ -98,7 +98,7 @@ def _run(*arguments: object) -> Result:
 def recorded(built: ControlLoop, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A drive of the operator, of 120 steps."""
     path = tmp_path_factory.mktemp("drives") / "driven.rrd"
-    loop = _loop(built, 501)
+    loop = _loop(built, 505)
     record_forest(loop, 120, operator_for(loop, RESPONSES), path, "all")
     return path
 
@@ -110,7 +110,7 @@ def test_the_operators_drive_is_saved_like_a_persons(
     assert session.keys > 0
     assert replay_session(recorded, strict=True).verdict == "identical: 120 steps"
     again = tmp_path / "again.rrd"
-    loop = _loop(built, 501)
+    loop = _loop(built, 505)
     presses = read_keystrokes(recorded.with_suffix(".keys"), order.stimulation_map)
     drive_headless(loop, presses, 120, SessionRecorder(again, loop.info))
     np.testing.assert_array_equal(read_session(again).digests, session.digests)
@@ -119,11 +119,11 @@ def test_the_operators_drive_is_saved_like_a_persons(
 
 
 def test_a_recorded_drive_scores_what_it_did(recorded: Path, built: ControlLoop) -> None:
-    loop = _loop(built, 501)
+    loop = _loop(built, 505)
     driven, events = drive_forest(loop, 120, operator_for(loop, RESPONSES))
     assert read_forest(recorded, "a1", 1000) == (driven, "stands")
     assert driven.presses == len(events) == driven.pressed_steps > 0
-    assert (driven.seed, driven.steps, driven.fell, driven.crossed) == (501, 120, False, False)
+    assert (driven.seed, driven.steps, driven.fell, driven.crossed) == (505, 120, False, False)
     session = read_session(recorded)
     shorter, _ = read_forest(recorded, "a1", 50)
     assert shorter.steps == 50
