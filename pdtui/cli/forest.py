@@ -67,7 +67,7 @@ def forest_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--steps",
             type=click.IntRange(1),
-            help="Forest: control steps an episode lasts at most.  [default: 1000]",
+            help="Forest: control steps an episode lasts at most.  [default: 2400]",
         ),
     ):
         asking = option(asking)
