@@ -89,7 +89,7 @@ def test_own_maps_come_before_shipped_ones(
     listed = {entry.path.stem: entry for entry in list_maps()}
     assert listed["ant"].path == tmp_path / "maps" / "ant.toml"
     assert "not a TOML file" in listed["torn"].problem
-    with pytest.raises(MapError, match="no map 'walrus'; there are ant"):
+    with pytest.raises(MapError, match="no map 'walrus'; there are a1, ant, anymal, "):
         find_map("walrus")
 
 
