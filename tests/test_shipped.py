@@ -139,3 +139,13 @@ def test_units_hold_anymals_heading_nearly_as_well_as_its_command() -> None:
     assert (units["by"], command["by"]) == ("units", "command")
     assert units["error"] <= 1.25 * command["error"]
     assert units["falls"] == command["falls"] == 0
+
+
+@pytest.mark.slow
+def test_an_operator_takes_the_a1_farther_than_it_comes_alone() -> None:
+    figures = _figures("evaluate", "a1", "--experiment", "forest", "--seeds", "100-119")
+    rows = {row["condition"]: row for row in figures["conditions"]}  # type: ignore[attr-defined]
+    alone, driven = rows["state alone"], rows["state with an operator"]
+    assert driven["distance"]["mean"] >= 2.6 * alone["distance"]["mean"]
+    assert driven["collisions"]["mean"] < alone["collisions"]["mean"]
+    assert rows["state + vision"]["distance"]["mean"] >= 2.6 * alone["distance"]["mean"]
