@@ -6,10 +6,10 @@ import sqlite3
 from collections.abc import Sequence
 from hashlib import blake2b
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 
+from pdtui.closing import Closing
 from pdtui.dissection.monitor import Start
 from pdtui.dissection.rollout import Job, Outcome
 from pdtui.errors import PdtuiError, RobotError
@@ -17,7 +17,7 @@ from pdtui.errors import PdtuiError, RobotError
 _SCHEMA = "CREATE TABLE IF NOT EXISTS rollouts (key BLOB PRIMARY KEY, outcome BLOB NOT NULL) WITHOUT ROWID"
 
 
-class Journal:
+class Journal(Closing):
     """Outcomes by what determines them: policy, robot, start, plan and length.
 
     A roll-out is a function of those, so one that is known need not be run again: a dissection that is run
@@ -43,17 +43,6 @@ class Journal:
             raise RobotError(
                 f"{path}: expected a journal of roll-outs, or a place for one: {error}"
             ) from error
-
-    def __enter__(self) -> Journal:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def __len__(self) -> int:
         return int(self._database.execute("SELECT count(*) FROM rollouts").fetchone()[0])

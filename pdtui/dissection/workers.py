@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from types import TracebackType
 from typing import TypeVar
 
+from pdtui.closing import Closing
 from pdtui.dissection.monitor import Progress, Start
 from pdtui.dissection.rollout import Job, Outcome, roll_out
 from pdtui.errors import RobotError
@@ -74,7 +74,7 @@ def _run(
     return [roll_out(*pair, starts[index], plan, steps, measure_from) for plan, index in jobs]
 
 
-class Crew:
+class Crew(Closing):
     """Runs roll-outs of one policy on one robot; with one worker in this process, else in others.
 
     The results do not depend on the number of workers: each roll-out is a function of its snapshot and plan.
@@ -109,17 +109,6 @@ class Crew:
         self._pool: ProcessPoolExecutor | None = None
         self.steps_run = 0
         self.rollouts = 0
-
-    def __enter__(self) -> Crew:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """End the worker processes; a later `run` starts new ones."""

@@ -7,7 +7,6 @@ difference.
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from pdtui.experiments.built import built_once
+from pdtui.experiments.built import built_once, worker_pool
 from pdtui.experiments.tasks import TaskResult, TaskRun, run_task, summarise_task
 from pdtui.robots.types import Floats
 from pdtui.sessions.events import Event
@@ -119,7 +118,7 @@ def evaluate_map(
     jobs: list[_Job] = [(order, name, seed, "aim") for name in names for seed in seeds]
     jobs += [(order, b.name, seed, kind) for b in tasked for kind in ("task", "untouched") for seed in seeds]
     runs: dict[tuple[str, int, str], Any] = {}
-    with multiprocessing.get_context("spawn").Pool(workers) as pool:
+    with worker_pool(workers) as pool:
         results: Iterable[_Run | TaskRun] = pool.imap(_run_job, jobs)
         for done, ((_, name, seed, kind), run) in enumerate(zip(jobs, results, strict=True), start=1):
             runs[name, seed, kind] = run

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import multiprocessing.pool
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from types import TracebackType
+from multiprocessing.pool import Pool
 
 import numpy as np
 
-from pdtui.dissection.workers import obey_parent
+from pdtui.closing import Closing
+from pdtui.experiments.built import built_once, worker_pool
 from pdtui.experiments.response import Response, step_response
 from pdtui.robots.geometry import wrap_angle, wrap_angles
 from pdtui.robots.types import Attribute, Floats
@@ -71,7 +70,7 @@ class Followed:
         return float(known.mean()) if known.size else float("nan")
 
 
-class Followers:
+class Followers(Closing):
     """Runs drives on one robot and policy; with one worker in this process, else in others.
 
     The results do not depend on the number of workers: each drive begins with a reset from its seed.
@@ -88,17 +87,10 @@ class Followers:
         self.loop = build_loop(order) if isinstance(order, DriveOrder) else order
         self._order = order if isinstance(order, DriveOrder) and workers > 1 else None
         self._workers = workers
-        self._pool: multiprocessing.pool.Pool | None = None
+        self._pool: Pool | None = None
 
-    def __enter__(self) -> Followers:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """End the processes; a later `run` starts new ones."""
         if self._pool is not None:
             self._pool.terminate()
             self._pool.join()
@@ -127,26 +119,17 @@ class Followers:
         return results
 
     def _results(self, drives: Sequence[Drive]) -> Iterable[Followed]:
-        if self._order is None:
+        order = self._order
+        if order is None:
             return (follow(self.loop, drive) for drive in drives)
         if self._pool is None:
-            context = multiprocessing.get_context("spawn")
-            self._pool = context.Pool(self._workers, _start_worker, (self._order,))
-        return self._pool.imap(_follow_in_worker, drives)
+            self._pool = worker_pool(self._workers)
+        return self._pool.imap(_follow_job, [(order, drive) for drive in drives])
 
 
-_loop: ControlLoop | None = None
-
-
-def _start_worker(order: DriveOrder) -> None:
-    global _loop  # noqa: PLW0603  (a process's own robot is its global state)
-    obey_parent()
-    _loop = build_loop(order)
-
-
-def _follow_in_worker(drive: Drive) -> Followed:
-    assert _loop is not None
-    return follow(_loop, drive)
+def _follow_job(job: tuple[DriveOrder, Drive]) -> Followed:
+    order, drive = job
+    return follow(built_once(order), drive)
 
 
 def follow(built: ControlLoop, drive: Drive) -> Followed:

@@ -6,7 +6,6 @@ cannot sense. All conditions meet the same forests for the same time.
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pdtui.errors import PdtuiError, PolicyError, SessionError
-from pdtui.experiments.built import built_once
+from pdtui.experiments.built import built_once, worker_pool
 from pdtui.experiments.forest_results import Forest, summarise
 from pdtui.experiments.forest_runs import (
     FOREST,
@@ -187,7 +186,7 @@ def _pool(workers: int) -> Iterator[Callable[..., Any]]:
     if not workers:
         yield lambda _, jobs: iter(jobs)
         return
-    with multiprocessing.get_context("spawn").Pool(workers) as pool:
+    with worker_pool(workers) as pool:
         yield pool.imap
 
 
