@@ -7,6 +7,7 @@ Parallel Deep Reinforcement Learning", 2021); so are the kinds of rewards.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,12 +46,12 @@ class Motion:
     feet: Floats
     feet_velocity: Floats
 
-    @property
+    @cached_property
     def linear(self) -> Floats:
         """Velocity in the body's frame, m/s."""
         return rotate(_inverse(self.qpos[:, 3:7]), self.qvel[:, :3])
 
-    @property
+    @cached_property
     def up(self) -> Floats:
         """The world's vertical in the body's frame."""
         return rotate(_inverse(self.qpos[:, 3:7]), np.broadcast_to([0.0, 0.0, 1.0], (len(self.qpos), 3)))
