@@ -276,18 +276,11 @@ class A1Vision(A1):
     name = "a1-vision"
     title = "Unitree A1 with a depth camera (PyBullet)"
 
-    def __init__(
-        self,
-        terrain: str = "forest",
-        roughness: float = 0.05,
-        density: float = 0.15,
-        top_speed: float = math.inf,
-    ) -> None:
-        super().__init__(terrain, roughness, density, top_speed)
+    def __init__(self, terrain: str = "forest", **options: float) -> None:
+        super().__init__(terrain, **options)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93 + len(_FAN),), np.float64)
 
     def observe(self) -> Floats:
-        (x, y, _), (qx, qy, qz, qw) = self._base()
-        yaw = roll_pitch_yaw(qw, qx, qy, qz)[2]
+        (x, y, _), yaw = self._base()[0], self._attitude()[2]
         nose = (x + _NOSE * math.cos(yaw), y + _NOSE * math.sin(yaw))
         return np.concatenate([super().observe(), nearness(nose, yaw, self.obstacles, _FAN, _SIGHT)])
