@@ -21,7 +21,7 @@ _ASKED = "asked"
 
 
 @dataclass(frozen=True)
-class Followed:
+class FollowedCommand:
     """One command over all seeds.
 
     Attributes:
@@ -41,7 +41,7 @@ class Followed:
 
 
 @dataclass(frozen=True)
-class Following:
+class CommandFollowing:
     """How closely commands are followed.
 
     Attributes:
@@ -56,7 +56,7 @@ class Following:
     policy: str
     seeds: tuple[int, ...]
     steps: int
-    commands: tuple[Followed, ...]
+    commands: tuple[FollowedCommand, ...]
     finished: int
 
     def as_dict(self) -> dict[str, Any]:
@@ -66,7 +66,7 @@ class Following:
 
 def evaluate_commands(
     order: DriveOrder, seeds: Sequence[int], *, progress: Callable[[int, int], None] | None = None
-) -> Following:
+) -> CommandFollowing:
     """Ask for commands drawn from the ranges of training, one set a seed, for a whole episode.
 
     Raises:
@@ -102,7 +102,7 @@ def evaluate_commands(
     for index, (name, column) in enumerate(zip(ranges, columns, strict=True)):
         error = np.array(errors)[:, index]
         rows.append(
-            Followed(
+            FollowedCommand(
                 name,
                 robot.attributes[column].unit,
                 tuple(np.array(asked)[:, index].tolist()),
@@ -111,7 +111,7 @@ def evaluate_commands(
                 float(np.array(biases)[:, index].mean()),
             )
         )
-    return Following(robot.name, policy.name, tuple(seeds), robot.episode_steps, tuple(rows), finished)
+    return CommandFollowing(robot.name, policy.name, tuple(seeds), robot.episode_steps, tuple(rows), finished)
 
 
 def _asking(shipped: StimulationMap, commands: dict[str, float]) -> StimulationMap:

@@ -11,7 +11,7 @@ from pdtui.experiments.bench import LoopBench
 from pdtui.experiments.bench_dissect import DissectBench
 from pdtui.experiments.bench_record import MemoryBench, RecordBench
 from pdtui.experiments.bench_screen import ScreenBench
-from pdtui.experiments.commands import Following
+from pdtui.experiments.commands import CommandFollowing
 from pdtui.experiments.evaluate import Evaluation
 from pdtui.experiments.forest_results import Forest, Spread
 from pdtui.experiments.walking import Walking
@@ -88,7 +88,7 @@ def walking_table(result: Walking) -> Table:
     return table
 
 
-def commands_table(result: Following) -> Table:
+def commands_table(result: CommandFollowing) -> Table:
     """How closely each command is followed."""
     table = new_table(
         f"{result.robot}, policy {result.policy}, {seeds_of(result.seeds)}, {result.steps} steps each",
