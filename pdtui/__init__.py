@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pdtui.api import (
-        QUICK,
+        QUICK_DISSECTION,
         Dissection,
-        Drive,
-        Effort,
+        DissectionSettings,
+        ImportOptions,
         Policy,
-        PolicyChoices,
+        Trajectory,
         dissect,
         drive,
         load_policy,
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 __all__ = [
-    "QUICK",
+    "QUICK_DISSECTION",
     "Dissection",
-    "Drive",
-    "Effort",
+    "DissectionSettings",
+    "ImportOptions",
     "Policy",
-    "PolicyChoices",
+    "Trajectory",
     "__version__",
     "dissect",
     "drive",

@@ -8,37 +8,37 @@ from typing import Any
 
 from torch import nn
 
+from pdtui.core.errors import SessionError
 from pdtui.dissection import dissect as dissection
-from pdtui.dissection.effort import QUICK, Effort
-from pdtui.dissection.findings import Dissection
-from pdtui.errors import SessionError
-from pdtui.policies import load
-from pdtui.policies.choices import NO_CHOICES, PolicyChoices, Spaces
-from pdtui.policies.decoders import Decoder
-from pdtui.policies.files import file_hash
-from pdtui.policies.modules import policy_of_module
-from pdtui.policies.runtime import Policy
+from pdtui.dissection.dissection_result import Dissection
+from pdtui.dissection.dissection_settings import QUICK_DISSECTION, DissectionSettings
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless import build_loop
+from pdtui.drive.keystrokes import read_keystrokes
+from pdtui.drive.replay import ReplayResult, replay_session
+from pdtui.drive.trajectory import Trajectory, drive_trajectory
+from pdtui.policies.runtime.action_decoders import Decoder
+from pdtui.policies.runtime.live_network import policy_from_network
+from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.torchscript import is_torchscript, read_torchscript
+from pdtui.policies.weights import policy_loading
+from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, WorldSpaces
+from pdtui.policies.weights.weights_file import hash_file
 from pdtui.robots import make_robot
-from pdtui.robots.base import Robot
-from pdtui.sessions.recorder import SessionRecorder
-from pdtui.stimulation.library import find_map
-from pdtui.stimulation.mapfile import load_map
-from pdtui.stimulation.maps import StimulationMap
-from pdtui.stimulation.settle import settle
-from pdtui.teleop.arrays import Drive, drive_to_arrays
-from pdtui.teleop.drive import build_loop
-from pdtui.teleop.keys import read_keystrokes
-from pdtui.teleop.order import DriveOrder
-from pdtui.teleop.replay import ReplayResult, replay_session
+from pdtui.robots.robot import Robot
+from pdtui.sessions.writer.session_recorder import SessionRecorder
+from pdtui.stimulation.map_library import find_map
+from pdtui.stimulation.map_policy import resolve_policy
+from pdtui.stimulation.map_reader import load_map
+from pdtui.stimulation.stimulation_map import StimulationMap
 
 __all__ = [
-    "QUICK",
+    "QUICK_DISSECTION",
     "Dissection",
-    "Drive",
-    "Effort",
+    "DissectionSettings",
+    "ImportOptions",
     "Policy",
-    "PolicyChoices",
+    "Trajectory",
     "dissect",
     "drive",
     "load_policy",
@@ -50,7 +50,7 @@ def load_policy(
     policy: str | Path | nn.Module,
     robot: str | Robot | None = None,
     *,
-    choices: PolicyChoices = NO_CHOICES,
+    choices: ImportOptions = NO_OPTIONS,
     observations: int | Sequence[int] | None = None,
     hidden: Sequence[str] | None = None,
     decode: Decoder | None = None,
@@ -81,21 +81,23 @@ def load_policy(
         robot: that it is for; gives the bounds of actions that somebody else's file may lack.
         choices: what somebody else's file leaves open; see `pdtui.policies.importers`.
         observations, hidden, decode, batched, initial_state, name: of a live or TorchScript network; see
-            `pdtui.policies.modules.policy_of_module`.
+            `pdtui.policies.runtime.live_network.policy_from_network`.
 
     Raises:
         PdtuiError: it cannot be had, or is for another robot.
     """
     sha256 = ""
     if not isinstance(policy, nn.Module) and is_torchscript(Path(policy)):
-        name, sha256 = name or Path(policy).stem, file_hash(Path(policy))
+        name, sha256 = name or Path(policy).stem, hash_file(Path(policy))
         policy = read_torchscript(Path(policy))
     world = make_robot(robot) if isinstance(robot, str) else robot
     if not isinstance(policy, nn.Module):
         if world is None:
-            return load.load_policy(policy, choices=choices)
-        return load.load_policy(policy, world.name, choices=choices, spaces=Spaces.of_world(world))
-    return policy_of_module(
+            return policy_loading.load_policy(policy, choices=choices)
+        return policy_loading.load_policy(
+            policy, world.name, choices=choices, spaces=WorldSpaces.of_world(world)
+        )
+    return policy_from_network(
         policy,
         world.observation_space if world is not None else None,
         world.action_space if world is not None else None,
@@ -113,14 +115,14 @@ def dissect(
     robot: str | Robot,
     policy: str | Path | nn.Module | Policy,
     *,
-    choices: PolicyChoices = NO_CHOICES,
+    choices: ImportOptions = NO_OPTIONS,
     preset: str = "paper",
     settings: Sequence[str] = (),
     episodes: int = 5,
     seed: int = 1000,
     budget_minutes: float | None = None,
     workers: int = 2,
-    effort: Effort | None = None,
+    effort: DissectionSettings | None = None,
     progress: dissection.StageProgress | None = None,
     journal: Path | None = None,
 ) -> Dissection:
@@ -133,7 +135,7 @@ def dissect(
     >>> from torch import nn
     >>> network = nn.Sequential(nn.Linear(27, 4), nn.Tanh(), nn.Linear(4, 8))
     >>> _ = nn.init.constant_(network[2].weight, 0.01)
-    >>> found = pdtui.dissect("ant", network, episodes=1, effort=pdtui.QUICK, budget_minutes=0.0)
+    >>> found = pdtui.dissect("ant", network, episodes=1, effort=pdtui.QUICK_DISSECTION, budget_minutes=0.0)
     >>> found.screen.effects.shape[0], found.matching.discrepancy.shape[1]  # a row, a column for each unit
     (4, 4)
     >>> found.to_map().robot
@@ -169,7 +171,7 @@ def drive(
     stimulation_map: str | Path | StimulationMap | None = None,
     *,
     policy: str | Path | nn.Module | Policy | None = None,
-    choices: PolicyChoices = NO_CHOICES,
+    choices: ImportOptions = NO_OPTIONS,
     keys: Mapping[int, str | Sequence[str]] | str | Path | None = None,
     steps: int = 1000,
     seed: int = 0,
@@ -177,7 +179,7 @@ def drive(
     start: str = "",
     record: str | Path | None = None,
     force: bool = False,
-) -> Drive:
+) -> Trajectory:
     """Drive without a screen, as fast as it goes.
 
     >>> import pdtui
@@ -209,14 +211,14 @@ def drive(
     live = load_policy(policy, robot) if isinstance(policy, nn.Module) else policy
     given = live if isinstance(live, Policy) else None
     named = "" if given is not None or live is None else str(live)
-    stimulation_map = settle(stimulation_map, named, choices)
-    order = DriveOrder(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
-    loop = build_loop(order, robot if isinstance(robot, Robot) else None, given)
+    stimulation_map = resolve_policy(stimulation_map, named, choices)
+    config = DriveConfig(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
+    loop = build_loop(config, robot if isinstance(robot, Robot) else None, given)
     presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
     if record is not None and Path(record).exists():
         raise SessionError(f"{record}: exists already; a drive is recorded into a new file")
     recorder = SessionRecorder(Path(record), loop.info) if record is not None else None
-    return drive_to_arrays(loop, presses, steps, recorder)
+    return drive_trajectory(loop, presses, steps, recorder)
 
 
 def replay(
@@ -239,7 +241,7 @@ def replay(
         session: the file.
         robot: where the session's is not known by its name.
         policy: where the session's is not where its map says.
-        judging: `strict`, `tolerance`, `horizon`, `force`; see `pdtui.teleop.replay.replay_session`.
+        judging: `strict`, `tolerance`, `horizon`, `force`; see `pdtui.drive.replay.replay_session`.
 
     Raises:
         PdtuiError: the session cannot be read, or robot or policy cannot be had.

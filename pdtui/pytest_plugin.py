@@ -11,7 +11,7 @@ Example::
 
 A test fails with the first step that differs and how far each attribute is off. On the machine and with
 the versions that recorded the session, every bit must be the same. Elsewhere, the attributes have to agree
-for the first seconds (see `pdtui.teleop.replay.TOLERANCE`); ``strict=True`` asks for the same bits there.
+for the first seconds (see `pdtui.drive.replay.TOLERANCE`); ``strict=True`` asks for the same bits there.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ import pytest
 if TYPE_CHECKING:
     from torch import nn
 
-    from pdtui.policies.runtime import Policy
-    from pdtui.robots.base import Robot
-    from pdtui.teleop.replay import ReplayResult
+    from pdtui.drive.replay import ReplayResult
+    from pdtui.policies.runtime.policy import Policy
+    from pdtui.robots.robot import Robot
 
 _SHOWN = 8
 
@@ -55,7 +55,7 @@ def pdtui_session(request: pytest.FixtureRequest) -> SessionCheck:
     - ``policy``: a weights file (found like the session), a shipped name, or a live network; by default the
       session's own. Other weights than the session's are run and compared all the same;
     - ``robot``: where the session's is not known by its name;
-    - ``strict``, ``tolerance``, ``horizon``: as for `pdtui.teleop.replay.replay_session`;
+    - ``strict``, ``tolerance``, ``horizon``: as for `pdtui.drive.replay.replay_session`;
 
     and returns the `ReplayResult` of a drive that repeats.
     """
@@ -71,7 +71,7 @@ def pdtui_session(request: pytest.FixtureRequest) -> SessionCheck:
     ) -> ReplayResult:
         # Only a test that asks for a drive pays for torch and the simulator.
         from pdtui.api import replay
-        from pdtui.errors import PdtuiError
+        from pdtui.core.errors import PdtuiError
 
         path = _find(session, folders)
         if isinstance(policy, str | Path):

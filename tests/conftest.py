@@ -8,15 +8,16 @@ from pathlib import Path
 import pytest
 
 from pdtui.dissection.dissect import dissect
-from pdtui.dissection.findings import Dissection
-from pdtui.policies.choices import FOLDERS
-from pdtui.policies.load import load_policy
-from pdtui.policies.runtime import Policy
-from pdtui.stimulation.mapfile import load_map
-from pdtui.stimulation.maps import StimulationMap
+from pdtui.dissection.dissection_result import Dissection
+from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.weights.file_search import FOLDERS
+from pdtui.policies.weights.policy_loading import load_policy
+from pdtui.stimulation.map_reader import load_map
+from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.real_viewer import RealViewer, real_viewer
 from tests.small_dissection import SMALL, small_network, write_policy
 from tests.small_map import SMALL_MAP, write_small_weights
+from tests.wired_policy import wired_file  # noqa: F401
 
 
 @pytest.fixture(scope="session")

@@ -15,16 +15,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pdtui.errors import PdtuiError
-from pdtui.sessions.recorder import SessionRecorder
-from pdtui.sessions.repair import examine, repair_session
-from pdtui.stimulation.mapfile import load_map
-from pdtui.teleop.drive import build_loop, key_events
-from pdtui.teleop.order import DriveOrder
-from pdtui.teleop.process import ProcessLink
-from pdtui.teleop.replay import replay_session
-from pdtui.teleop.simulation import PACED_ROWS_PER_WRITE
-from pdtui.teleop.snapshot import Snapshot
+from pdtui.core.errors import PdtuiError
+from pdtui.drive.client import DriveClient
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.drive_snapshot import DriveSnapshot
+from pdtui.drive.headless import build_loop, key_events
+from pdtui.drive.replay import replay_session
+from pdtui.drive.server import PACED_ROWS_PER_WRITE
+from pdtui.sessions.session_repair import examine_session, repair_session
+from pdtui.sessions.writer.session_recorder import SessionRecorder
+from pdtui.stimulation.map_reader import load_map
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 KEYS = ("w", "t", "h", "space", "r", "backspace")
@@ -53,11 +53,11 @@ class Tally:
         """
         self.broken += 1
         try:
-            if whole and not examine(path).whole:
+            if whole and not examine_session(path).whole:
                 raise AssertionError("was not closed whole")
             output = path.with_suffix(".repaired.rrd")
             steps = repair_session(path, output).steps
-            if not examine(output).whole:
+            if not examine_session(output).whole:
                 raise AssertionError("is not whole after its repair")
             result = replay_session(output, strict=True)
             if not (result.identical and result.steps == steps):
@@ -92,7 +92,7 @@ def cut_files(folder: Path, map_path: Path, cuts: int, drawn: random.Random) -> 
 
 def _record(path: Path, map_path: Path, *, seed: int, steps: int, drawn: random.Random) -> list[int]:
     """Drive as the screen's process does; the file's size before the first step and after each."""
-    loop = build_loop(DriveOrder("ant", load_map(map_path), seed))
+    loop = build_loop(DriveConfig("ant", load_map(map_path), seed))
     recorder = SessionRecorder(path, loop.info, rows_per_write=PACED_ROWS_PER_WRITE)
     sizes = [recorder.bytes]
     for _ in range(steps):
@@ -124,8 +124,8 @@ class _Drive:
 
     def __init__(self, path: Path, map_path: Path, number: signal.Signals, drawn: random.Random) -> None:
         self.path, self._number, self._drawn = path, number, drawn
-        order = DriveOrder("ant", load_map(map_path), drawn.randrange(1000), recording=str(path))
-        self._link = ProcessLink(order)
+        config = DriveConfig("ant", load_map(map_path), drawn.randrange(1000), recording=str(path))
+        self._link = DriveClient(config)
         self._moment: float | None = None
         self._lasts = drawn.uniform(0.0, 2.5)
         self._killed = False
@@ -138,7 +138,7 @@ class _Drive:
             self.over = True
             self._link.close()
             return
-        if self._killed or not isinstance(message, Snapshot):
+        if self._killed or not isinstance(message, DriveSnapshot):
             return
         self.driven = message.step
         now = time.monotonic()

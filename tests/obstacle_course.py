@@ -9,13 +9,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from pdtui.policies.decoders import decoder_for
-from pdtui.policies.network import NetworkSpec, PolicyNetwork
-from pdtui.policies.runtime import Policy
-from pdtui.robots.base import Robot
-from pdtui.robots.types import Attribute, Floats, Link, RobotSnapshot
-from pdtui.stimulation.maps import Behavior, StimulationMap
-from pdtui.teleop.loop import ControlLoop
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.bodies import Link, RobotState
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.policies.runtime.action_decoders import decoder_for
+from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
+from pdtui.robots.robot import Robot
+from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 COUNT = 4
 _PACE = 0.25
@@ -54,10 +55,10 @@ class Course(Robot):
     def read_poses(self) -> Floats:
         return np.array([[self.x, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0]])
 
-    def snapshot(self) -> RobotSnapshot:
-        return RobotSnapshot(self.name, self.observe(), (self.obstacles,), self.np_random.bit_generator.state)
+    def snapshot(self) -> RobotState:
+        return RobotState(self.name, self.observe(), (self.obstacles,), self.np_random.bit_generator.state)
 
-    def restore(self, snapshot: RobotSnapshot) -> None:
+    def restore(self, snapshot: RobotState) -> None:
         self.x, (self.obstacles,) = float(snapshot.state[0]), snapshot.extras
         self.np_random.bit_generator.state = snapshot.rng
 

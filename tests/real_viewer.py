@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from rerun.experimental import ViewerClient, ViewerState
 
-from pdtui.sessions.viewer import LOCAL, find_viewer
+from pdtui.sessions.viewer.viewer_address import LOCAL, find_viewer
 
 _PATIENCE = 30.0
 _NO_MATTER = ("Software rasterizer", "Failed to load examples")

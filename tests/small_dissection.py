@@ -6,13 +6,14 @@ from pathlib import Path
 
 import torch
 
-from pdtui.dissection.effort import Effort, Sizes
-from pdtui.dissection.hold import HoldSizes
-from pdtui.dissection.imprint import ImprintSizes
-from pdtui.policies.files import save_network
-from pdtui.policies.network import NetworkSpec, PolicyNetwork
+from pdtui.dissection.dissection_settings import DissectionSettings
+from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
+from pdtui.policies.weights.weights_file import save_network
+from pdtui.search.controller_search import ControllerSearchSettings
+from pdtui.search.imprints import ImprintSettings
+from pdtui.search.search_settings import BehaviorSearchSettings
 
-SMALL = Effort(
+SMALL = DissectionSettings(
     steps=130,
     screen_values=(-3.0, 3.0),
     screen_starts=2,
@@ -25,12 +26,12 @@ SMALL = Effort(
     selection_starts=2,
     held_out_starts=2,
     walk=20,
-    imprint=ImprintSizes(episodes=2, steps=10, bins=2, units=(3,), factors=(1.0,)),
-    search=Sizes(
+    imprint=ImprintSettings(episodes=2, steps=10, bins=2, units=(3,), factors=(1.0,)),
+    search=BehaviorSearchSettings(
         pool=4, atoms=4, elite=3, children=3, promoted=2, most_units=(3,), generations=1, quick_starts=1,
         quick_steps=12, full_starts=2, full_steps=16, finalists=2, final_steps=18,
     ),
-    hold=HoldSizes(units=1, finalists=2, steps=12, final_steps=18),
+    hold=ControllerSearchSettings(units=1, finalists=2, steps=12, final_steps=18),
 )  # fmt: skip
 
 

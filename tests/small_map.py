@@ -6,8 +6,8 @@ from pathlib import Path
 
 import torch
 
-from pdtui.policies.files import file_hash, save_network
-from pdtui.policies.network import NetworkSpec, PolicyNetwork
+from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
+from pdtui.policies.weights.weights_file import hash_file, save_network
 
 SMALL_MAP = """\
 schema = 1
@@ -74,5 +74,5 @@ def write_small_map(folder: Path) -> Path:
     """That policy and the map, in a folder; the map's path."""
     weights = write_small_weights(folder / "small.safetensors")
     path = folder / "small.toml"
-    path.write_text(SMALL_MAP.format(policy=weights, sha256=file_hash(weights)))
+    path.write_text(SMALL_MAP.format(policy=weights, sha256=hash_file(weights)))
     return path

@@ -16,10 +16,11 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from pdtui.policies.decoders import categorical
-from pdtui.policies.runtime import Policy
-from pdtui.robots.base import Robot
-from pdtui.robots.types import Attribute, Floats, Link, RobotSnapshot
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.bodies import Link, RobotState
+from pdtui.policies.runtime.action_decoders import categorical
+from pdtui.policies.runtime.policy import Policy
+from pdtui.robots.robot import Robot
 
 SIDE = 6
 MOVES = np.array([(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)])
@@ -41,10 +42,10 @@ class _Small(Robot):
         self.state = self._begin()
         return self.observe(), {}
 
-    def snapshot(self) -> RobotSnapshot:
-        return RobotSnapshot(self.name, self.state.copy(), (), self.np_random.bit_generator.state)
+    def snapshot(self) -> RobotState:
+        return RobotState(self.name, self.state.copy(), (), self.np_random.bit_generator.state)
 
-    def restore(self, snapshot: RobotSnapshot) -> None:
+    def restore(self, snapshot: RobotState) -> None:
         self.state = snapshot.state.copy()
         self.np_random.bit_generator.state = snapshot.rng
 

@@ -21,8 +21,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pdtui.sessions.reader import read_session
-from pdtui.teleop.replay import ReplayResult, replay_session
+from pdtui.drive.replay import ReplayResult, replay_session
+from pdtui.sessions.session_reader import read_session
 
 KEYS = (
     *(b"w", b"t", b"h", b" ", b"w", b"t", b"h", b" "),  # the map's own

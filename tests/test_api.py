@@ -13,11 +13,11 @@ from torch import nn
 
 import pdtui
 import pdtui.api
-from pdtui.errors import EventError, MapError, PolicyError, SessionError
-from pdtui.policies.runtime import Policy
-from pdtui.robots.base import Robot
-from pdtui.stimulation.mapfile import parse_map
-from pdtui.stimulation.maps import StimulationMap
+from pdtui.core.errors import KeystrokeError, MapError, PolicyError, SessionError
+from pdtui.policies.runtime.policy import Policy
+from pdtui.robots.robot import Robot
+from pdtui.stimulation.map_reader import parse_map
+from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.small_worlds import Dot, Pole, initial_state, trained_conv, trained_lstm
 
 _MAP = """\
@@ -92,7 +92,7 @@ def test_a_recorded_drive_of_a_live_network_replays_bit_for_bit_with_a_rewind(
 def test_a_live_network_is_dissected(world: object) -> None:
     assert callable(world)
     robot, policy, _ = world()
-    found = pdtui.dissect(robot, policy, episodes=2, effort=pdtui.QUICK)
+    found = pdtui.dissect(robot, policy, episodes=2, effort=pdtui.QUICK_DISSECTION)
     assert found.screen.effects.shape[:2] == (policy.units, 2)
     assert np.abs(np.nan_to_num(found.screen.effects)).max() > 0
     assert repr(found).startswith(f"<Dissection of {policy.name} on {robot.name}: {policy.units} units")
@@ -128,7 +128,7 @@ def test_changed_weights_are_another_policy() -> None:
     [
         (lambda: pdtui.load_policy(nn.Linear(2, 2)), PolicyError, "Linear: expected the shape of the obs"),
         (lambda: pdtui.load_policy("nothing"), PolicyError, "no policy 'nothing'"),
-        (lambda: pdtui.drive("ant", keys={0: "z"}, steps=1), EventError, "step 0: key 'z'"),
+        (lambda: pdtui.drive("ant", keys={0: "z"}, steps=1), KeystrokeError, "step 0: key 'z'"),
         (lambda: pdtui.nothing, AttributeError, "module 'pdtui' has no attribute 'nothing'"),
     ],
 )

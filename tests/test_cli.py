@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from pdtui.cli import main
-from pdtui.stimulation.maps import StimulationMap
+from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.real_viewer import RealViewer, free_port, is_blank
 
 
@@ -45,12 +45,12 @@ def test_a_headless_drive_is_recorded_and_replays_in_a_fresh_process(
 
 def test_a_replay_names_the_first_step_that_differs(map_path: Path, tmp_path: Path) -> None:
     """The same drive with another disturbance: a session whose robot was pushed behind the loop's back."""
-    from pdtui.sessions.recorder import SessionRecorder
-    from pdtui.stimulation.mapfile import load_map
-    from pdtui.teleop.drive import build_loop
-    from pdtui.teleop.order import DriveOrder
+    from pdtui.drive.drive_config import DriveConfig
+    from pdtui.drive.headless import build_loop
+    from pdtui.sessions.writer.session_recorder import SessionRecorder
+    from pdtui.stimulation.map_reader import load_map
 
-    loop = build_loop(DriveOrder("ant", load_map(map_path), 3))
+    loop = build_loop(DriveConfig("ant", load_map(map_path), 3))
     session = tmp_path / "pushed.rrd"
     with SessionRecorder(session, loop.info) as recorder:
         for step in range(40):
@@ -179,7 +179,7 @@ def test_a_divergence_is_one_line_and_leaves_the_session(
     map_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from pdtui.robots.ant import Ant
-    from pdtui.sessions.reader import read_session
+    from pdtui.sessions.session_reader import read_session
 
     whole = Ant.step
 

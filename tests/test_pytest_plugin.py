@@ -12,12 +12,12 @@ import pytest
 import torch
 
 from pdtui import pytest_plugin
-from pdtui.policies.files import load_network, save_network
-from pdtui.policies.runtime import Policy
-from pdtui.sessions.recorder import SessionRecorder
-from pdtui.stimulation.mapfile import load_map
-from pdtui.teleop.drive import build_loop, drive_headless
-from pdtui.teleop.order import DriveOrder
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless import build_loop, drive_headless
+from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.weights.weights_file import load_network, save_network
+from pdtui.sessions.writer.session_recorder import SessionRecorder
+from pdtui.stimulation.map_reader import load_map
 
 pytest_plugins = ["pytester"]
 
@@ -25,7 +25,7 @@ pytest_plugins = ["pytester"]
 @pytest.fixture
 def suite(pytester: pytest.Pytester, map_path: Path, weights: Path) -> pytest.Pytester:
     """The example of the documentation, pasted, with a session and a policy beside it."""
-    loop = build_loop(DriveOrder("ant", load_map(map_path), 3))
+    loop = build_loop(DriveConfig("ant", load_map(map_path), 3))
     session = pytester.path / "sessions" / "walk.rrd"
     drive_headless(loop, {10: ["w"]}, 40, SessionRecorder(session, loop.info))
     (pytester.path / "my_policy.safetensors").write_bytes(weights.read_bytes())

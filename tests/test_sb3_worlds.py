@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from pdtui.cli import main
-from pdtui.sessions.reader import read_session
-from pdtui.stimulation.mapfile import load_map
+from pdtui.sessions.session_reader import read_session
+from pdtui.stimulation.map_reader import load_map
 
 FIXTURES = Path(__file__).parent / "fixtures"
 WORLDS = {"Pendulum-v1": "sb3-pendulum", "Hopper-v5": "sb3-hopper", "HalfCheetah-v5": "sb3-halfcheetah"}

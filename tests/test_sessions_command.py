@@ -15,11 +15,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from pdtui.cli import main
-from pdtui.sessions.reader import read_activations, read_session
-from pdtui.stimulation.library import shipped_folder
-from pdtui.stimulation.mapfile import load_map
-from pdtui.teleop.drive import build_loop
-from pdtui.teleop.order import DriveOrder
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless import build_loop
+from pdtui.sessions.session_reader import read_activations, read_session
+from pdtui.stimulation.map_library import shipped_folder
+from pdtui.stimulation.map_reader import load_map
 
 KEYS = "10 w\n20 t\n30 space\n35 h\n40 left\n50 r\n"
 
@@ -168,9 +168,9 @@ def test_compare_names_the_first_step_and_how_far_it_goes(
 
 
 def test_text_from_files_is_harmless(map_path: Path, tmp_path: Path) -> None:
-    from pdtui.sessions.recorder import SessionRecorder
+    from pdtui.sessions.writer.session_recorder import SessionRecorder
 
-    loop = build_loop(DriveOrder("ant", load_map(map_path), 3))
+    loop = build_loop(DriveConfig("ant", load_map(map_path), 3))
     with SessionRecorder(tmp_path / "evil.rrd", loop.info) as recorder:
         recorder.write(loop.advance())
         recorder.close("\x1b[2J\x1b]0;owned\x07[bold]finished[/bold]")
@@ -184,7 +184,7 @@ def test_text_from_files_is_harmless(map_path: Path, tmp_path: Path) -> None:
 
 def test_the_viewer_is_bound_to_this_machine(folder: Path, tmp_path: Path) -> None:
     """The program that is started writes down what it was told: a viewer needs a display and a person."""
-    from pdtui.sessions import viewer
+    from pdtui.sessions.viewer import viewer_address
 
     environment = {**os.environ, "DISPLAY": ""}
     environment.pop("WAYLAND_DISPLAY", None)
@@ -192,7 +192,7 @@ def test_the_viewer_is_bound_to_this_machine(folder: Path, tmp_path: Path) -> No
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "no display for the viewer's window" in done.stderr
-    told = viewer.viewer_command(folder / "a.rrd", web=True)
+    told = viewer_address.viewer_command(folder / "a.rrd", web=True)
     assert told[1:] == [str(folder / "a.rrd"), "--bind", "127.0.0.1", "--serve-web"]
     assert "garbage.rrd: expected a Rerun" in run("sessions", "open", folder / "garbage.rrd").output
 

@@ -9,13 +9,13 @@ import pytest
 from click.testing import CliRunner
 
 from pdtui.cli import main
-from pdtui.policies.files import file_hash, find_weights, load_network
-from pdtui.sessions.reader import read_session
-from pdtui.stimulation.library import find_map, shipped_folder
-from pdtui.stimulation.mapfile import load_map
-from pdtui.teleop.drive import build_loop
-from pdtui.teleop.order import DriveOrder
-from pdtui.teleop.replay import replay_session
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless import build_loop
+from pdtui.drive.replay import replay_session
+from pdtui.policies.weights.weights_file import find_weights_file, hash_file, load_network
+from pdtui.sessions.session_reader import read_session
+from pdtui.stimulation.map_library import find_map, shipped_folder
+from pdtui.stimulation.map_reader import load_map
 
 LEAST = {
     "a1": {"left": 18, "right": 18, "stop": 12, "forward": 18},
@@ -65,14 +65,14 @@ def test_the_weights_say_how_they_were_trained_and_the_map_fits_them(
 ) -> None:
     if robot == "a1":
         pytest.importorskip("pybullet", reason="PyBullet is not installed (it has no wheels for this Python)")
-    spec = load_network(find_weights(robot)).spec
+    spec = load_network(find_weights_file(robot)).spec
     assert (spec.layers, spec.activation, spec.head) == (layers, "tanh", "squashed_gaussian")
     assert spec.command.startswith(f"pdtui train {robot} --algorithm ppo --seed ")
     assert spec.score["episodes"] >= 32
     shipped = load_map(find_map(robot))
     assert behaviors <= shipped.behaviors.keys()
-    shipped.check(robot, spec.layers, file_hash(find_weights(robot)))
-    build_loop(DriveOrder(robot, shipped, 0))
+    shipped.check(robot, spec.layers, hash_file(find_weights_file(robot)))
+    build_loop(DriveConfig(robot, shipped, 0))
 
 
 @pytest.mark.slow

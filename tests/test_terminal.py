@@ -12,8 +12,8 @@ from pathlib import Path
 import pexpect
 import pytest
 
-from pdtui.sessions.reader import read_session
-from pdtui.teleop.replay import replay_session
+from pdtui.drive.replay import replay_session
+from pdtui.sessions.session_reader import read_session
 
 PATIENCE = 60
 

@@ -56,7 +56,7 @@ def test_the_wheel_drives_the_ant(installed: Path, tmp_path: Path) -> None:
 
 
 def test_the_wheel_brings_the_samples(installed: Path, tmp_path: Path) -> None:
-    code = "from pdtui.stimulation.library import shipped_folder; print(shipped_folder('sessions'))"
+    code = "from pdtui.stimulation.map_library import shipped_folder; print(shipped_folder('sessions'))"
     shipped = Path(_run(installed, tmp_path, "-c", code).strip())
     assert shipped.is_relative_to(installed)
     assert list(shipped.glob("samples/*.rrd"))

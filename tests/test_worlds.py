@@ -13,17 +13,17 @@ import torch
 from click.testing import CliRunner, Result
 
 from pdtui.cli import main
-from pdtui.policies.files import file_hash, save_network
-from pdtui.policies.network import Head, NetworkSpec, PolicyNetwork
+from pdtui.core.events import Event
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.drive_snapshot import DriveFacts
+from pdtui.drive.headless import build_loop
+from pdtui.drive.snapshot_builder import SnapshotBuilder
+from pdtui.policies.weights.policy_network import Head, NetworkSpec, PolicyNetwork
+from pdtui.policies.weights.weights_file import hash_file, save_network
 from pdtui.robots import make_robot
-from pdtui.sessions.events import Event
-from pdtui.sessions.reader import read_session
-from pdtui.stimulation.mapfile import load_map
-from pdtui.teleop.drive import build_loop
-from pdtui.teleop.observer import Observer
-from pdtui.teleop.order import DriveOrder
-from pdtui.teleop.snapshot import Briefing
-from pdtui.tui.app import DriveApp
+from pdtui.sessions.session_reader import read_session
+from pdtui.stimulation.map_reader import load_map
+from pdtui.tui.drive_app import DriveApp
 from tests.tui.conftest import Message, ScriptedLink
 from tests.tui.screens import played, shown
 
@@ -69,7 +69,7 @@ def write_world(robot: str, folder: Path, *, name: str = "") -> Path:
     save_network(weights, PolicyNetwork(spec))
     path = folder / "world.toml"
     path.write_text(
-        MAP.format(robot=name or robot, policy=weights, sha256=file_hash(weights), attribute=attribute)
+        MAP.format(robot=name or robot, policy=weights, sha256=hash_file(weights), attribute=attribute)
     )
     return path
 
@@ -99,10 +99,10 @@ def test_a_drive_with_rewind_and_reset_replays_bit_for_bit(robot: str, tmp_path:
 @pytest.mark.parametrize("size", [(80, 24), (160, 48)])
 async def test_the_screen_shows_it(robot: str, size: tuple[int, int], tmp_path: Path) -> None:
     stimulation_map = load_map(write_world(robot, tmp_path))
-    loop = build_loop(DriveOrder(robot, stimulation_map, 3))
-    observer = Observer(loop)
+    loop = build_loop(DriveConfig(robot, stimulation_map, 3))
+    observer = SnapshotBuilder(loop)
     messages: list[Message] = [
-        Briefing(robot, "small", 3, loop.robot.control_dt, loop.robot.attributes, loop.robot.links, (8, 8))
+        DriveFacts(robot, "small", 3, loop.robot.control_dt, loop.robot.attributes, loop.robot.links, (8, 8))
     ]
     for step in range(40):
         observer.see(loop.advance([Event(39, "behavior", "push", key="w")] if step == 39 else []))

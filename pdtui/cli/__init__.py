@@ -8,14 +8,14 @@ from __future__ import annotations
 import click
 
 from pdtui import __version__
-from pdtui.cli.benching import bench
-from pdtui.cli.common import OneLineErrors
-from pdtui.cli.drawing import figure
-from pdtui.cli.driving import drive, pick_and_drive, replay
-from pdtui.cli.evaluating import evaluate
-from pdtui.cli.making import convert, dissect, pursue, train
-from pdtui.cli.sessions import sessions
-from pdtui.cli.tuning import tune
+from pdtui.cli.bench_command import bench
+from pdtui.cli.drive_commands import drive, pick_and_drive, replay
+from pdtui.cli.evaluate_command import evaluate
+from pdtui.cli.figure_command import figure
+from pdtui.cli.making_commands import convert, dissect, pursue, train
+from pdtui.cli.sessions_commands import sessions
+from pdtui.cli.shared_options import OneLineErrors
+from pdtui.cli.tune_command import tune
 
 
 @click.group(cls=OneLineErrors, invoke_without_command=True)

@@ -10,11 +10,11 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from pdtui.sessions.compare import Comparison, Deviation
-from pdtui.sessions.events import Event
-from pdtui.sessions.reader import Session
-from pdtui.sessions.summary import SessionSummary
-from pdtui.text import plain, size_of
+from pdtui.core.events import Event
+from pdtui.core.plain_text import file_size, printable
+from pdtui.sessions.session_comparison import AttributeDeviation, SessionComparison
+from pdtui.sessions.session_reader import Session
+from pdtui.sessions.session_summary import SessionSummary
 
 _KEPT = {
     "all": "of every unit, in every step",
@@ -24,7 +24,7 @@ _KEPT = {
 
 
 def _cell(text: object, style: str = "") -> Text:
-    return Text(plain(str(text)), style)
+    return Text(printable(str(text)), style)
 
 
 def _table(*columns: str, left: Sequence[str] = ()) -> Table:
@@ -40,7 +40,7 @@ def list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
         "session", "robot", "length", "keys", "size", "outcome", left=("session", "robot", "outcome")
     )
     for row in rows:
-        name, size = _cell(Path(row["path"]).relative_to(folder)), size_of(row["bytes"])
+        name, size = _cell(Path(row["path"]).relative_to(folder)), file_size(row["bytes"])
         if row["broken"]:
             table.add_row(name, "", "", "", size, _cell(f"broken: {row['broken']}", "red"))
             continue
@@ -72,7 +72,7 @@ def show_table(session: Session, summary: SessionSummary) -> Any:
         ("outcome", session.outcome or "none: the file was cut off"),
         *session.versions.items(),
     ):
-        facts.add_row(Text(plain(str(name)), "dim"), _cell(value))
+        facts.add_row(Text(printable(str(name)), "dim"), _cell(value))
     figures = Table(box=None, pad_edge=False, show_header=False)
     for name, value in (
         ("length", f"{summary.steps} steps, {summary.seconds:g} s"),
@@ -131,7 +131,7 @@ def _told(event: Event) -> str:
     }[event.kind]
 
 
-def deviation_table(deviations: Sequence[Deviation]) -> Table:
+def deviation_table(deviations: Sequence[AttributeDeviation]) -> Table:
     """One row an attribute that differs."""
     table = _table("attribute", "at first", "mean", "largest", "step", "unit", left=("attribute", "unit"))
     for row in deviations:
@@ -146,7 +146,7 @@ def deviation_table(deviations: Sequence[Deviation]) -> Table:
     return table
 
 
-def compare_table(result: Comparison) -> Any:
+def compare_table(result: SessionComparison) -> Any:
     """The first step that differs, and how far attributes are apart after it."""
     parts: list[Any] = [_cell(compare_line(result))]
     if result.first_event:
@@ -158,7 +158,7 @@ def compare_table(result: Comparison) -> Any:
     return Group(*parts)
 
 
-def compare_line(result: Comparison) -> str:
+def compare_line(result: SessionComparison) -> str:
     lengths = result.lengths
     tail = "" if lengths[0] == lengths[1] else f"; they have {lengths[0]} and {lengths[1]} steps"
     if result.first_difference is None:

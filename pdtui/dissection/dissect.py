@@ -10,26 +10,26 @@ from pathlib import Path
 
 import numpy as np
 
-from pdtui.dissection.confirm import draw_controls, select_units
-from pdtui.dissection.effort import Effort
-from pdtui.dissection.excerpt import excerpt
-from pdtui.dissection.findings import Dissection
-from pdtui.dissection.journal import Journal
-from pdtui.dissection.matching import match
-from pdtui.dissection.monitor import Progress, monitor
-from pdtui.dissection.phase import correlate
-from pdtui.dissection.probe import Prober
-from pdtui.dissection.searches import Clock, Searches
-from pdtui.dissection.settings import find_preset
-from pdtui.dissection.starts import gather
-from pdtui.dissection.steer import movable, steer
-from pdtui.dissection.workers import Crew
-from pdtui.policies.choices import NO_CHOICES, PolicyChoices
-from pdtui.policies.runtime import Policy
-from pdtui.policies.units import Stimulation, parse_unit
-from pdtui.robots.base import Robot
-from pdtui.sessions.versions import environment_versions
-from pdtui.stimulation.maps import StimulationMap
+from pdtui.core.units import Stimulation, parse_unit
+from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
+from pdtui.dissection.dissection_result import Dissection
+from pdtui.dissection.dissection_searches import DissectionSearches, TimeShare
+from pdtui.dissection.dissection_settings import DissectionSettings
+from pdtui.dissection.sample_episode import pick_sample_episode
+from pdtui.dissection.start_states import gather_start_states
+from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
+from pdtui.probing.confirmation import draw_controls, select_units
+from pdtui.probing.effect_probe import EffectProber
+from pdtui.probing.rollout_journal import RolloutJournal
+from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.robots.robot import Robot
+from pdtui.sessions.environment_versions import environment_versions
+from pdtui.spectra.matching import match_units
+from pdtui.spectra.matching_presets import find_preset
+from pdtui.spectra.monitor import StepProgress, monitor_episodes
+from pdtui.spectra.phase_correlation import correlate_phases
+from pdtui.stimulation.stimulation_map import StimulationMap
 
 StageProgress = Callable[[str, int, int], None]
 
@@ -38,14 +38,14 @@ def dissect(
     robot: str | Robot,
     policy: str | Path | Policy,
     *,
-    choices: PolicyChoices = NO_CHOICES,
+    choices: ImportOptions = NO_OPTIONS,
     preset: str = "paper",
     settings: Sequence[str] = (),
     episodes: int = 5,
     seed: int = 1000,
     budget_minutes: float | None = None,
     workers: int = 2,
-    effort: Effort | None = None,
+    effort: DissectionSettings | None = None,
     progress: StageProgress | None = None,
     journal: Path | None = None,
     start_from: StimulationMap | None = None,
@@ -60,7 +60,7 @@ def dissect(
         policy: weights file, name of a shipped policy, or a policy.
         choices: what the weights file leaves open.
         preset: ``paper`` or ``authors``.
-        settings: choices of the preset to change, ``NAME=VALUE`` each; see `pdtui.dissection.settings`.
+        settings: choices of the preset to change, ``NAME=VALUE`` each; see `pdtui.spectra.matching_presets`.
         episodes: monitored (the paper: 5).
         seed: of everything.
         budget_minutes: the searches end, with the best so far, when this is over; screening always completes.
@@ -73,21 +73,23 @@ def dissect(
     Raises:
         PdtuiError: an unknown robot, policy or preset, or a policy that falls too often to be dissected.
     """
-    spectrum, plan, began = find_preset(preset, settings), effort or Effort(), time.monotonic()
+    spectrum, plan, began = find_preset(preset, settings), effort or DissectionSettings(), time.monotonic()
 
-    def stage(name: str) -> Progress | None:
+    def stage(name: str) -> StepProgress | None:
         return None if progress is None else lambda done, of: progress(name, done, of)
 
-    with Crew(robot, policy, workers, choices) as crew, ExitStack() as stack:
+    with RolloutPool(robot, policy, workers, choices) as crew, ExitStack() as stack:
         remembered = None
         if journal is not None:
-            remembered = stack.enter_context(Journal(journal, _identity(crew)))
-        world, network, prober = crew.robot, crew.policy, Prober(crew, remembered)
+            remembered = stack.enter_context(RolloutJournal(journal, _identity(crew)))
+        world, network, prober = crew.robot, crew.policy, EffectProber(crew, remembered)
         known = _behaviors_of(start_from, network) if start_from is not None else ()
-        recorded = monitor(world, network, range(seed, seed + episodes), plan.steps, stage("monitor"))
-        matching = match(recorded, world.attributes, spectrum)
-        phase = correlate(recorded, world.attributes, spectrum)
-        starts = gather(crew, plan, seed + 100)
+        recorded = monitor_episodes(
+            world, network, range(seed, seed + episodes), plan.steps, stage("monitor")
+        )
+        matching = match_units(recorded, world.attributes, spectrum)
+        phase = correlate_phases(recorded, world.attributes, spectrum)
+        starts = gather_start_states(crew, plan, seed + 100)
         plan = starts.plan
         screen = prober.sweep(
             range(network.units),
@@ -106,8 +108,8 @@ def dissect(
             progress=stage("refine the best"),
         )
         spread = np.concatenate([episode.attributes for episode in recorded]).std(axis=0)
-        columns = movable(world.attributes, recorded)
-        steered = steer(
+        columns = movable_columns(world.attributes, recorded)
+        steered = find_attribute_movers(
             prober,
             columns,
             spread,
@@ -117,7 +119,9 @@ def dissect(
             plan,
             stage("up and down"),
         )
-        searches = Searches(prober, world, plan, seed, Clock(began, budget_minutes), stage, known)
+        searches = DissectionSearches(
+            prober, world, plan, seed, TimeShare(began, budget_minutes), stage, known
+        )
         behaviors, holds = searches.run(screen, refined, starts.searches)
         if remembered is not None:
             remembered.remove()
@@ -132,7 +136,7 @@ def dissect(
             seed=seed,
             matching=matching,
             phase=phase,
-            excerpt=excerpt(recorded, world.attributes, matching, spectrum),
+            excerpt=pick_sample_episode(recorded, world.attributes, matching, spectrum),
             screen=screen,
             refined=refined,
             controls=controls,
@@ -149,7 +153,7 @@ def dissect(
         )
 
 
-def _identity(crew: Crew) -> str:
+def _identity(crew: RolloutPool) -> str:
     """What a roll-out's outcome depends on besides its start and plan."""
     return json.dumps([crew.robot.name, crew.policy.sha256, environment_versions()])
 

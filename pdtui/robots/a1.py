@@ -9,13 +9,13 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.errors import RobotError, SimulationDiverged
-from pdtui.robots.bullet import BulletRobot, add_ground, add_plane, add_trees, data_folder
-from pdtui.robots.depth import nearness
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.robots.geometry import roll_pitch_yaw
-from pdtui.robots.terrain import Ground, rough_ground, scatter_trees
-from pdtui.robots.types import Attribute, Floats
-from pdtui.robots.urdf import links_of_urdf
+from pdtui.robots.legged.terrain import RoughGround, rough_ground, scatter_trees
+from pdtui.robots.legged.trunk_rays import nearness
+from pdtui.robots.simulators.bullet_robot import BulletRobot, add_ground, add_plane, add_trees, data_folder
+from pdtui.robots.simulators.urdf_links import links_of_urdf
 
 _LEGS = ("FR", "FL", "RR", "RL")
 _LEG_NAMES = {"FR": "front right", "FL": "front left", "RR": "rear right", "RL": "rear left"}
@@ -124,7 +124,7 @@ class A1(BulletRobot):
         bullet.setTimeStep(_DT)
         bullet.setPhysicsEngineParameter(numSolverIterations=18, enableConeFriction=0)
         angles = _STANCE + rng.uniform(-_START_NOISE, _START_NOISE, 12)
-        self.ground: Ground | None = None
+        self.ground: RoughGround | None = None
         self.obstacles = np.empty((0, 3))
         if start == "plane":
             add_plane(bullet, _FRICTION)

@@ -9,9 +9,9 @@ import numpy as np
 from gymnasium.envs.mujoco.ant_v5 import AntEnv
 from numpy.typing import NDArray
 
+from pdtui.core.attributes import Attribute, Floats
 from pdtui.robots.geometry import roll_pitch_yaw
-from pdtui.robots.mujoco import GearedMotors, MujocoRobot, links_of
-from pdtui.robots.types import Attribute, Floats
+from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, links_of
 
 _LEGS = {"1": "front left", "2": "back left", "3": "back right", "4": "front right"}
 

@@ -13,10 +13,18 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.bodies import CommandRange
 from pdtui.robots.geometry import roll_pitch_yaw, rotate
-from pdtui.robots.legged import COMMAND_SCALES, Motion, Rewards, fallen, observations, rewards
-from pdtui.robots.mujoco import MujocoRobot, links_of
-from pdtui.robots.types import Attribute, CommandRange, Floats
+from pdtui.robots.legged.legged_rewards import (
+    COMMAND_SCALES,
+    LeggedMotion,
+    RewardWeights,
+    fallen,
+    legged_observations,
+    legged_rewards,
+)
+from pdtui.robots.simulators.mujoco_robot import MujocoRobot, links_of
 
 MODEL = Path(__file__).parent / "models" / "anymal_c.xml"
 LEGS = ("LF", "LH", "RF", "RH")
@@ -70,7 +78,7 @@ class Anymal(MujocoRobot):
         self.action_space = spaces.Box(-_MOST, _MOST, (12,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (46 + len(self.commands),), np.float64)
         self._feet, self._feet_velocity = feet_of(self.model)
-        self._weights = Rewards()
+        self._weights = RewardWeights()
         self._command = np.array([1.0, 0.0, 0.0])
         self._action, self._last_action = np.zeros(12), np.zeros(12)
         self._air_time = np.zeros((1, 4))
@@ -124,7 +132,7 @@ class Anymal(MujocoRobot):
         return self.observe(), {}
 
     def observe(self) -> Floats:
-        seen: Floats = observations(self._motion(), DEFAULT, len(self.commands))[0]
+        seen: Floats = legged_observations(self._motion(), DEFAULT, len(self.commands))[0]
         return seen
 
     def step(self, action: NDArray[np.float32]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
@@ -133,14 +141,14 @@ class Anymal(MujocoRobot):
         mujoco.mj_step(self.model, self.data, SUBSTEPS)
         self._check_finite()
         motion = self._motion()
-        paid, self._air_time = rewards(
+        paid, self._air_time = legged_rewards(
             motion, self._air_time, self.control_dt, HEIGHT, DEFAULT, self._weights
         )
         info: dict[str, Any] = {"cost": 0.0}
         fell = bool(fallen(motion)[0])
         if fell:
             info["reason"] = f"fell: trunk at {self.data.qpos[2]:.2f} m"
-        return observations(motion, DEFAULT, len(self.commands))[0], float(paid[0]), fell, False, info
+        return legged_observations(motion, DEFAULT, len(self.commands))[0], float(paid[0]), fell, False, info
 
     def read_attributes(self) -> Floats:
         vx, vy, _, a, b, c = self.data.qvel[:6].tolist()
@@ -156,9 +164,9 @@ class Anymal(MujocoRobot):
     def _command_units(self) -> list[tuple[str, str]]:
         return [(name, "rad/s" if name == "yaw rate" else "m/s") for name in self.commands]
 
-    def _motion(self) -> Motion:
+    def _motion(self) -> LeggedMotion:
         sensors = self.data.sensordata
-        return Motion(
+        return LeggedMotion(
             self.data.qpos[None],
             self.data.qvel[None],
             self._action[None],

@@ -11,9 +11,10 @@ import numpy as np
 from gymnasium.envs.box2d import bipedal_walker as stock
 from numpy.typing import NDArray
 
-from pdtui.robots.environment import EnvironmentRobot
-from pdtui.robots.geometry import wrap_angle
-from pdtui.robots.types import Attribute, Floats, Link
+from pdtui.core.angles import wrap_angle
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.bodies import Link
+from pdtui.robots.environments.environment_robot import EnvironmentRobot
 
 FINISH = (stock.TERRAIN_LENGTH - stock.TERRAIN_GRASS) * stock.TERRAIN_STEP
 _GROUND = 2000.0

@@ -9,19 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from pdtui.robots.types import Floats, Link
-
-
-def wrap_angle(angle: float) -> float:
-    """The same angle in (−π, π], rad."""
-    wrapped = (angle + np.pi) % (2.0 * np.pi) - np.pi
-    return float(np.pi if wrapped == -np.pi else wrapped)
-
-
-def wrap_angles(angles: Floats) -> Floats:
-    """The same angles in [−π, π), rad, of any shape; NaN stays."""
-    wrapped: Floats = np.mod(angles + np.pi, 2.0 * np.pi) - np.pi
-    return wrapped
+    from pdtui.core.attributes import Floats
+    from pdtui.core.bodies import Link
 
 
 def multiply_quaternions(a: Floats, b: Floats) -> Floats:

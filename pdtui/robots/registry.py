@@ -16,10 +16,10 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING, Any
 
-from pdtui.errors import RobotError
+from pdtui.core.errors import RobotError
 
 if TYPE_CHECKING:
-    from pdtui.robots.base import Robot
+    from pdtui.robots.robot import Robot
 
 GROUP = "pdtui.robots"
 TRUSTED = "PDTUI_ENVIRONMENT_MODULES"
@@ -93,7 +93,7 @@ def _entry_of(name: str) -> EntryPoint | None:
 
 
 def _from_entry(entry: EntryPoint, options: dict[str, Any]) -> Robot:
-    from pdtui.robots.base import Robot
+    from pdtui.robots.robot import Robot
 
     where = f"robot '{entry.name}' (entry point {entry.value}" + (
         f" of {entry.dist.name})" if entry.dist is not None else ")"
@@ -112,12 +112,12 @@ def _from_entry(entry: EntryPoint, options: dict[str, Any]) -> Robot:
 
 
 def _from_environment(environment: str, name: str) -> Robot:
-    from pdtui.robots.environment import make_environment
-    from pdtui.robots.generic_env import ObservedRobot
-    from pdtui.robots.generic_mujoco import MujocoEnvironmentRobot, is_mujoco
+    from pdtui.robots.environments.environment_robot import make_environment
+    from pdtui.robots.environments.mujoco_environment import MujocoEnvironmentRobot, is_mujoco
+    from pdtui.robots.environments.observation_robot import ObservationRobot
 
     env = make_environment(environment)
-    kind = MujocoEnvironmentRobot if is_mujoco(env) else ObservedRobot
+    kind = MujocoEnvironmentRobot if is_mujoco(env) else ObservationRobot
     env.close()
     return kind(name, environment=environment)
 

@@ -10,9 +10,9 @@ import numpy as np
 from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv
 from numpy.typing import NDArray
 
-from pdtui.robots.geometry import wrap_angle
-from pdtui.robots.mujoco import GearedMotors, MujocoRobot, links_of
-from pdtui.robots.types import Attribute, Floats
+from pdtui.core.angles import wrap_angle
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, links_of
 
 _LONGEST_STRIDE = 0.4
 """s"""

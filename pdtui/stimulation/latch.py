@@ -3,33 +3,13 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
 
-from pdtui.errors import EventError
-from pdtui.policies.units import NO_STIMULATION, Stimulation, parse_unit
-from pdtui.robots.types import Attribute, Floats, column_of
-from pdtui.stimulation.magnitude import PidMagnitude
-from pdtui.stimulation.maps import Behavior, StimulationMap
-
-
-@dataclass(frozen=True)
-class ActiveBehavior:
-    """A latched behavior as the screen and the session see it.
-
-    Attributes:
-        name: of the behavior.
-        remaining: control steps until its period ends; None lasts until another key.
-        factor: by how much the operator scaled the map's magnitudes.
-        target, value, error, magnitude: of the controller in mode ``pid``, else None.
-    """
-
-    name: str
-    remaining: int | None
-    factor: float = 1.0
-    target: float | None = None
-    value: float | None = None
-    error: float | None = None
-    magnitude: float | None = None
+from pdtui.core.attributes import Attribute, Floats, column_of
+from pdtui.core.errors import KeystrokeError
+from pdtui.core.step_record import ActiveBehavior
+from pdtui.core.units import NO_STIMULATION, Stimulation, parse_unit
+from pdtui.stimulation.pid_magnitude import PidMagnitude
+from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 
 class _Latched:
@@ -144,7 +124,7 @@ class Latch:
         """
         controller = self._find(name).controller
         if controller is None:
-            raise EventError(f"behavior '{name}' holds no target; its mode is fixed")
+            raise KeystrokeError(f"behavior '{name}' holds no target; its mode is fixed")
         controller.set_target(target)
 
     def set_factor(self, name: str, factor: float) -> None:
@@ -196,11 +176,11 @@ class Latch:
     def _behavior(self, name: str) -> Behavior:
         if name not in self._map.behaviors:
             known = ", ".join(self._map.behaviors)
-            raise EventError(f"{self._map.source}: no behavior '{name}'; there are {known}")
+            raise KeystrokeError(f"{self._map.source}: no behavior '{name}'; there are {known}")
         return self._map.behaviors[name]
 
     def _find(self, name: str) -> _Latched:
         for latched in self._latched:
             if latched.behavior.name == name:
                 return latched
-        raise EventError(f"behavior '{name}' is not latched")
+        raise KeystrokeError(f"behavior '{name}' is not latched")

@@ -13,27 +13,25 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
-from pdtui.robots.anymal import (
-    ACTION_SCALE,
-    COMMANDS,
-    DEFAULT,
-    HEIGHT,
-    MODEL,
-    SUBSTEPS,
-    Anymal,
-    feet_of,
+from pdtui.core.attributes import Floats
+from pdtui.core.bodies import RobotState
+from pdtui.robots.anymal import ACTION_SCALE, COMMANDS, DEFAULT, HEIGHT, MODEL, SUBSTEPS, Anymal, feet_of
+from pdtui.robots.legged.legged_rewards import (
+    LeggedMotion,
+    RewardWeights,
+    fallen,
+    legged_observations,
+    legged_rewards,
 )
-from pdtui.robots.legged import Motion, Rewards, fallen, observations, rewards
-from pdtui.robots.types import Floats, RobotSnapshot
-from pdtui.training.sac import Batch
-from pdtui.training.worlds import WorldsState
+from pdtui.training.sac import TransitionBatch
+from pdtui.training.world_batch import WorldBatchState
 
 _THREADS = 2
 _NQ, _NV = 19, 18
 
 
 @dataclass(frozen=True)
-class Randomisation:
+class DomainRandomisation:
     """What differs between worlds, and from step to step.
 
     Attributes:
@@ -54,7 +52,7 @@ class Randomisation:
     noise: tuple[float, ...] = (0.01, 0.05, 0.1, 0.03, 0.01, 0.5)
 
 
-class LeggedWorlds:
+class LeggedWorldBatch:
     """A batch of ANYmals that start over by themselves; offers what `worlds.Worlds` does.
 
     Args:
@@ -67,7 +65,7 @@ class LeggedWorlds:
 
     def __init__(self, name: str, commands: int, count: int, seed: int, episode: int) -> None:
         self._name, self._count, self._episode, self._commands = name, count, episode, commands
-        self._random, self._weights = Randomisation(), Rewards()
+        self._random, self._weights = DomainRandomisation(), RewardWeights()
         low, high, number = self._random.frictions
         shared = [mujoco.MjModel.from_xml_path(str(MODEL)) for _ in range(number)]
         for model, friction in zip(shared, np.linspace(low, high, number), strict=True):
@@ -91,7 +89,7 @@ class LeggedWorlds:
         self._age[:] = self._rng.integers(0, episode, count)
         self.observations = self._observe(self._motion(np.zeros((count, 24)), np.zeros((count, 12))))
 
-    def step(self, actions: NDArray[np.float32]) -> Batch:
+    def step(self, actions: NDArray[np.float32]) -> TransitionBatch:
         """Step every robot once and return the transitions, leading axis (worlds,)."""
         before = self.observations
         self._last_action, self._action = self._action, actions.astype(np.float64)
@@ -104,7 +102,9 @@ class LeggedWorlds:
         joints = self._physics[:, 8 : 1 + _NQ], self._physics[:, 1 + _NQ + 6 :]
         torque = np.clip(80.0 * (targets - joints[0]) - 2.0 * joints[1], -80.0, 80.0)
         motion = self._motion(sensors[:, -1], torque)
-        paid, self._air_time = rewards(motion, self._air_time, self._dt, HEIGHT, DEFAULT, self._weights)
+        paid, self._air_time = legged_rewards(
+            motion, self._air_time, self._dt, HEIGHT, DEFAULT, self._weights
+        )
         fell = fallen(motion) | ~np.isfinite(self._physics).all(axis=1)
         self._age += 1
         self.restarted = fell | (self._age >= self._episode)
@@ -112,11 +112,11 @@ class LeggedWorlds:
         self._start_over(self.restarted)
         self._disturb()
         self.observations = self._observe(self._motion(sensors[:, -1], torque))
-        return Batch(
+        return TransitionBatch(
             before, actions, paid.astype(np.float32), (~fell).astype(np.float32), np.nan_to_num(following)
         )
 
-    def state(self) -> WorldsState:
+    def state(self) -> WorldBatchState:
         """All worlds as one snapshot: they share their random numbers."""
         extras = (
             self._command,
@@ -127,10 +127,10 @@ class LeggedWorlds:
             self.observations.astype(np.float64),
         )
         rng: Any = self._rng.bit_generator.state
-        kept = RobotSnapshot(self._name, self._physics.copy(), tuple(one.copy() for one in extras), rng)
-        return WorldsState([kept], list(self.ages))
+        kept = RobotState(self._name, self._physics.copy(), tuple(one.copy() for one in extras), rng)
+        return WorldBatchState([kept], list(self.ages))
 
-    def restore(self, state: WorldsState) -> None:
+    def restore(self, state: WorldBatchState) -> None:
         (kept,) = state.snapshots
         self._physics = kept.state.copy()
         self._command, self._action, self._last_action, self._air_time = (
@@ -139,8 +139,8 @@ class LeggedWorlds:
         self._age, self.observations = kept.extras[4].astype(np.int64), kept.extras[5].astype(np.float32)
         self._rng.bit_generator.state = kept.rng
 
-    def _motion(self, sensors: Floats, torque: Floats) -> Motion:
-        return Motion(
+    def _motion(self, sensors: Floats, torque: Floats) -> LeggedMotion:
+        return LeggedMotion(
             self._physics[:, 1 : 1 + _NQ],
             self._physics[:, 1 + _NQ :],
             self._action,
@@ -151,8 +151,8 @@ class LeggedWorlds:
             sensors[:, self._feet_velocity].reshape(-1, 4, 3),
         )
 
-    def _observe(self, motion: Motion) -> NDArray[np.float32]:
-        clean = observations(motion, DEFAULT, self._commands)
+    def _observe(self, motion: LeggedMotion) -> NDArray[np.float32]:
+        clean = legged_observations(motion, DEFAULT, self._commands)
         height, velocity, turning, gravity, joints, speeds = self._random.noise
         spread = np.concatenate(
             [

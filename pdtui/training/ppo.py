@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from pdtui.training.mlp import Params, init_mlp, tanh_mlp
+from pdtui.training.jax_mlp import MlpParameters, init_mlp, tanh_mlp
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,9 @@ class PpoConfig:
 class PpoState(NamedTuple):
     """All that learning changes; a tree of arrays."""
 
-    actor: Params
+    actor: MlpParameters
     log_std: jax.Array
-    critic: Params
+    critic: MlpParameters
     optimiser: Any
     rate: jax.Array
     key: jax.Array
@@ -62,11 +62,11 @@ class PpoState(NamedTuple):
     variance: jax.Array
     rows_seen: jax.Array
     iterations: jax.Array
-    average: Params
+    average: MlpParameters
     """Moving average of the actor: it walks more steadily than any single actor, so it is what is kept."""
 
 
-class Rollout(NamedTuple):
+class PpoRollout(NamedTuple):
     """What was collected, leading axes (steps, worlds); observations are raw, actions before tanh."""
 
     observation: Any
@@ -125,7 +125,7 @@ class PpoLearner:
             jax.tree.map(jnp.copy, actor),
         )
 
-    def folded_actor(self, state: PpoState) -> Params:
+    def folded_actor(self, state: PpoState) -> MlpParameters:
         """The actor on raw observations, with log standard deviations as constant outputs."""
         deviation = jnp.sqrt(state.variance + 1e-8)
         first = state.average[0]
@@ -140,7 +140,7 @@ class PpoLearner:
             },
         ]
 
-    def _update(self, state: PpoState, rollout: Rollout) -> tuple[PpoState, jax.Array]:
+    def _update(self, state: PpoState, rollout: PpoRollout) -> tuple[PpoState, jax.Array]:
         """One iteration on a roll-out; also returns the mean divergence."""
         state = self._observe(state, rollout.observation.reshape(-1, self.observations))
         samples = self._samples(state, rollout)
@@ -172,7 +172,7 @@ class PpoLearner:
             rows_seen=jnp.minimum(total, 2_000_000.0),
         )
 
-    def _samples(self, state: PpoState, rollout: Rollout) -> _Sample:
+    def _samples(self, state: PpoState, rollout: PpoRollout) -> _Sample:
         config = self.config
         observation = normalise(state, rollout.observation)
         value = tanh_mlp(state.critic, observation)[..., 0]
@@ -205,7 +205,7 @@ class PpoLearner:
     def _step(self, state: PpoState, batch: _Sample) -> tuple[PpoState, jax.Array]:
         config = self.config
 
-        def loss(parameters: tuple[Params, jax.Array, Params]) -> tuple[jax.Array, jax.Array]:
+        def loss(parameters: tuple[MlpParameters, jax.Array, MlpParameters]) -> tuple[jax.Array, jax.Array]:
             actor, log_std, critic = parameters
             mean = tanh_mlp(actor, batch.observation)
             ratio = jnp.exp(_log_prob(mean, log_std, batch.action) - batch.log_prob)

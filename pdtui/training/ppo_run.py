@@ -13,21 +13,21 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.policies.files import find_weights, load_network
-from pdtui.training.graft import actor_of, graft
-from pdtui.training.mlp import Params
-from pdtui.training.ppo import PpoConfig, PpoLearner, PpoState, Rollout, act
-from pdtui.training.recipes import RECIPES
-from pdtui.training.remote import RemoteWorlds
-from pdtui.training.run import Run, numpy_actor
-from pdtui.training.worlds import Worlds
+from pdtui.policies.weights.weights_file import find_weights_file, load_network
+from pdtui.training.jax_mlp import MlpParameters
+from pdtui.training.policy_graft import actor_of, graft_policy
+from pdtui.training.ppo import PpoConfig, PpoLearner, PpoRollout, PpoState, act
+from pdtui.training.remote_worlds import RemoteWorldBatch
+from pdtui.training.training_recipes import RECIPES
+from pdtui.training.training_run import TrainingRun, numpy_actor
+from pdtui.training.world_batch import WorldBatch
 
 THREADS = 2
 _FIRST_LOOK = 200
 
 
-class PpoRun(Run):
-    """A run of PPO; see `Run`."""
+class PpoTrainingRun(TrainingRun):
+    """A run of PPO; see `TrainingRun`."""
 
     algorithm: ClassVar[str] = "ppo"
 
@@ -43,23 +43,23 @@ class PpoRun(Run):
         if build is not None:
             self.worlds = [build(self.config.worlds, seeds[0], self.make().episode_steps)]
         elif self.config.processes:
-            self.worlds = [RemoteWorlds(self.robot, self._options, share, seed) for seed in seeds]
+            self.worlds = [RemoteWorldBatch(self.robot, self._options, share, seed) for seed in seeds]
         else:
-            self.worlds = [Worlds(self.make, share, seed) for seed in seeds]
+            self.worlds = [WorldBatch(self.make, share, seed) for seed in seeds]
         self.learner = PpoLearner(self.config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self._threads = ThreadPoolExecutor(THREADS)
         if RECIPES[self.robot].begin and not self.checkpoint.exists():
-            self._begin_from(find_weights(RECIPES[self.robot].begin))
+            self._begin_from(find_weights_file(RECIPES[self.robot].begin))
 
     def advance(self) -> int:
         on_host: PpoState = jax.tree.map(np.asarray, self.state)
         rows = [self._collect(on_host) for _ in range(self.config.chunk)]
-        rollout = Rollout(*(np.stack(column) for column in zip(*rows, strict=True)))
+        rollout = PpoRollout(*(np.stack(column) for column in zip(*rows, strict=True)))
         self.state, _ = self.learner.update(self.state, rollout)
         return self.config.worlds * self.config.chunk
 
-    def kept_actor(self) -> Params:
+    def kept_actor(self) -> MlpParameters:
         return self.learner.folded_actor(self.state)
 
     def _begin_from(self, weights: Path) -> None:
@@ -72,9 +72,9 @@ class PpoRun(Run):
             actions = self.to_robot(act(observations[:, :inputs]))
             shares = np.split(actions, len(self.worlds))
             list(self._threads.map(_step, self.worlds, shares))
-        self.state = graft(self.learner, self.state, actor, np.concatenate(seen))
+        self.state = graft_policy(self.learner, self.state, actor, np.concatenate(seen))
 
-    def _collect(self, state: PpoState) -> Rollout:
+    def _collect(self, state: PpoState) -> PpoRollout:
         observation = np.concatenate([group.observations for group in self.worlds])
         action = act(state, observation, self.rng)
         shares = np.split(self.to_robot(np.tanh(action)), len(self.worlds))
@@ -84,10 +84,10 @@ class PpoRun(Run):
             return np.concatenate([getattr(row, column) for row in rows])
 
         restarted = np.concatenate([group.restarted for group in self.worlds]).astype(np.float32)
-        return Rollout(
+        return PpoRollout(
             observation, action, joined("reward"), joined("discount"), joined("following"), restarted
         )
 
 
-def _step(group: Worlds, actions: NDArray[np.float32]) -> Any:
+def _step(group: WorldBatch, actions: NDArray[np.float32]) -> Any:
     return group.step(actions)

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from pdtui.training.mlp import Params, init_mlp, tanh_mlp
+from pdtui.training.jax_mlp import MlpParameters, init_mlp, tanh_mlp
 
 
 @dataclass(frozen=True)
@@ -39,22 +39,22 @@ class SacConfig:
     evaluate_steps: int = 1000
 
 
-class LearnerState(NamedTuple):
+class SacState(NamedTuple):
     """All that learning changes; a tree of arrays."""
 
-    actor: Params
-    critics: Params
-    targets: Params
+    actor: MlpParameters
+    critics: MlpParameters
+    targets: MlpParameters
     log_alpha: jax.Array
     actor_opt: Any
     critic_opt: Any
     alpha_opt: Any
     key: jax.Array
-    average: Params
+    average: MlpParameters
     """Moving average of the actor: it walks more steadily than any single actor, so it is what is kept."""
 
 
-class Batch(NamedTuple):
+class TransitionBatch(NamedTuple):
     """Transitions, NumPy or JAX, float32; those to learn from have leading axes (pairs, 2, batch)."""
 
     observation: Any
@@ -64,13 +64,13 @@ class Batch(NamedTuple):
     following: Any
 
 
-def actor_forward(params: Params, observation: jax.Array) -> tuple[jax.Array, jax.Array]:
+def actor_forward(params: MlpParameters, observation: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Mean and log standard deviation before squashing, each (..., actions)."""
     mean, log_std = jnp.split(tanh_mlp(params, observation), 2, axis=-1)
     return mean, jnp.clip(log_std, -5.0, 2.0)
 
 
-def _critic_forward(params: Params, observation: jax.Array, action: jax.Array) -> jax.Array:
+def _critic_forward(params: MlpParameters, observation: jax.Array, action: jax.Array) -> jax.Array:
     x = jnp.concatenate([observation, action], axis=-1)
     for layer in params[:-1]:
         x = x @ layer["w"] + layer["b"]
@@ -84,7 +84,7 @@ def _critic_forward(params: Params, observation: jax.Array, action: jax.Array) -
 _both_critics = jax.vmap(_critic_forward, in_axes=(0, None, None))
 
 
-def _sample(params: Params, observation: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
+def _sample(params: MlpParameters, observation: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
     """A squashed action and its log probability."""
     mean, log_std = actor_forward(params, observation)
     noise = jax.random.normal(key, mean.shape)
@@ -110,7 +110,7 @@ class SacLearner:
         self._alpha_tx = optax.adam(half)
         self.update = jax.jit(self._update)
 
-    def init(self, seed: int) -> LearnerState:
+    def init(self, seed: int) -> SacState:
         """The untrained state."""
         config = self.config
         key, actor_key, *critic_keys = jax.random.split(jax.random.PRNGKey(seed), 4)
@@ -118,7 +118,7 @@ class SacLearner:
         widths = (self.observations + self.actions, *config.layers, 1)
         critics = jax.vmap(partial(init_mlp, widths=widths, layer_norm=True))(jnp.stack(critic_keys))
         log_alpha = jnp.zeros(())
-        return LearnerState(
+        return SacState(
             actor,
             critics,
             jax.tree.map(jnp.copy, critics),
@@ -130,14 +130,14 @@ class SacLearner:
             jax.tree.map(jnp.copy, actor),
         )
 
-    def _critic_step(self, state: LearnerState, batch: Batch) -> LearnerState:
+    def _critic_step(self, state: SacState, batch: TransitionBatch) -> SacState:
         key, action_key = jax.random.split(state.key)
         following, log_prob = _sample(state.actor, batch.following, action_key)
         future = _both_critics(state.targets, batch.following, following).min(0)
         future = future - jnp.exp(state.log_alpha) * log_prob
         goal = batch.reward + batch.discount * self.config.discount * future
 
-        def loss(critics: Params) -> jax.Array:
+        def loss(critics: MlpParameters) -> jax.Array:
             value = _both_critics(critics, batch.observation, batch.action)
             total: jax.Array = ((value - goal) ** 2).mean(-1).sum()
             return total
@@ -148,11 +148,11 @@ class SacLearner:
         targets = jax.tree.map(lambda old, new: old + tau * (new - old), state.targets, critics)
         return state._replace(critics=critics, targets=targets, critic_opt=critic_opt, key=key)
 
-    def _actor_step(self, state: LearnerState, batch: Batch) -> LearnerState:
+    def _actor_step(self, state: SacState, batch: TransitionBatch) -> SacState:
         key, action_key = jax.random.split(state.key)
         alpha = jnp.exp(state.log_alpha)
 
-        def loss(actor: Params) -> tuple[jax.Array, jax.Array]:
+        def loss(actor: MlpParameters) -> tuple[jax.Array, jax.Array]:
             action, log_prob = _sample(actor, batch.observation, action_key)
             value = _both_critics(state.critics, batch.observation, action).min(0)
             return (alpha * log_prob - value).mean(), log_prob.mean()
@@ -172,12 +172,12 @@ class SacLearner:
             key=key,
         )
 
-    def _update(self, state: LearnerState, batches: Batch) -> LearnerState:
+    def _update(self, state: SacState, batches: TransitionBatch) -> SacState:
         """Run `updates` critic updates and half as many actor updates; leading axes (pairs, 2, batch)."""
 
-        def pair(state: LearnerState, batch: Batch) -> tuple[LearnerState, None]:
-            state = self._critic_step(state, Batch(*(leaf[0] for leaf in batch)))
-            second = Batch(*(leaf[1] for leaf in batch))
+        def pair(state: SacState, batch: TransitionBatch) -> tuple[SacState, None]:
+            state = self._critic_step(state, TransitionBatch(*(leaf[0] for leaf in batch)))
+            second = TransitionBatch(*(leaf[1] for leaf in batch))
             return self._actor_step(self._critic_step(state, second), second), None
 
         return jax.lax.scan(pair, state, batches)[0]

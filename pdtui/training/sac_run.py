@@ -8,15 +8,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.training.mlp import Params
-from pdtui.training.replay import ReplayBuffer
-from pdtui.training.run import Run, numpy_actor
-from pdtui.training.sac import Batch, SacConfig, SacLearner
-from pdtui.training.worlds import Actor, Worlds
+from pdtui.training.jax_mlp import MlpParameters
+from pdtui.training.replay_buffer import ReplayBuffer
+from pdtui.training.sac import SacConfig, SacLearner, TransitionBatch
+from pdtui.training.training_run import TrainingRun, numpy_actor
+from pdtui.training.world_batch import Actor, WorldBatch
 
 
-class SacRun(Run):
-    """A run of SAC; see `Run`."""
+class SacTrainingRun(TrainingRun):
+    """A run of SAC; see `TrainingRun`."""
 
     algorithm: ClassVar[str] = "sac"
 
@@ -28,7 +28,7 @@ class SacRun(Run):
 
     def build(self) -> None:
         config = self.config
-        self.worlds = [Worlds(self.make, config.worlds, self.seed)]
+        self.worlds = [WorldBatch(self.make, config.worlds, self.seed)]
         self.learner = SacLearner(config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self.replay = ReplayBuffer(config.capacity, self.observations, self.actions)
@@ -45,8 +45,8 @@ class SacRun(Run):
             self._collect(actor)
         return chunk
 
-    def kept_actor(self) -> Params:
-        params: Params = self.state.average
+    def kept_actor(self) -> MlpParameters:
+        params: MlpParameters = self.state.average
         return params
 
     def memory(self) -> dict[str, NDArray[Any]]:
@@ -66,4 +66,6 @@ class SacRun(Run):
         else:
             squashed = actor(worlds.observations)
         rows = worlds.step(self.to_robot(squashed))
-        self.replay.add(Batch(rows.observation, squashed, rows.reward, rows.discount, rows.following))
+        self.replay.add(
+            TransitionBatch(rows.observation, squashed, rows.reward, rows.discount, rows.following)
+        )

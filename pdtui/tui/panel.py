@@ -14,13 +14,13 @@ from textual.reactive import reactive
 from textual.strip import Strip
 from textual.widget import Widget
 
-from pdtui.tui.palette import Palette, palette_of
+from pdtui.tui.theme import ThemeStyles, theme_styles
 
 if TYPE_CHECKING:
     from textual import events
 
-    from pdtui.stimulation.maps import StimulationMap
-    from pdtui.teleop.snapshot import Briefing, Snapshot
+    from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
+    from pdtui.stimulation.stimulation_map import StimulationMap
 
 
 Sides = tuple[Strip, Strip, Color, Style]
@@ -35,8 +35,8 @@ class Panel(Widget, can_focus=False, inherit_bindings=False):
     """
 
     ALLOW_SELECT: ClassVar[bool] = False
-    briefing: reactive[Briefing | None] = reactive(None, init=False, repaint=False, always_update=True)
-    snapshot: reactive[Snapshot | None] = reactive(None, init=False, repaint=False, always_update=True)
+    facts: reactive[DriveFacts | None] = reactive(None, init=False, repaint=False, always_update=True)
+    snapshot: reactive[DriveSnapshot | None] = reactive(None, init=False, repaint=False, always_update=True)
 
     def __init__(self, stimulation_map: StimulationMap, *, id: str | None = None) -> None:
         super().__init__(id=id)
@@ -44,28 +44,28 @@ class Panel(Widget, can_focus=False, inherit_bindings=False):
         self._strips: list[Strip] = []
         self._framed: list[Strip | None] = []
         self._sides: Sides | None = None
-        self._palette: Palette | None = None
+        self._palette: ThemeStyles | None = None
 
     @abstractmethod
     def paint(self, width: int, height: int) -> list[Strip]:
         """The lines of the panel as it is now; missing ones are blank."""
 
-    def remember(self, snapshot: Snapshot) -> None:
+    def remember(self, snapshot: DriveSnapshot) -> None:
         """Keep what later frames need of this snapshot; called once for each."""
         del snapshot
 
     @property
-    def palette(self) -> Palette:
+    def palette(self) -> ThemeStyles:
         """Styles of the present theme."""
         if self._palette is None:
-            self._palette = palette_of(self.app.theme_variables)
+            self._palette = theme_styles(self.app.theme_variables)
         return self._palette
 
-    def watch_briefing(self) -> None:
+    def watch_facts(self) -> None:
         """Robot and policy are loaded."""
         self.redraw()
 
-    def watch_snapshot(self, snapshot: Snapshot | None) -> None:
+    def watch_snapshot(self, snapshot: DriveSnapshot | None) -> None:
         """A newer picture of the drive has come."""
         if snapshot is not None:
             self.remember(snapshot)

@@ -11,7 +11,7 @@ _LEVELS = np.array([ord(character) for character in " ▁▂▃▄▅▆▇█"]
 _LEAST_SHARE = 0.05
 
 
-class History:
+class AttributeHistory:
     """The last `length` rows of J numbers.
 
     Args:
@@ -54,7 +54,7 @@ class History:
         return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
-def sparklines(means: Floats, low: Floats, high: Floats) -> list[str]:
+def draw_sparklines(means: Floats, low: Floats, high: Floats) -> list[str]:
     """One line of block characters for each column of means (cells, J).
 
     Each is scaled to what it shows, but to no less than a twentieth of the range `low` to `high` that was

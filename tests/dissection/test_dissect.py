@@ -11,25 +11,25 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from pdtui.dissection.combine import Found, Starts
-from pdtui.dissection.confirm import rank_correlation
+from pdtui.core.errors import MapError
+from pdtui.core.units import Stimulation
 from pdtui.dissection.dissect import dissect
-from pdtui.dissection.findings import Dissection
-from pdtui.dissection.goals import GOALS, gains, score
-from pdtui.dissection.hold import Held
-from pdtui.dissection.monitor import collect_starts
-from pdtui.dissection.probe import Effects, Prober
-from pdtui.dissection.propose import propose
-from pdtui.dissection.report import render
-from pdtui.dissection.searches import Clock, Searches
-from pdtui.dissection.settings import PRESETS, find_preset, settings_of
-from pdtui.dissection.summary import summarise
-from pdtui.dissection.workers import Crew
-from pdtui.errors import MapError
-from pdtui.policies.files import file_hash
-from pdtui.policies.units import Stimulation
-from pdtui.stimulation.mapfile import parse_map
-from pdtui.stimulation.maps import Measured, Pid
+from pdtui.dissection.dissection_result import Dissection
+from pdtui.dissection.dissection_searches import DissectionSearches, TimeShare
+from pdtui.dissection.dissection_summary import summarise_dissection
+from pdtui.dissection.dissection_tables import print_tables
+from pdtui.dissection.draft_map import draft_map
+from pdtui.policies.weights.weights_file import hash_file
+from pdtui.probing.confirmation import rank_correlation
+from pdtui.probing.effect_probe import EffectProber, PlanEffects
+from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.search.behavior_goals import GOALS, goal_gains, goal_scores
+from pdtui.search.behavior_search import FoundBehavior, SearchStarts
+from pdtui.search.controller_search import FoundController
+from pdtui.spectra.matching_presets import PRESETS, find_preset, preset_values
+from pdtui.spectra.monitor import collect_start_states
+from pdtui.stimulation.map_reader import parse_map
+from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains
 from tests.small_dissection import SMALL
 
 
@@ -45,12 +45,12 @@ def test_the_result_does_not_depend_on_the_workers(dissection: Dissection, polic
     np.testing.assert_array_equal(again.screen.effects, dissection.screen.effects)
     assert again.behaviors == dissection.behaviors
     assert again.holds == dissection.holds
-    assert propose(again) == propose(dissection)
+    assert draft_map(again) == draft_map(dissection)
 
 
 def test_summary_is_json_and_names_what_was_asked(dissection: Dissection, policy_file: Path) -> None:
-    summary = json.loads(json.dumps(summarise(dissection), allow_nan=False))
-    assert summary["sha256"] == file_hash(policy_file)
+    summary = json.loads(json.dumps(summarise_dissection(dissection), allow_nan=False))
+    assert summary["sha256"] == hash_file(policy_file)
     vx = summary["attributes"][0]
     assert vx["name"] == "vx"
     best = dissection.matching.discrepancy[0].min()
@@ -58,8 +58,8 @@ def test_summary_is_json_and_names_what_was_asked(dissection: Dissection, policy
 
 
 def test_summary_holds_every_setting_and_the_whole_match(dissection: Dissection) -> None:
-    summary = summarise(dissection)
-    assert summary["settings"] == settings_of(PRESETS["paper"])
+    summary = summarise_dissection(dissection)
+    assert summary["settings"] == preset_values(PRESETS["paper"])
     assert summary["settings_changed"] == []
     keys = {"unit", "flaw", "discrepancy", "level_share", "rho", "rho_circular", "rho_disagree"}
     for attribute in summary["attributes"]:
@@ -77,14 +77,14 @@ def test_a_silent_unit_and_a_broken_attribute_are_marked_rows(dissection: Dissec
         unit_flaws={9: "never fires"},
     )
     broken = replace(dissection, matching=matching, preset=find_preset("paper", ["hop=8"]))
-    summary = json.loads(json.dumps(summarise(broken), allow_nan=False))
+    summary = json.loads(json.dumps(summarise_dissection(broken), allow_nan=False))
     assert summary["settings_changed"] == ["hop=8"]
     assert summary["unit_flaws"] == {"1:1": "never fires"}
     vx, vy = summary["attributes"][:2]
     assert (vx["frequency"], vx["matches"]) == (None, [])
     assert (vy["matches"][0]["unit"], vy["matches"][0]["flaw"]) == ("1:1", "never fires")
     screen = StringIO()
-    Console(file=screen, width=220).print(render(broken))
+    Console(file=screen, width=220).print(print_tables(broken))
     for text in (
         "Matching (paper hop=8)",
         "1:1 †",
@@ -96,7 +96,7 @@ def test_a_silent_unit_and_a_broken_attribute_are_marked_rows(dissection: Dissec
 
 def test_report_shows_every_attribute_and_behavior(dissection: Dissection) -> None:
     screen = StringIO()
-    Console(file=screen, width=220).print(render(dissection))
+    Console(file=screen, width=220).print(print_tables(dissection))
     for name in (
         "yaw rate",
         "front left hip torque",
@@ -107,7 +107,7 @@ def test_report_shows_every_attribute_and_behavior(dissection: Dissection) -> No
 
 
 def test_a_small_trembling_ant_gets_no_behavior_and_the_map_says_so(dissection: Dissection) -> None:
-    text = propose(dissection)
+    text = draft_map(dissection)
     parsed = tomllib.loads(text)
     reached = [found.goal.name for found in dissection.behaviors if found.reached]
     held = ["hold heading" for held in dissection.holds if held.holds]
@@ -118,12 +118,14 @@ def test_a_small_trembling_ant_gets_no_behavior_and_the_map_says_so(dissection: 
 
 
 def test_what_was_found_is_in_the_map(dissection: Dissection) -> None:
-    sure = Measured(1.2, 1.0, 1.4)
-    up = Found(GOALS[1], Stimulation((3, 9), (-2.5, 4.0)), 1.5, 1.6, sure, sure, 1.0, 0.0, 1.2, 0.0, 10)
-    held = Held(
-        Stimulation((9,), (-1.0,)), Pid("yaw", 6.0, 0.0, 0.0, 4.0, 0.2), 0.1, 0.6, 0.0, (-0.4, 0.4), True
+    sure = MeasuredEffect(1.2, 1.0, 1.4)
+    up = FoundBehavior(
+        GOALS[1], Stimulation((3, 9), (-2.5, 4.0)), 1.5, 1.6, sure, sure, 1.0, 0.0, 1.2, 0.0, 10
     )
-    text = propose(replace(dissection, behaviors=(up,), holds=(held,)))
+    held = FoundController(
+        Stimulation((9,), (-1.0,)), PidGains("yaw", 6.0, 0.0, 0.0, 4.0, 0.2), 0.1, 0.6, 0.0, (-0.4, 0.4), True
+    )
+    text = draft_map(replace(dissection, behaviors=(up,), holds=(held,)))
     parsed = tomllib.loads(text)
     parse_map(text, "proposed").check("ant", dissection.layers, dissection.policy_hash)
     assert parsed["schema"] == 1
@@ -144,7 +146,7 @@ def test_what_was_found_is_in_the_map(dissection: Dissection) -> None:
 
 
 def test_a_primitive_carries_what_was_measured(dissection: Dissection) -> None:
-    for entry in tomllib.loads(propose(dissection)).get("primitives", []):
+    for entry in tomllib.loads(draft_map(dissection)).get("primitives", []):
         assert entry["measured"]["low"] * entry["measured"]["high"] > 0
         assert entry["value"] in SMALL.screen_values
 
@@ -156,9 +158,9 @@ def test_a_budget_that_is_over_still_screens(policy_file: Path) -> None:
     assert quick.holds == ()
 
 
-def effects(means: list[list[float]], falls: list[list[bool]], unperturbed: list[float]) -> Effects:
+def effects(means: list[list[float]], falls: list[list[bool]], unperturbed: list[float]) -> PlanEffects:
     stimulated, without = np.array(means)[..., None], np.array(unperturbed)[:, None]
-    return Effects(
+    return PlanEffects(
         stimulated - without, stimulated, without, np.array(falls), np.full(stimulated.shape, np.nan)
     )
 
@@ -166,7 +168,7 @@ def effects(means: list[list[float]], falls: list[list[bool]], unperturbed: list
 def test_a_stop_gains_the_share_of_the_speed_that_is_gone() -> None:
     stop = GOALS[0]
     result = effects([[0.0, 1.0, 3.0]], [[False, False, False]], [4.0, 2.0, 2.0])
-    np.testing.assert_allclose(gains(stop, 0, result), [[1.0, 0.5, -0.5]])
+    np.testing.assert_allclose(goal_gains(stop, 0, result), [[1.0, 0.5, -0.5]])
 
 
 def test_scores_want_every_start_and_no_falls() -> None:
@@ -174,11 +176,11 @@ def test_scores_want_every_start_and_no_falls() -> None:
     never = [[False] * 5] * 2
     result = effects([[0.7] * 5, [2.0, 2.0, 2.0, 0.0, 0.0]], never, [0.0] * 5)
     # By hand: halfway between mean (0.7 and 1.2) and lower fifth (0.7 and 0), in parts of 0.7.
-    np.testing.assert_allclose(score(up, 0, result, [1, 1]), [1.0, 0.6 / 0.7])
-    np.testing.assert_allclose(score(up, 0, result, [4, 4]), [0.96, 0.6 / 0.7 - 0.04])
-    assert score(down, 0, result, [1, 1])[0] == pytest.approx(-1.0)
+    np.testing.assert_allclose(goal_scores(up, 0, result, [1, 1]), [1.0, 0.6 / 0.7])
+    np.testing.assert_allclose(goal_scores(up, 0, result, [4, 4]), [0.96, 0.6 / 0.7 - 0.04])
+    assert goal_scores(down, 0, result, [1, 1])[0] == pytest.approx(-1.0)
     fell = effects([[1.4] * 5], [[True, False, False, False, False]], [0.0] * 5)
-    np.testing.assert_allclose(gains(up, 0, fell), [[0.0, 1.4, 1.4, 1.4, 1.4]])
+    np.testing.assert_allclose(goal_gains(up, 0, fell), [[0.0, 1.4, 1.4, 1.4, 1.4]])
 
 
 def test_rank_correlation() -> None:
@@ -194,7 +196,7 @@ def test_searches_begin_from_a_maps_behaviors(policy_file: Path) -> None:
     text = f"""
 schema = 1
 robot = "ant"
-policy = {{ name = "{policy_file}", sha256 = "{file_hash(policy_file)}" }}
+policy = {{ name = "{policy_file}", sha256 = "{hash_file(policy_file)}" }}
 [[behaviors]]
 name = "lean"
 key = "l"
@@ -202,12 +204,12 @@ magnitudes = {{ "0:3" = 9.5, "1:7" = -9.5 }}
 """
     known = Stimulation((3, 15), (9.5, -9.5))
     effort = replace(SMALL, search=replace(SMALL.search, pool=1, atoms=0, children=8, promoted=8, elite=8))
-    with Crew("ant", policy_file, 1) as crew:
-        starts = collect_starts(crew.robot, crew.policy, 1200, 1, at=5, survive=20)
-        searches = Searches(
-            Prober(crew), crew.robot, effort, 1000, Clock(0.0, None), lambda _: None, (known,)
+    with RolloutPool("ant", policy_file, 1) as crew:
+        starts = collect_start_states(crew.robot, crew.policy, 1200, 1, at=5, survive=20)
+        searches = DissectionSearches(
+            EffectProber(crew), crew.robot, effort, 1000, TimeShare(0.0, None), lambda _: None, (known,)
         )
-        assert known in searches.pool(Starts(tuple(starts), (), ())).plans
+        assert known in searches.pool(SearchStarts(tuple(starts), (), ())).plans
     beginning = parse_map(text, "mine")
     quick = partial(dissect, "ant", policy_file, episodes=1, workers=1, effort=effort, budget_minutes=0.0)
     found, alone = quick(start_from=beginning), quick()

@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from pdtui.errors import PdtuiError
+from pdtui.core.errors import PdtuiError
 
 SECONDS = 30
 """What reads so long hangs."""
@@ -70,41 +70,41 @@ def read_session_file(path: Path) -> None:
     from rich.console import Console
 
     from pdtui.cli.session_tables import compare_table, show_table
-    from pdtui.sessions.compare import compare_sessions
-    from pdtui.sessions.reader import read_activations, read_session
-    from pdtui.sessions.repair import examine, repair_session
-    from pdtui.sessions.summary import summarize
-    from pdtui.teleop.keys import write_keystrokes
-    from pdtui.teleop.replay import order_of
+    from pdtui.drive.keystrokes import write_keystrokes
+    from pdtui.drive.replay import config_of
+    from pdtui.sessions.session_comparison import compare_sessions
+    from pdtui.sessions.session_reader import read_activations, read_session
+    from pdtui.sessions.session_repair import examine_session, repair_session
+    from pdtui.sessions.session_summary import summarise_session
 
     output = path.with_name("repaired.rrd")
     try:
         session = read_session(path)
     except PdtuiError:
-        if examine(path).steps:
+        if examine_session(path).steps:
             repair_session(path, output)
-            assert examine(output).whole
+            assert examine_session(output).whole
         raise
     read_activations(path)
-    examine(path)
+    examine_session(path)
     with Path("/dev/null").open("w") as nowhere:
         console = Console(file=nowhere)
-        console.print(show_table(session, summarize(session)))
+        console.print(show_table(session, summarise_session(session)))
         console.print(compare_table(compare_sessions(session, session)))
     write_keystrokes(session.events)
-    order_of(session, str(path))
+    config_of(session, str(path))
 
 
 def _reads(map_path: Path) -> dict[str, Callable[[Path], object]]:
-    from pdtui.policies.load import load_policy
-    from pdtui.stimulation.mapfile import load_map
-    from pdtui.stimulation.settle import settle
-    from pdtui.teleop.keys import read_keystrokes
+    from pdtui.drive.keystrokes import read_keystrokes
+    from pdtui.policies.weights.policy_loading import load_policy
+    from pdtui.stimulation.map_policy import resolve_policy
+    from pdtui.stimulation.map_reader import load_map
 
     known = load_map(map_path)
     return {
         "session": read_session_file,
-        "map": lambda path: settle(load_map(path)),
+        "map": lambda path: resolve_policy(load_map(path)),
         "keys": lambda path: read_keystrokes(path, known),
         "weights": load_policy,
     }

@@ -14,10 +14,10 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis.strategies import SearchStrategy
 
-from pdtui.sessions.recorder import SessionRecorder
+from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.fuzz.damage import Content, damaged, damaged_session, damaged_weights
 from tests.fuzz.reading import Reader
-from tests.sessions.drives import events_of, make_loop, random_weights
+from tests.sessions.recorded_drives import events_of, make_loop, random_weights
 
 KEYS = "# a drive\n3 w\n10 t\n20 space\n25 h\n25 left\n40 r\n"
 SUITE = {"session": 200, "map": 150, "keys": 75, "weights": 75}

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pdtui.errors import RobotError
+from pdtui.core.angles import wrap_angle
+from pdtui.core.errors import RobotError
 from pdtui.robots import make_robot
-from pdtui.robots.geometry import place_links, wrap_angle
+from pdtui.robots.geometry import place_links
 
 pytest.importorskip("pybullet", reason="PyBullet is not installed (it has no wheels for this Python)")
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pdtui.errors import RobotError, SimulationDiverged
+from pdtui.core.angles import wrap_angle
+from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.robots import make_robot
 from pdtui.robots.ant import Ant
-from pdtui.robots.geometry import capsule_ends, place_links, wrap_angle
+from pdtui.robots.geometry import capsule_ends, place_links
 
 
 def _actions(count: int, seed: int = 0) -> np.ndarray:

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from pdtui.api import load_policy
-from pdtui.errors import MapError
+from pdtui.core.errors import MapError
+from pdtui.core.events import Event
+from pdtui.drive.control_loop import ControlLoop
 from pdtui.robots import make_robot
 from pdtui.robots.anymal import DEFAULT, Anymal, AnymalForward
-from pdtui.robots.legged import COMMAND_SCALES
-from pdtui.sessions.events import Event
-from pdtui.stimulation.mapfile import parse_map
-from pdtui.teleop.loop import ControlLoop
+from pdtui.robots.legged.legged_rewards import COMMAND_SCALES
+from pdtui.stimulation.map_reader import parse_map
 
 REFERENCE = Path(__file__).parents[3] / "shared" / "reference"
 

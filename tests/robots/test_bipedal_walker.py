@@ -7,7 +7,7 @@ import pytest
 from gymnasium.envs.box2d import bipedal_walker as stock
 from gymnasium.utils import seeding
 
-from pdtui.errors import RobotError
+from pdtui.core.errors import RobotError
 from pdtui.robots.bipedal_walker import FINISH, BipedalWalker
 
 
@@ -130,7 +130,7 @@ def test_what_is_drawn_is_where_the_hull_is(walker: BipedalWalker) -> None:
 
 
 def test_it_passes_the_finish_and_goes_on() -> None:
-    from pdtui.policies.load import load_policy
+    from pdtui.policies.weights.policy_loading import load_policy
 
     robot = BipedalWalker()
     policy = load_policy("bipedal_walker", "bipedal_walker")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from pdtui.errors import RobotError
+from pdtui.core.errors import RobotError
 from pdtui.robots import check_robot, file_stem, make_robot
 
 GUIDE = Path(__file__).parents[2] / "pdtui" / "robots" / "README.md"

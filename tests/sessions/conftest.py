@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from pdtui.sessions.record import StepRecord
-from pdtui.teleop.loop import ControlLoop
-from tests.sessions.drives import random_weights, record_drive
+from pdtui.core.step_record import StepRecord
+from pdtui.drive.control_loop import ControlLoop
+from tests.sessions.recorded_drives import random_weights, record_drive
 
 Recorded = tuple[Path, ControlLoop, list[StepRecord]]
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pdtui.errors import SessionError
-from pdtui.sessions.compare import compare_sessions
-from pdtui.sessions.export import export_stream
-from pdtui.sessions.reader import read_activations, read_session
-from pdtui.sessions.recorder import SessionRecorder
-from pdtui.sessions.repair import examine, repair_session
+from pdtui.core.errors import SessionError
 from pdtui.sessions.schema import ActivationsKept
+from pdtui.sessions.session_comparison import compare_sessions
+from pdtui.sessions.session_export import export_stream
+from pdtui.sessions.session_reader import read_activations, read_session
+from pdtui.sessions.session_repair import examine_session, repair_session
+from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded
 
 
@@ -53,7 +53,7 @@ def test_everything_else_is_there(kept: ActivationsKept, recorded: Recorded, tmp
     torn = tmp_path / "torn.rrd"
     torn.write_bytes(path.read_bytes()[: path.stat().st_size * 3 // 4])
     assert repair_session(torn, torn).info.activations == kept
-    assert examine(torn).whole
+    assert examine_session(torn).whole
 
 
 def test_beyond_the_range_of_half_is_infinite(recorded: Recorded, tmp_path: Path) -> None:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from pdtui.sessions.reader import read_activations, read_session
+from pdtui.sessions.session_reader import read_activations, read_session
 from tests.sessions.conftest import Recorded
-from tests.sessions.drives import TEXT, make_loop, record_drive
+from tests.sessions.recorded_drives import TEXT, make_loop, record_drive
 
 
 def test_everything_of_every_step_comes_back(recorded: Recorded) -> None:

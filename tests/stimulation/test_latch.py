@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from pdtui.errors import EventError, RobotError
-from pdtui.policies.units import Stimulation
-from pdtui.robots.types import Attribute
+from pdtui.core.attributes import Attribute
+from pdtui.core.errors import KeystrokeError, RobotError
+from pdtui.core.units import Stimulation
 from pdtui.stimulation.latch import Latch
-from pdtui.stimulation.magnitude import PidMagnitude
-from pdtui.stimulation.mapfile import parse_map
-from pdtui.stimulation.maps import Pid, StimulationMap
+from pdtui.stimulation.map_reader import parse_map
+from pdtui.stimulation.pid_magnitude import PidMagnitude
+from pdtui.stimulation.stimulation_map import PidGains, StimulationMap
 
 ATTRIBUTES = (Attribute("vy", "m/s"), Attribute("yaw", "rad", wraps=True))
 AT_REST = np.zeros(2)
@@ -68,7 +68,7 @@ def test_the_factor_scales_the_outputs(latch: Latch) -> None:
     latch.press("push", AT_REST)
     latch.set_factor("push", 0.5)
     assert latch.stimulate(AT_REST).values == (-1.0, 1.0)
-    with pytest.raises(EventError, match="'twitch' is not latched"):
+    with pytest.raises(KeystrokeError, match="'twitch' is not latched"):
         latch.set_factor("twitch", 2.0)
 
 
@@ -83,10 +83,10 @@ def test_a_target_starts_at_the_present_value_and_moves(latch: Latch) -> None:
 
 
 def test_errors_name_what_there_is(latch: Latch) -> None:
-    with pytest.raises(EventError, match="no behavior 'fly'; there are push, twitch, hold heading"):
+    with pytest.raises(KeystrokeError, match="no behavior 'fly'; there are push, twitch, hold heading"):
         latch.press("fly", AT_REST)
     latch.press("push", AT_REST)
-    with pytest.raises(EventError, match="'push' holds no target"):
+    with pytest.raises(KeystrokeError, match="'push' holds no target"):
         latch.set_target("push", 1.0)
 
 
@@ -110,7 +110,7 @@ def test_a_saved_state_repeats_itself(latch: Latch) -> None:
 def test_pid_is_that_of_the_textbook() -> None:
     """Independent computation: P on the error, I summed, D on the measurement, limited."""
     kp, ki, kd, dt, limit = 2.0, 0.5, 0.1, 0.05, 3.0
-    controller = PidMagnitude(Pid("vy", kp, ki, kd, limit, 0.1), wraps=False, dt=dt)
+    controller = PidMagnitude(PidGains("vy", kp, ki, kd, limit, 0.1), wraps=False, dt=dt)
     controller.start(0.0, target=1.0)
     integral, before = 0.0, None
     for value in [0.0, 0.1, 0.3, 0.9, 1.4, 1.2]:
@@ -137,7 +137,7 @@ def test_a_controllers_output_is_added_to_its_base(map_text: str) -> None:
 
 def test_a_heading_crosses_pi_without_a_jump() -> None:
     """The same motion, once across ±π and once far from it, needs the same magnitudes."""
-    gains = Pid("yaw", 2.0, 0.3, 0.4, 3.0, 0.1)
+    gains = PidGains("yaw", 2.0, 0.3, 0.4, 3.0, 0.1)
     turned = np.linspace(-0.3, 0.3, 40)
 
     def run(offset: float) -> list[float]:

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from pdtui.errors import PdtuiError
-from pdtui.stimulation.maps import StimulationMap
-from pdtui.teleop.link import Pace
-from pdtui.teleop.snapshot import Briefing, Snapshot
-from pdtui.tui.app import DriveApp
-from tests.tui.recorded import drive_map, load
+from pdtui.core.errors import PdtuiError
+from pdtui.drive.drive_protocol import PaceRequest
+from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.stimulation.stimulation_map import StimulationMap
+from pdtui.tui.drive_app import DriveApp
+from tests.tui.recorded_snapshots import drive_map, load
 
 DATA = Path(__file__).parent / "data" / "ant.npz"
-Message = Briefing | Snapshot | PdtuiError
+Message = DriveFacts | DriveSnapshot | PdtuiError
 
 
 class ScriptedLink:
@@ -24,9 +24,9 @@ class ScriptedLink:
     def __init__(self, messages: list[Message]) -> None:
         self.messages = list(messages)
         self.pressed: list[str] = []
-        self.paced: list[Pace] = []
+        self.paced: list[PaceRequest] = []
 
-    def poll(self) -> Briefing | Snapshot | None:
+    def poll(self) -> DriveFacts | DriveSnapshot | None:
         if not self.messages:
             return None
         message = self.messages.pop(0)
@@ -37,7 +37,7 @@ class ScriptedLink:
     def press(self, key: str) -> None:
         self.pressed.append(key)
 
-    def pace(self, request: Pace) -> None:
+    def pace(self, request: PaceRequest) -> None:
         self.paced.append(request)
 
     def close(self) -> str:
@@ -45,7 +45,7 @@ class ScriptedLink:
 
 
 @pytest.fixture(scope="session")
-def drive() -> tuple[Briefing, list[Snapshot]]:
+def drive() -> tuple[DriveFacts, list[DriveSnapshot]]:
     """360 control steps of a half-trained Ant, with stimulations of every kind."""
     return load(DATA)
 
@@ -59,7 +59,7 @@ MakeApp = Callable[..., tuple[DriveApp, ScriptedLink]]
 
 
 @pytest.fixture
-def make_app(drive: tuple[Briefing, list[Snapshot]], a_map: StimulationMap) -> MakeApp:
+def make_app(drive: tuple[DriveFacts, list[DriveSnapshot]], a_map: StimulationMap) -> MakeApp:
     """An application over the first snapshots of the recorded drive, or over other messages."""
 
     def make(
@@ -67,9 +67,9 @@ def make_app(drive: tuple[Briefing, list[Snapshot]], a_map: StimulationMap) -> M
         stimulation_map: StimulationMap | None = None,
         watching: bool = False,
     ) -> tuple[DriveApp, ScriptedLink]:
-        briefing, snapshots = drive
+        facts, snapshots = drive
         first = snapshots[:messages] if isinstance(messages, int) else []
-        played: list[Message] = [briefing, *first] if isinstance(messages, int) else messages
+        played: list[Message] = [facts, *first] if isinstance(messages, int) else messages
         link = ScriptedLink(played)
         return DriveApp(link, stimulation_map or a_map, fps=200, watching=watching), link
 

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pdtui.errors import PolicyError
-from pdtui.policies.choices import NO_CHOICES, NO_NORMALISER, PolicyChoices, Spaces
-from pdtui.policies.importers.archive import Archive, read_bounded, shorten
-from pdtui.policies.importers.build import build
-from pdtui.policies.importers.chain import import_chain
+from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.cleanrl import import_cleanrl
-from pdtui.policies.importers.found import Found
-from pdtui.policies.importers.kinds import Kind, kind_of
+from pdtui.policies.importers.file_kind import FileKind, file_kind_of
+from pdtui.policies.importers.network_assembly import assemble_network
+from pdtui.policies.importers.observation_statistics import read_statistics
+from pdtui.policies.importers.partial_policy import PartialPolicy
+from pdtui.policies.importers.plain_state_dict import import_plain_state_dict
 from pdtui.policies.importers.rllib import import_rllib
 from pdtui.policies.importers.rsl_rl import import_rsl_rl
-from pdtui.policies.importers.sb3 import OTHER_NETWORKS, import_sb3, is_sb3
-from pdtui.policies.importers.statistics import read_statistics
-from pdtui.policies.importers.tensors import Tensors, flatten, from_npz, from_safetensors, from_torch
-from pdtui.policies.network import PolicyNetwork
+from pdtui.policies.importers.stable_baselines3 import OTHER_NETWORKS, import_sb3, is_sb3
+from pdtui.policies.importers.tensor_files import (
+    Tensors,
+    flatten_tensors,
+    from_npz,
+    from_safetensors,
+    from_torch,
+)
+from pdtui.policies.importers.zip_archive import ZipArchive, read_bounded, shorten
+from pdtui.policies.weights.import_options import NO_NORMALISER, NO_OPTIONS, ImportOptions, WorldSpaces
+from pdtui.policies.weights.policy_network import PolicyNetwork
 
 FORMATS = (
     "Stable-Baselines3 .zip, PyTorch .pt or .pth, .npz or .safetensors of RLlib, rsl_rl, CleanRL or a plain "
@@ -27,8 +33,8 @@ FORMATS = (
 
 def import_network(
     path: Path,
-    choices: PolicyChoices = NO_CHOICES,
-    spaces: Spaces | None = None,
+    choices: ImportOptions = NO_OPTIONS,
+    spaces: WorldSpaces | None = None,
     *,
     normaliser: Path | None = None,
 ) -> PolicyNetwork:
@@ -48,20 +54,20 @@ def import_network(
         found = _find(read_bounded(path), source, choices)
         if normaliser is not None and choices.normaliser != NO_NORMALISER:
             found = found.having(read_statistics(normaliser, found.layers[0].shape[1]))
-        return build(found, choices, spaces, source)
+        return assemble_network(found, choices, spaces, source)
     except PolicyError as error:
         text = str(error)
         named = text.startswith(source) or (normaliser is not None and text.startswith(str(normaliser)))
         raise error if named else PolicyError(f"{source}: {text}") from error
 
 
-def _find(content: bytes, source: str, choices: PolicyChoices) -> Found:
-    match kind_of(content):
-        case Kind.ZIP:
+def _find(content: bytes, source: str, choices: ImportOptions) -> PartialPolicy:
+    match file_kind_of(content):
+        case FileKind.ZIP:
             return _from_zip(content, source, choices)
-        case Kind.SAFETENSORS:
-            return _from_tensors(flatten(from_safetensors(content, source)), source)
-        case Kind.PICKLE:
+        case FileKind.SAFETENSORS:
+            return _from_tensors(flatten_tensors(from_safetensors(content, source)), source)
+        case FileKind.PICKLE:
             raise PolicyError(
                 f"{source}: a pickle, which can run anything when it is read, so pdtui reads none; save the "
                 "tensors alone: torch.save(model.state_dict(), FILE) of PyTorch 1.6 or later, or numpy.savez"
@@ -70,23 +76,23 @@ def _find(content: bytes, source: str, choices: PolicyChoices) -> Found:
             raise PolicyError(f"{source}: {other.value}; expected {FORMATS}")
 
 
-def _from_zip(content: bytes, source: str, choices: PolicyChoices) -> Found:
-    archive = Archive(content, source)
+def _from_zip(content: bytes, source: str, choices: ImportOptions) -> PartialPolicy:
+    archive = ZipArchive(content, source)
     names = archive.names
     if is_sb3(names):
         return import_sb3(archive, choices)
     if names and all(name.endswith(".npy") for name in names):
-        return _from_tensors(flatten(from_npz(archive)), source)
+        return _from_tensors(flatten_tensors(from_npz(archive)), source)
     if any(name.endswith("/constants.pkl") for name in names):
         raise PolicyError(
             f"{source}: TorchScript, which states a computation and is no set of weights; load it as a policy"
         )
     if any(name.endswith("/data.pkl") for name in names):
-        return _from_tensors(flatten(from_torch(content, source)), source)
+        return _from_tensors(flatten_tensors(from_torch(content, source)), source)
     raise PolicyError(f"{source}: a zip that holds no policy: its entries are {archive.listing()}")
 
 
-def _from_tensors(tensors: Tensors, source: str) -> Found:
+def _from_tensors(tensors: Tensors, source: str) -> PartialPolicy:
     if not tensors:
         raise PolicyError(f"{source}: expected weights, found no tensor")
     if any(tensor.ndim > 2 and "weight" in name for name, tensor in tensors.items()):
@@ -98,5 +104,5 @@ def _from_tensors(tensors: Tensors, source: str) -> Found:
         import_rllib(tensors)
         or import_rsl_rl(tensors)
         or import_cleanrl(tensors)
-        or import_chain(tensors, source)
+        or import_plain_state_dict(tensors, source)
     )

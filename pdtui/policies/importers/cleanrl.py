@@ -9,14 +9,20 @@ from __future__ import annotations
 
 import re
 
-from pdtui.errors import PolicyError
-from pdtui.policies.importers.found import Found, chained, linear, paired, sequence
-from pdtui.policies.importers.tensors import Tensors
+from pdtui.core.errors import PolicyError
+from pdtui.policies.importers.partial_policy import (
+    PartialPolicy,
+    check_layer_chain,
+    read_layer_sequence,
+    read_linear_layer,
+    split_mean_and_deviation_head,
+)
+from pdtui.policies.importers.tensor_files import Tensors
 
 _FIRST = re.compile(r"(?:(0|actor)\.)?(?=(?:actor_mean|fc1)\.)")
 
 
-def import_cleanrl(tensors: Tensors) -> Found | None:
+def import_cleanrl(tensors: Tensors) -> PartialPolicy | None:
     """The actor of a CleanRL state dict; None if it is named otherwise.
 
     Raises:
@@ -26,27 +32,29 @@ def import_cleanrl(tensors: Tensors) -> Found | None:
     prefix = min(prefixes, key=len, default="")
     named = {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}
     if "actor_mean.0.weight" in named:
-        layers = sequence(named, "actor_mean")
-        return Found("CleanRL PPO", layers, log_std=named.get("actor_logstd"))
+        layers = read_layer_sequence(named, "actor_mean")
+        return PartialPolicy("CleanRL PPO", layers, log_std=named.get("actor_logstd"))
     if "actor.0.weight" in named and "critic.0.weight" in named:
-        return Found("CleanRL PPO", sequence(named, "actor"), "categorical")
+        return PartialPolicy("CleanRL PPO", read_layer_sequence(named, "actor"), "categorical")
     last = next((name for name in ("fc_mean", "fc_mu") if f"{name}.weight" in named), None)
     if last is None or "fc1.weight" not in named:
         return None
     return _off_policy(named, last)
 
 
-def _off_policy(named: Tensors, last: str) -> Found:
+def _off_policy(named: Tensors, last: str) -> PartialPolicy:
     numbers = sorted(int(match[1]) for name in named if (match := re.fullmatch(r"fc(\d{1,4})\.weight", name)))
-    hidden = [linear(named, f"fc{number}") for number in numbers]
+    hidden = [read_linear_layer(named, f"fc{number}") for number in numbers]
     low, high = _bounds(named)
     if last == "fc_mu":
-        layers = chained([*hidden, linear(named, last)], "fc")
-        return Found("CleanRL TD3 or DDPG", layers, squash="tanh", low=low, high=high)
-    head = paired(linear(named, last), linear(named, "fc_logstd"))
-    return Found(
+        layers = check_layer_chain([*hidden, read_linear_layer(named, last)], "fc")
+        return PartialPolicy("CleanRL TD3 or DDPG", layers, squash="tanh", low=low, high=high)
+    head = split_mean_and_deviation_head(
+        read_linear_layer(named, last), read_linear_layer(named, "fc_logstd")
+    )
+    return PartialPolicy(
         "CleanRL SAC",
-        chained([*hidden, head], "fc"),
+        check_layer_chain([*hidden, head], "fc"),
         "gaussian pair",
         squash="tanh",
         low=low,

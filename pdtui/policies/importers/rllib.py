@@ -9,15 +9,20 @@ from __future__ import annotations
 
 import re
 
-from pdtui.errors import PolicyError
-from pdtui.policies.importers.found import Found, Linear, chained, linear
-from pdtui.policies.importers.tensors import Tensors
+from pdtui.core.errors import PolicyError
+from pdtui.policies.importers.partial_policy import (
+    LinearLayer,
+    PartialPolicy,
+    check_layer_chain,
+    read_linear_layer,
+)
+from pdtui.policies.importers.tensor_files import Tensors
 
 _SAC = re.compile(r"(.*?/?)(?:sequential/)?(action)_(\d{1,4}|out)/kernel")
 _PPO = re.compile(r"(.*?/?)(fc)_(\d{1,4}|out)/kernel")
 
 
-def import_rllib(tensors: Tensors) -> Found | None:
+def import_rllib(tensors: Tensors) -> PartialPolicy | None:
     """The policy in RLlib's weights; None if they are named otherwise.
 
     A policy and its target network have the same layers: the first in the file acts.
@@ -33,7 +38,7 @@ def import_rllib(tensors: Tensors) -> Found | None:
         if layers:
             low, high = log_std_range
             name = "RLlib SAC" if output == "gaussian pair" else "RLlib PPO"
-            return Found(
+            return PartialPolicy(
                 name,
                 layers,
                 "gaussian pair" if output == "gaussian pair" else "unknown pair",
@@ -44,8 +49,8 @@ def import_rllib(tensors: Tensors) -> Found | None:
     return None
 
 
-def _actor(tensors: Tensors, pattern: re.Pattern[str]) -> tuple[Linear, ...]:
-    layers: dict[str, Linear] = {}
+def _actor(tensors: Tensors, pattern: re.Pattern[str]) -> tuple[LinearLayer, ...]:
+    layers: dict[str, LinearLayer] = {}
     scope = None
     for name in tensors:
         match = pattern.fullmatch(name)
@@ -59,14 +64,14 @@ def _actor(tensors: Tensors, pattern: re.Pattern[str]) -> tuple[Linear, ...]:
     if "out" not in layers:
         return ()
     order = sorted((key for key in layers if key != "out"), key=int)
-    return chained([layers[key] for key in [*order, "out"]], scope or "")
+    return check_layer_chain([layers[key] for key in [*order, "out"]], scope or "")
 
 
-def _transposed(tensors: Tensors, prefix: str) -> Linear:
+def _transposed(tensors: Tensors, prefix: str) -> LinearLayer:
     kernel, bias = tensors[f"{prefix}/kernel"], tensors.get(f"{prefix}/bias")
     if kernel.ndim != 2:
         raise PolicyError(
             f"tensor '{prefix}/kernel': expected shape (inputs, outputs), found {tuple(kernel.shape)}"
         )
     named = {"layer.weight": kernel.T.contiguous()} | ({} if bias is None else {"layer.bias": bias})
-    return linear(named, "layer")
+    return read_linear_layer(named, "layer")

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import torch
 
-from pdtui.policies.importers.found import Found, Statistics, sequence
-from pdtui.policies.importers.tensors import Tensors
+from pdtui.policies.importers.partial_policy import ObservationStatistics, PartialPolicy, read_layer_sequence
+from pdtui.policies.importers.tensor_files import Tensors
 
 # rsl_rl's EmpiricalNormalization divides by std + 0.01, a constant that it does not store.
 _EPSILON = 1e-2
@@ -19,7 +19,7 @@ _LOG_STDS = ("log_std", "distribution.log_std_param")
 _NORMALISERS = ("actor_obs_normalizer", "obs_normalizer", "obs_norm_state_dict")
 
 
-def import_rsl_rl(tensors: Tensors) -> Found | None:
+def import_rsl_rl(tensors: Tensors) -> PartialPolicy | None:
     """The actor of rsl_rl's weights; None if they are named otherwise.
 
     Raises:
@@ -30,8 +30,12 @@ def import_rsl_rl(tensors: Tensors) -> Found | None:
     log_std = _log_std(named)
     if prefix is None or log_std is None:
         return None
-    return Found(
-        "rsl_rl", sequence(named, prefix), squash="none", log_std=log_std, statistics=_statistics(named)
+    return PartialPolicy(
+        "rsl_rl",
+        read_layer_sequence(named, prefix),
+        squash="none",
+        log_std=log_std,
+        statistics=_statistics(named),
     )
 
 
@@ -55,9 +59,9 @@ def _log_std(named: Tensors) -> torch.Tensor | None:
     return next((torch.log(named[name].clamp(min=1e-6)) for name in _STDS if name in named), None)
 
 
-def _statistics(named: Tensors) -> Statistics | None:
+def _statistics(named: Tensors) -> ObservationStatistics | None:
     for prefix in _NORMALISERS:
         mean, std = named.get(f"{prefix}._mean"), named.get(f"{prefix}._std")
         if mean is not None and std is not None:
-            return Statistics(mean.reshape(-1), std.reshape(-1) + _EPSILON)
+            return ObservationStatistics(mean.reshape(-1), std.reshape(-1) + _EPSILON)
     return None

@@ -6,6 +6,6 @@ walks the code that stands in the archive as text, calling the operators of a li
 others.
 """
 
-from pdtui.policies.torchscript.archive import is_torchscript, read_torchscript
+from pdtui.policies.torchscript.torchscript_archive import is_torchscript, read_torchscript
 
 __all__ = ["is_torchscript", "read_torchscript"]

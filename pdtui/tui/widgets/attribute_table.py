@@ -8,11 +8,11 @@ import numpy as np
 from rich.cells import cell_len
 from textual.strip import Strip
 
-from pdtui.teleop.snapshot import Snapshot
-from pdtui.text import plain
+from pdtui.core.plain_text import printable
+from pdtui.drive.drive_snapshot import DriveSnapshot
+from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.panel import Panel
-from pdtui.tui.sparkline import History, sparklines
-from pdtui.tui.text import Row, number
+from pdtui.tui.sparkline import AttributeHistory, draw_sparklines
 
 _SECONDS = 12.0
 _ROWS_KEPT = 4096
@@ -23,23 +23,23 @@ _FORCES = ("N", "N m", "Nm")
 class AttributeTable(Panel):
     """One attribute a line; where there is no room for all, forces and torques go first."""
 
-    _history: History | None = None
+    _history: AttributeHistory | None = None
 
     def on_mount(self) -> None:
         """Name the panel."""
         self.border_title = "attributes"
 
-    def remember(self, snapshot: Snapshot) -> None:
+    def remember(self, snapshot: DriveSnapshot) -> None:
         if self._history is None:
-            self._history = History(_ROWS_KEPT, len(snapshot.attributes))
+            self._history = AttributeHistory(_ROWS_KEPT, len(snapshot.attributes))
         self._history.extend(snapshot.history)
 
     def paint(self, width: int, height: int) -> list[Strip]:
-        if self.briefing is None:
-            return [Row(width).add("values come with the policy", self.palette.faint).strip()]
+        if self.facts is None:
+            return [ScreenRow(width).add("values come with the policy", self.palette.faint).strip()]
         shown = self._choose(height)
-        attributes = [self.briefing.attributes[index] for index in shown]
-        widest = max(cell_len(plain(attribute.name)) for attribute in attributes)
+        attributes = [self.facts.attributes[index] for index in shown]
+        widest = max(cell_len(printable(attribute.name)) for attribute in attributes)
         holds = any(behavior.pid is not None for behavior in self.map.behaviors.values())
         target_width = _TARGET if holds else 0
         fixed = _VALUE + _UNIT + target_width + 3
@@ -52,13 +52,13 @@ class AttributeTable(Panel):
         for index, attribute, line in zip(shown, attributes, lines, strict=True):
             target, row = targets.get(attribute.name, (None, -1))
             name_style = palette.text if target is None else palette.behavior(row)
-            value = "" if values is None else number(float(values[index]))
+            value = "" if values is None else format_number(float(values[index]))
             strips.append(
-                Row(width)
-                .add(plain(attribute.name), name_style, name_width)
+                ScreenRow(width)
+                .add(printable(attribute.name), name_style, name_width)
                 .add(" " + value, palette.title, _VALUE + 1, right=True)
-                .add(" " + plain(attribute.unit), palette.muted, _UNIT + 1)
-                .add("" if target is None else f"→ {number(target)}", name_style, target_width)
+                .add(" " + printable(attribute.unit), palette.muted, _UNIT + 1)
+                .add("" if target is None else f"→ {format_number(target)}", name_style, target_width)
                 .add(" " + line, palette.primary if target is None else palette.behavior(row))
                 .strip()
             )
@@ -66,18 +66,18 @@ class AttributeTable(Panel):
 
     def _choose(self, height: int) -> list[int]:
         """Rows of the robot's attributes that are shown, in the robot's order."""
-        assert self.briefing is not None
+        assert self.facts is not None
         named = {primitive.attribute for primitive in self.map.primitives.values()}
         for behavior in self.map.behaviors.values():
             named |= {part.attribute for part in (behavior.aim, behavior.pid) if part is not None}
 
         def rank(index: int) -> tuple[bool, bool, int]:
-            assert self.briefing is not None
-            attribute = self.briefing.attributes[index]
+            assert self.facts is not None
+            attribute = self.facts.attributes[index]
             force = attribute.unit in _FORCES
             return force, attribute.name not in named, index
 
-        return sorted(sorted(range(len(self.briefing.attributes)), key=rank)[:height])
+        return sorted(sorted(range(len(self.facts.attributes)), key=rank)[:height])
 
     def _targets(self) -> dict[str, tuple[float, int]]:
         """Target and behavior row of each attribute that a controller holds now."""
@@ -89,18 +89,15 @@ class AttributeTable(Panel):
         return targets
 
     def _sparklines(self, shown: list[int], cells: int) -> list[str]:
-        assert self.briefing is not None
+        assert self.facts is not None
         assert self._history is not None
         if cells <= 0:
             return [""] * len(shown)
-        per_cell = min(max(1, ceil(_SECONDS / self.briefing.dt / cells)), _ROWS_KEPT // cells)
+        per_cell = min(max(1, ceil(_SECONDS / self.facts.dt / cells)), _ROWS_KEPT // cells)
         means = self._history.means(cells, per_cell)[:, shown]
         low, high = self._history.low[shown], self._history.high[shown]
         # An angle's line has the whole turn for its scale: a jump at ±π is then a jump from edge to edge.
         for column, index in enumerate(shown):
-            if (
-                self.briefing.attributes[index].wraps
-                and np.nanmax(np.abs(means[:, column]), initial=0.0) > 1.5
-            ):
+            if self.facts.attributes[index].wraps and np.nanmax(np.abs(means[:, column]), initial=0.0) > 1.5:
                 low[column], high[column] = -20 * pi, 20 * pi
-        return sparklines(means, low, high)
+        return draw_sparklines(means, low, high)

@@ -8,13 +8,13 @@ from rich.cells import cell_len
 from rich.style import Style
 from textual.strip import Strip
 
-from pdtui.text import plain
+from pdtui.core.plain_text import printable
+from pdtui.tui.cell_text import ScreenRow, format_number, format_signed, key_name, wrap_text
 from pdtui.tui.panel import Panel
-from pdtui.tui.text import Row, key_name, number, signed, wrap_text
 
 if TYPE_CHECKING:
-    from pdtui.stimulation.latch import ActiveBehavior
-    from pdtui.stimulation.maps import Behavior
+    from pdtui.core.step_record import ActiveBehavior
+    from pdtui.stimulation.stimulation_map import Behavior
 
 _BAR = 10
 _BLOCKS = " ▏▎▍▌▋▊▉"
@@ -31,8 +31,8 @@ class BehaviorList(Panel):
         active = {view.name: view for view in self.snapshot.active} if self.snapshot is not None else {}
         behaviors = list(self.map.behaviors.values())
         if not behaviors:
-            return [Row(width).add("none: the map has no behaviors", self.palette.faint).strip()]
-        names = [plain(behavior.name) for behavior in behaviors]
+            return [ScreenRow(width).add("none: the map has no behaviors", self.palette.faint).strip()]
+        names = [printable(behavior.name) for behavior in behaviors]
         keys = [key_name(behavior.key) for behavior in behaviors]
         key_width = max((cell_len(key) for key in keys), default=0) + 2
         name_width = min(max((cell_len(name) for name in names), default=0), max(8, width // 3))
@@ -47,7 +47,7 @@ class BehaviorList(Panel):
         gap = [Strip.blank(width)] if roomy else []
         latched = [behavior.name in active for behavior in behaviors]
         shown = self._crop(entries, latched, width, height - 1 - len(gap))
-        default = Row(width)
+        default = ScreenRow(width)
         self._add_cap(default, self.map.default_key, self.palette.key)
         default.add("  clears all stimulation", self.palette.good if active else self.palette.muted)
         return [*shown, *gap, default.strip()]
@@ -58,17 +58,17 @@ class BehaviorList(Panel):
         palette = self.palette
         name_width = self._columns[1]
         color = palette.behavior(row)
-        says = plain(behavior.says)
-        line = Row(width)
+        says = printable(behavior.says)
+        line = ScreenRow(width)
         if active is None:
             self._add_cap(line, behavior.key, palette.key)
-            line.add("  " + plain(behavior.name), color, name_width + 2).add("  ", palette.text)
+            line.add("  " + printable(behavior.name), color, name_width + 2).add("  ", palette.text)
             line.add(self._kind(behavior) if roomy else says, palette.muted)
             lines = [line.strip()]
         else:
             self._add_cap(line, behavior.key, palette.caps[row % len(palette.caps)])
             line.add(" ▌", color)
-            line.add(plain(behavior.name), color + Style(bold=True), name_width).add("  ", palette.text)
+            line.add(printable(behavior.name), color + Style(bold=True), name_width).add("  ", palette.text)
             self._add_state(line, behavior, active, color)
             lines = [line.strip()]
             if active.target is not None:
@@ -77,22 +77,22 @@ class BehaviorList(Panel):
             indent = " " * (self._columns[0] + 2)
             sentence = wrap_text(says, width - len(indent), 1)[0]
             style = palette.muted if active is None else palette.text
-            lines.insert(1, Row(width).add(indent + sentence, style).strip())
+            lines.insert(1, ScreenRow(width).add(indent + sentence, style).strip())
         return lines
 
-    def _add_cap(self, line: Row, key: str, style: Style) -> None:
+    def _add_cap(self, line: ScreenRow, key: str, style: Style) -> None:
         """The key as a cap, padded to the widest of all."""
         cap = f" {key_name(key)} "
         line.add(cap, style).add(" " * (self._columns[0] - cell_len(cap)), self.palette.text)
 
     def _kind(self, behavior: Behavior) -> str:
         if behavior.pid is not None:
-            return f"holds {plain(behavior.pid.attribute)}"
-        return "" if behavior.period is None else f"for {number(behavior.period)} s"
+            return f"holds {printable(behavior.pid.attribute)}"
+        return "" if behavior.period is None else f"for {format_number(behavior.period)} s"
 
-    def _add_state(self, line: Row, behavior: Behavior, active: ActiveBehavior, color: Style) -> None:
+    def _add_state(self, line: ScreenRow, behavior: Behavior, active: ActiveBehavior, color: Style) -> None:
         """How long it still lasts: a draining bar, or the word latched."""
-        dt = None if self.briefing is None else self.briefing.dt
+        dt = None if self.facts is None else self.facts.dt
         if active.remaining is None or dt is None or behavior.period is None:
             line.add("latched", color)
         else:
@@ -100,27 +100,27 @@ class BehaviorList(Panel):
             line.add(_bar(active.remaining / steps, _BAR), color + Style(bgcolor=self.palette.key.bgcolor))
             line.add(f" {active.remaining * dt:.1f} s", color)
         if abs(active.factor - 1.0) > 1e-9:
-            line.add(f"  × {number(active.factor)}", self.palette.accent)
+            line.add(f"  × {format_number(active.factor)}", self.palette.accent)
 
     def _control(self, behavior: Behavior, active: ActiveBehavior, width: int) -> Strip:
         """Target, value, error and c of a controller."""
         palette = self.palette
         unit = self._unit_of(behavior)
-        row = Row(width).add(" " * (self._columns[0] + 2), palette.text)
+        row = ScreenRow(width).add(" " * (self._columns[0] + 2), palette.text)
         parts = (
-            ("", f"{number(active.value or 0.0)} → {number(active.target or 0.0)} {unit}"),
-            (" e ", signed(active.error or 0.0)),
-            (" c ", signed(active.magnitude or 0.0)),
+            ("", f"{format_number(active.value or 0.0)} → {format_number(active.target or 0.0)} {unit}"),
+            (" e ", format_signed(active.error or 0.0)),
+            (" c ", format_signed(active.magnitude or 0.0)),
         )
         for label, value in parts:
             row.add(label, palette.muted).add(value, palette.text)
         return row.strip()
 
     def _unit_of(self, behavior: Behavior) -> str:
-        if self.briefing is None or behavior.pid is None:
+        if self.facts is None or behavior.pid is None:
             return ""
-        named = {attribute.name: attribute.unit for attribute in self.briefing.attributes}
-        return plain(named.get(behavior.pid.attribute, ""))
+        named = {attribute.name: attribute.unit for attribute in self.facts.attributes}
+        return printable(named.get(behavior.pid.attribute, ""))
 
     def _crop(self, entries: list[list[Strip]], latched: list[bool], width: int, height: int) -> list[Strip]:
         """As many entries as fit: latched ones first, in the order of the map."""
@@ -134,7 +134,7 @@ class BehaviorList(Panel):
                 chosen.append(index)
         strips = [strip for index in sorted(chosen) for strip in entries[index]]
         hidden = len(entries) - len(chosen)
-        more = Row(width).add(f"+{hidden} more: ? lists all", self.palette.muted)
+        more = ScreenRow(width).add(f"+{hidden} more: ? lists all", self.palette.muted)
         return [*strips, more.strip()]
 
 

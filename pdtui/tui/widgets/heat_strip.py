@@ -13,12 +13,12 @@ from rich.style import Style
 from textual.color import Color
 from textual.strip import Strip
 
-from pdtui.policies.units import format_unit, locate_unit
-from pdtui.teleop.snapshot import Snapshot, UnitView
-from pdtui.tui.ownership import owners
-from pdtui.tui.palette import HEAT_LEVELS
+from pdtui.core.units import format_unit, locate_unit
+from pdtui.drive.drive_snapshot import DriveSnapshot, StimulatedUnit
+from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.panel import Panel
-from pdtui.tui.text import Row, number
+from pdtui.tui.theme import HEAT_LEVELS
+from pdtui.tui.unit_owners import unit_owners
 
 _LABEL = 4
 
@@ -36,14 +36,14 @@ class HeatStrip(Panel):
         """Name the panel."""
         self.border_title = "hidden units"
 
-    def watch_briefing(self) -> None:
-        if self.briefing is not None:
-            widths = enumerate(self.briefing.layers)
+    def watch_facts(self) -> None:
+        if self.facts is not None:
+            widths = enumerate(self.facts.layers)
             layers = " · ".join(f"layer {layer}: {width}" for layer, width in widths)
             self.border_title = f"hidden units · {layers}"
-        super().watch_briefing()
+        super().watch_facts()
 
-    def remember(self, snapshot: Snapshot) -> None:
+    def remember(self, snapshot: DriveSnapshot) -> None:
         finite = np.abs(snapshot.activations[np.isfinite(snapshot.activations)])
         # Not every function is bounded as tanh is. A few overwritten units must not darken all others, so the
         # scale is what all but a fiftieth stay below; the largest seen counts, slowly forgotten.
@@ -51,14 +51,14 @@ class HeatStrip(Panel):
             self._scale = max(self._scale * 0.998, float(np.quantile(finite, 0.98)), 1e-6)
 
     def paint(self, width: int, height: int) -> list[Strip]:
-        if self.briefing is None or self.snapshot is None:
+        if self.facts is None or self.snapshot is None:
             return []
         columns = width - _LABEL
         lines = max(1, height - 1)
-        places = shares(len(self.briefing.layers), lines * 2)
+        places = shares(len(self.facts.layers), lines * 2)
         pixels = np.zeros((lines * 2, columns), np.int64)
         first = 0
-        for layer, units in enumerate(self.briefing.layers):
+        for layer, units in enumerate(self.facts.layers):
             values = self.snapshot.activations[first : first + units]
             top, rows = places[layer]
             if rows:
@@ -71,7 +71,7 @@ class HeatStrip(Panel):
 
     def _levels(self, values: NDArray[np.float32], rows: int, columns: int) -> NDArray[np.int64]:
         """Colour numbers of a layer's pixels, −1 for none, shape (rows, columns)."""
-        strongest = Grid(len(values), rows, columns).spread(np.nan_to_num(values))
+        strongest = UnitGrid(len(values), rows, columns).spread(np.nan_to_num(values))
         share = np.clip(strongest / self._scale, -1.0, 1.0)
         level = np.round(share * HEAT_LEVELS).astype(np.int64) + HEAT_LEVELS
         return np.where(np.isnan(strongest), -1, level)
@@ -92,20 +92,20 @@ class HeatStrip(Panel):
 
     def _marks(self, width: int, columns: int, places: list[tuple[int, int]]) -> Strip:
         """Stimulated units under their columns, with natural and overwritten value while there is room."""
-        assert self.briefing is not None
+        assert self.facts is not None
         assert self.snapshot is not None
-        owner = owners(self.map, self.snapshot.active, self.briefing.layers)
+        owner = unit_owners(self.map, self.snapshot.active, self.facts.layers)
         units = sorted(self.snapshot.units, key=lambda view: view.unit)
         marks = [(self._column(view, columns, places), view) for view in units]
         marks.sort(key=lambda mark: mark[0])
-        row, hidden = Row(width), 0
+        row, hidden = ScreenRow(width), 0
         for index, (column, view) in enumerate(marks):
             style = self.palette.behavior(self.row_of(owner.get(view.unit, "")))
-            address = format_unit(view.unit, self.briefing.layers)
-            text = f"▲{address} {number(view.natural)}→{number(view.overwritten)} "
+            address = format_unit(view.unit, self.facts.layers)
+            text = f"▲{address} {format_number(view.natural)}→{format_number(view.overwritten)} "
             at = width - row.left
             rest = sum(
-                len(format_unit(other.unit, self.briefing.layers)) + 16 for _, other in marks[index + 1 :]
+                len(format_unit(other.unit, self.facts.layers)) + 16 for _, other in marks[index + 1 :]
             )
             target = max(at, min(column + _LABEL, width - len(text) - rest))
             if target + len(text) > width:
@@ -116,11 +116,11 @@ class HeatStrip(Panel):
             row.add(f"+{hidden}".rjust(row.left), self.palette.muted)
         return row.strip()
 
-    def _column(self, view: UnitView, columns: int, places: list[tuple[int, int]]) -> int:
-        assert self.briefing is not None
-        layer, index = locate_unit(view.unit, self.briefing.layers)
+    def _column(self, view: StimulatedUnit, columns: int, places: list[tuple[int, int]]) -> int:
+        assert self.facts is not None
+        layer, index = locate_unit(view.unit, self.facts.layers)
         rows = max(1, places[layer][1])
-        return Grid(self.briefing.layers[layer], rows, columns).column_of(index)
+        return UnitGrid(self.facts.layers[layer], rows, columns).column_of(index)
 
 
 @lru_cache(maxsize=1024)
@@ -137,7 +137,7 @@ def shares(layers: int, rows: int) -> list[tuple[int, int]]:
 
 
 @dataclass(frozen=True)
-class Grid:
+class UnitGrid:
     """Where a layer's units are: down, then right, on `rows` × `columns` pixels.
 
     Fewer units than pixels are drawn wider, so that a layer always fills its strip; of more units than

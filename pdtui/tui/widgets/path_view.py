@@ -7,13 +7,13 @@ from math import atan2, ceil, log2, pi
 import numpy as np
 from textual.strip import Strip
 
+from pdtui.drive.drive_snapshot import DriveSnapshot
 from pdtui.robots.geometry import root_body, rotate
-from pdtui.teleop.snapshot import Snapshot
+from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.camera import Floats, round_length
-from pdtui.tui.canvas import Canvas
+from pdtui.tui.cell_text import format_number
 from pdtui.tui.panel import Panel
-from pdtui.tui.text import number
-from pdtui.tui.trail import Trail
+from pdtui.tui.path_trail import PathTrail
 
 _ARROWS = "→↗↑↖←↙↓↘"
 _LEAST_SIZE = 2.0
@@ -26,14 +26,14 @@ class PathView(Panel):
     def on_mount(self) -> None:
         """Name the panel and start with no path."""
         self.border_title = "path"
-        self.trail = Trail()
+        self.trail = PathTrail()
         self._heading = 0.0
         self._here = np.zeros(2)
 
-    def remember(self, snapshot: Snapshot) -> None:
+    def remember(self, snapshot: DriveSnapshot) -> None:
         self.trail.extend(snapshot.path, restarted=snapshot.restarted)
-        if self.briefing is not None and len(snapshot.poses):
-            root = snapshot.poses[root_body(self.briefing.links)]
+        if self.facts is not None and len(snapshot.poses):
+            root = snapshot.poses[root_body(self.facts.links)]
             ahead = rotate(root[3:], np.array([1.0, 0.0, 0.0]))
             self._here = root[:2]
             self._heading = atan2(float(ahead[1]), float(ahead[0]))
@@ -42,7 +42,7 @@ class PathView(Panel):
         points = self.trail.points
         if not len(points):
             return []
-        canvas = Canvas(width, height)
+        canvas = BrailleCanvas(width, height)
         middle, zoom = self._frame(canvas, points[:, :2])
 
         def place(world: Floats) -> Floats:
@@ -62,7 +62,7 @@ class PathView(Panel):
         palette = self.palette
         return canvas.strips([palette.faint, palette.text, palette.accent, palette.muted, *palette.behaviors])
 
-    def _frame(self, canvas: Canvas, points: Floats) -> tuple[Floats, float]:
+    def _frame(self, canvas: BrailleCanvas, points: Floats) -> tuple[Floats, float]:
         """Middle of the picture in m, and dots per m.
 
         The scale moves in steps of √2 and the middle in whole cells, so that the picture stands still
@@ -76,11 +76,11 @@ class PathView(Panel):
         middle: Floats = np.round((low + high) / 2 / cell) * cell
         return middle, zoom
 
-    def _mark(self, canvas: Canvas, dot: Floats, character: str) -> None:
+    def _mark(self, canvas: BrailleCanvas, dot: Floats, character: str) -> None:
         canvas.text(int(dot[0]) // 2, int(dot[1]) // 4, character, _MARK)
 
-    def _draw_scale(self, canvas: Canvas, zoom: float) -> None:
+    def _draw_scale(self, canvas: BrailleCanvas, zoom: float) -> None:
         length = round_length(max(canvas.columns // 3, 4) * 2 / zoom)
         cells = max(2, round(length * zoom / 2))
-        label = number(length).removesuffix(".00") + " m"
+        label = format_number(length).removesuffix(".00") + " m"
         canvas.text(0, canvas.rows - 1, "├" + "─" * (cells - 2) + "┤ " + label, _LABEL)

@@ -9,14 +9,14 @@ from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
+from pdtui.core.bodies import NO_OBSTACLES
+from pdtui.drive.drive_snapshot import DriveSnapshot
 from pdtui.robots.geometry import capsule_ends, place_links, root_body, rotate
-from pdtui.robots.types import NO_OBSTACLES
-from pdtui.teleop.snapshot import Snapshot
+from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.camera import Camera, Floats, round_length
-from pdtui.tui.canvas import Canvas
+from pdtui.tui.cell_text import ScreenRow, format_number
+from pdtui.tui.obstacle_drawing import draw_from_above, draw_from_side
 from pdtui.tui.panel import Panel
-from pdtui.tui.scenery import draw_from_above, draw_from_side
-from pdtui.tui.text import Row, number
 
 View = Literal["side", "above"]
 _ELEVATION: dict[View, float] = {"side": 14.0, "above": 90.0}
@@ -55,29 +55,29 @@ class RobotView(Panel):
         """Name the panel."""
         self.border_title = f"robot · {self.view}"
 
-    def remember(self, snapshot: Snapshot) -> None:
+    def remember(self, snapshot: DriveSnapshot) -> None:
         if snapshot.obstacles is not None:
             self._obstacles = snapshot.obstacles
             if len(snapshot.obstacles) and not self._looked:
                 self._looked, self.view = True, "above"
-        if self.briefing is not None and len(self._obstacles) and len(snapshot.poses):
-            ahead = _heading(snapshot.poses[root_body(self.briefing.links)])
+        if self.facts is not None and len(self._obstacles) and len(snapshot.poses):
+            ahead = _heading(snapshot.poses[root_body(self.facts.links)])
             if self._ahead is None or snapshot.restarted:
                 self._ahead = ahead
             self._ahead = self._ahead + _EASING * (ahead - self._ahead)
 
     def paint(self, width: int, height: int) -> list[Strip]:
-        if self.briefing is None:
+        if self.facts is None:
             return self._loading(width, height)
-        if self.snapshot is None or not self.briefing.links:
+        if self.snapshot is None or not self.facts.links:
             return []
-        canvas = Canvas(width, height)
-        placed = place_links(self.briefing.links, self.snapshot.poses)
-        ends = capsule_ends(self.briefing.links, placed)
+        canvas = BrailleCanvas(width, height)
+        placed = place_links(self.facts.links, self.snapshot.poses)
+        ends = capsule_ends(self.facts.links, placed)
         if not np.isfinite(ends).all():
             canvas.text(1, height // 2, "the robot's pose is not finite", _LABEL)
             return canvas.strips(self._styles())
-        root = self.snapshot.poses[root_body(self.briefing.links)]
+        root = self.snapshot.poses[root_body(self.facts.links)]
         camera = self._camera(canvas, root, ends)
         self._draw_ground(canvas, camera, root)
         self._draw_shadow(canvas, camera, ends)
@@ -89,7 +89,8 @@ class RobotView(Panel):
         self._draw_links(canvas, camera, placed, ends)
         if self.view == "side":
             draw_from_side(canvas, camera, self._obstacles, _OBSTACLE, behind=False)
-        place = f"x {number(float(root[0]))}  y {number(float(root[1]))}  z {number(float(root[2]))} m"
+        x, y, z = (format_number(float(value)) for value in root[:3])
+        place = f"x {x}  y {y}  z {z} m"
         canvas.text(width - len(place), height - 1, place, _LABEL)
         return canvas.strips(self._styles())
 
@@ -103,7 +104,7 @@ class RobotView(Panel):
         return [
             *blank,
             *(
-                Row(width).add(" " * max(0, (width - len(line)) // 2), style).add(line, style).strip()
+                ScreenRow(width).add(" " * max(0, (width - len(line)) // 2), style).add(line, style).strip()
                 for line, style in lines
             ),
         ]
@@ -120,10 +121,10 @@ class RobotView(Panel):
             *palette.depth,
         ]
 
-    def _camera(self, canvas: Canvas, root: Floats, ends: Floats) -> Camera:
+    def _camera(self, canvas: BrailleCanvas, root: Floats, ends: Floats) -> Camera:
         """Far enough away for the widest stretch that the robot has shown so far."""
-        assert self.briefing is not None
-        radii = np.array([_radius(link.size) for link in self.briefing.links])
+        assert self.facts is not None
+        radii = np.array([_radius(link.size) for link in self.facts.links])
         stretch = np.linalg.norm(ends - root[:3], axis=-1).max(axis=-1) + radii
         self._extent = max(self._extent, float(stretch.max()))
         extent, centre = self._extent, (canvas.width / 2, canvas.height / 2)
@@ -140,7 +141,7 @@ class RobotView(Panel):
         middle = (float(root[0]), float(root[1]), 0.45 * extent)
         return Camera(middle, _ELEVATION["side"], extent, zoom, (canvas.width / 2, canvas.height * 0.47))
 
-    def _draw_ground(self, canvas: Canvas, camera: Camera, root: Floats) -> None:
+    def _draw_ground(self, canvas: BrailleCanvas, camera: Camera, root: Floats) -> None:
         """A grid fixed to the world, so that its lines pass when the robot moves."""
         cell = round_length(camera.extent)
         reach = 9 if self.view == "side" else 6
@@ -158,13 +159,13 @@ class RobotView(Panel):
             inks = np.broadcast_to(ink[:, None], before.shape)[before]
             canvas.points(dots[before][:, 0], dots[before][:, 1], inks)
 
-    def _draw_shadow(self, canvas: Canvas, camera: Camera, ends: Floats) -> None:
+    def _draw_shadow(self, canvas: BrailleCanvas, camera: Camera, ends: Floats) -> None:
         flat = ends * np.array([1.0, 1.0, 0.0])
         dots, _, before = camera.project(flat)
         kept = before.all(axis=-1)
         canvas.segments(dots[kept, 0], dots[kept, 1], _SHADOW)
 
-    def _draw_heading(self, canvas: Canvas, camera: Camera, root: Floats) -> None:
+    def _draw_heading(self, canvas: BrailleCanvas, camera: Camera, root: Floats) -> None:
         """Where the robot's own x axis points, as an arrow on the ground."""
         x, y = _heading(root)
         if not (x or y):
@@ -180,9 +181,9 @@ class RobotView(Panel):
         if before.all():
             canvas.segments(dots[:, 0], dots[:, 1], _HEADING)
 
-    def _draw_links(self, canvas: Canvas, camera: Camera, placed: Floats, ends: Floats) -> None:
+    def _draw_links(self, canvas: BrailleCanvas, camera: Camera, placed: Floats, ends: Floats) -> None:
         """Far links first and darker, near ones over them."""
-        assert self.briefing is not None
+        assert self.facts is not None
         dots, magnification, before = camera.project(ends)
         depth = camera.depth(ends.mean(axis=-2))
         shades = len(self.palette.depth)
@@ -190,7 +191,7 @@ class RobotView(Panel):
         for row in np.argsort(-depth, kind="stable"):
             if not before[row].all():
                 continue
-            link, ink = self.briefing.links[row], _FIRST_SHADE + int(shade[row])
+            link, ink = self.facts.links[row], _FIRST_SHADE + int(shade[row])
             if link.shape == "box":
                 self._draw_box(canvas, camera, placed[row], link.size, ink)
                 continue
@@ -198,7 +199,7 @@ class RobotView(Panel):
             canvas.capsule(dots[row, 0], dots[row, 1], thick, ink, halo=1.0)
 
     def _draw_box(
-        self, canvas: Canvas, camera: Camera, pose: Floats, size: tuple[float, ...], ink: int
+        self, canvas: BrailleCanvas, camera: Camera, pose: Floats, size: tuple[float, ...], ink: int
     ) -> None:
         signs = np.array([[(corner >> axis & 1) * 2 - 1 for axis in range(3)] for corner in range(8)])
         dots, _, before = camera.project(pose[:3] + rotate(pose[3:], signs * np.array(size)))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from rich.cells import cell_len
 from textual.strip import Strip
 
-from pdtui.policies.units import format_unit
-from pdtui.text import plain
-from pdtui.tui.ownership import owners
+from pdtui.core.plain_text import printable
+from pdtui.core.units import format_unit
+from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.panel import Panel
-from pdtui.tui.text import Row, number
+from pdtui.tui.unit_owners import unit_owners
 
 _NUMBER = 8
 _ADDRESS = 8
@@ -24,14 +24,16 @@ class UnitTable(Panel):
 
     def paint(self, width: int, height: int) -> list[Strip]:
         palette = self.palette
-        if self.briefing is None or self.snapshot is None or not self.snapshot.units:
+        if self.facts is None or self.snapshot is None or not self.snapshot.units:
             text = "none: the policy is on its own" if self.snapshot is not None else ""
-            return [Row(width).add(text, palette.faint).strip()]
+            return [ScreenRow(width).add(text, palette.faint).strip()]
         head = (
-            Row(width).add("unit", palette.muted, _ADDRESS).add("natural", palette.muted, _NUMBER, right=True)
+            ScreenRow(width)
+            .add("unit", palette.muted, _ADDRESS)
+            .add("natural", palette.muted, _NUMBER, right=True)
         )
         head.add("    overwritten", palette.muted)
-        owner = owners(self.map, self.snapshot.active, self.briefing.layers)
+        owner = unit_owners(self.map, self.snapshot.active, self.facts.layers)
         strips = [head.strip()]
         units = self.snapshot.units
         room = height - 1 if len(units) < height else height - 2
@@ -39,15 +41,15 @@ class UnitTable(Panel):
             name = owner.get(view.unit, "")
             style = palette.behavior(self.row_of(name))
             row = (
-                Row(width)
-                .add(format_unit(view.unit, self.briefing.layers), style, _ADDRESS)
-                .add(number(view.natural), palette.muted, _NUMBER, right=True)
+                ScreenRow(width)
+                .add(format_unit(view.unit, self.facts.layers), style, _ADDRESS)
+                .add(format_number(view.natural), palette.muted, _NUMBER, right=True)
                 .add("  → ", palette.faint)
-                .add(number(view.overwritten), palette.title, _NUMBER)
+                .add(format_number(view.overwritten), palette.title, _NUMBER)
             )
-            if row.left > cell_len(plain(name)):
-                row.add(" " + plain(name), style)
+            if row.left > cell_len(printable(name)):
+                row.add(" " + printable(name), style)
             strips.append(row.strip())
         if len(units) > room:
-            strips.append(Row(width).add(f"+{len(units) - room} more", palette.faint).strip())
+            strips.append(ScreenRow(width).add(f"+{len(units) - room} more", palette.faint).strip())
         return strips

@@ -1,0 +1,137 @@
+"""`pdtui bench loop`: what each part of a control step costs, measured side by side in one run."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pdtui.core.events import Event
+from pdtui.core.units import Stimulation
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless import build_loop
+from pdtui.sessions.writer.session_recorder import SessionRecorder
+
+ROUNDS = 7
+
+
+@dataclass(frozen=True)
+class LoopBenchmark:
+    """Median over rounds.
+
+    Attributes:
+        bare, policy, stimulated, recorded: control steps a second of the simulator alone, with the policy,
+            with attributes and stimulation (the whole control loop), and recorded.
+        recorded_share: median over rounds of recorded / bare.
+        forward_us: a forward pass of the policy with three stimulated units, µs.
+    """
+
+    bare: float
+    policy: float
+    stimulated: float
+    recorded: float
+    recorded_share: float
+    forward_us: float
+
+
+def bench_loop(
+    config: DriveConfig,
+    *,
+    steps: int = 5000,
+    rounds: int = ROUNDS,
+    progress: Callable[[int, int], None] | None = None,
+) -> LoopBenchmark:
+    """Measure the four in turn, several rounds, so that a machine that drifts drifts for all of them.
+
+    All four walk: the bare simulator is fed the actions that the policy chose from the same start.
+
+    Raises:
+        PdtuiError: robot, policy or map cannot be had.
+    """
+    loop = build_loop(config)
+    walked = _actions(loop, config.seed, steps)
+    behavior = next(iter(config.stimulation_map.behaviors), "")
+    parts: dict[str, Callable[[], float]] = {
+        "bare": lambda: _bare(loop, config.seed, walked),
+        "policy": lambda: _with_policy(loop, config.seed, steps),
+        "stimulated": lambda: _whole(loop, config.seed, steps, behavior, None),
+        "recorded": lambda: _recorded(loop, config.seed, steps, behavior),
+    }
+    rates: dict[str, list[float]] = {name: [] for name in parts}
+    for done in range(rounds):
+        for name, measure in parts.items():
+            rates[name].append(measure())
+        if progress is not None:
+            progress(done + 1, rounds)
+    share = float(np.median(np.array(rates["recorded"]) / np.array(rates["bare"])))
+    medians = {name: float(np.median(values)) for name, values in rates.items()}
+    return LoopBenchmark(**medians, recorded_share=share, forward_us=_forward(loop))
+
+
+def _actions(loop: ControlLoop, seed: int, steps: int) -> list[np.ndarray]:
+    observation, _ = loop.robot.reset(seed=seed)
+    loop.policy.reset()
+    actions = []
+    for _ in range(steps):
+        actions.append(loop.policy.act(observation).action)
+        observation, _, terminated, _, _ = loop.robot.step(actions[-1])
+        if terminated:
+            observation, _ = loop.robot.reset()
+            loop.policy.reset()
+    return actions
+
+
+def _bare(loop: ControlLoop, seed: int, actions: list[np.ndarray]) -> float:
+    loop.robot.reset(seed=seed)
+    start = time.perf_counter()
+    for action in actions:
+        if loop.robot.step(action)[2]:
+            loop.robot.reset()
+    return len(actions) / (time.perf_counter() - start)
+
+
+def _with_policy(loop: ControlLoop, seed: int, steps: int) -> float:
+    start = time.perf_counter()
+    _actions(loop, seed, steps)
+    return steps / (time.perf_counter() - start)
+
+
+def _whole(
+    loop: ControlLoop, seed: int, steps: int, behavior: str, recorder: SessionRecorder | None
+) -> float:
+    fresh = ControlLoop(loop.robot, loop.policy, loop.map, seed)
+    start = time.perf_counter()
+    for step in range(steps):
+        events = [Event(step, "behavior", behavior)] if behavior and step % 200 == 100 else []
+        if step % 200 == 150:
+            events = [Event(step, "default")]
+        record = fresh.advance(events)
+        if recorder is not None:
+            recorder.write(record)
+    if recorder is not None:
+        recorder.close("finished")
+    return steps / (time.perf_counter() - start)
+
+
+def _recorded(loop: ControlLoop, seed: int, steps: int, behavior: str) -> float:
+    with tempfile.TemporaryDirectory() as folder:
+        recorder = SessionRecorder(Path(folder) / "bench.rrd", loop.info)
+        return _whole(loop, seed, steps, behavior, recorder)
+
+
+def _forward(loop: ControlLoop, calls: int = 2000) -> float:
+    observation = loop.robot.observe()
+    width = loop.policy.units
+    stimulation = Stimulation((0, width // 2, width - 1), (1.0, -1.0, 2.0))
+    times = []
+    for _ in range(ROUNDS):
+        start = time.perf_counter()
+        for _ in range(calls):
+            loop.policy.act(observation, stimulation)
+        times.append((time.perf_counter() - start) / calls * 1e6)
+    return float(np.median(times))

@@ -1,0 +1,180 @@
+"""`pdtui bench record`: what recording costs at 50 Hz, and what an hour of it takes in memory."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pdtui.core.errors import ScreenError
+from pdtui.core.events import Event
+from pdtui.core.step_record import StepRecord
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless import build_loop
+from pdtui.drive.replay import replay_session
+from pdtui.drive.server import PACED_ROWS_PER_WRITE
+from pdtui.sessions.drive_info import DriveInfo
+from pdtui.sessions.schema import ACTIVATIONS_KEPT, ActivationsKept
+from pdtui.sessions.session_repair import examine_session
+from pdtui.sessions.writer.session_recorder import SessionRecorder
+
+RATE = 50.0
+"""Control steps a second, whatever the robot's own rate."""
+
+_PRESS_EVERY, _HELD = 150, 50
+_SAMPLES = 10
+
+
+@dataclass(frozen=True)
+class RecordingCost:
+    """Of one way to record, in the small batches of a drive on the screen.
+
+    Attributes:
+        activations: how they are recorded.
+        driven: what the operator does.
+        cpu_share: of one core, by all threads, at `RATE`.
+        mb_a_minute: growth of the file at `RATE`, its end included, 10⁶ bytes.
+    """
+
+    activations: ActivationsKept
+    driven: str
+    cpu_share: float
+    mb_a_minute: float
+
+
+@dataclass(frozen=True)
+class RecordingBenchmark:
+    """What was measured.
+
+    Attributes:
+        units: hidden units of the policy.
+        steps: control steps of each recording.
+        costs: of each way to record.
+    """
+
+    units: int
+    steps: int
+    costs: tuple[RecordingCost, ...]
+
+
+@dataclass(frozen=True)
+class MemoryBenchmark:
+    """Resident memory over a long drive without a screen.
+
+    Attributes:
+        steps: control steps.
+        file_bytes: size of the session.
+        seconds: of recording, examining and replaying.
+        resident: bytes at ten moments of recording, then of replaying, by name.
+        verdict: of the replay.
+        whole: whether the session is.
+    """
+
+    steps: int
+    file_bytes: int
+    seconds: dict[str, float]
+    resident: dict[str, list[int]]
+    verdict: str
+    whole: bool
+
+
+def bench_record(
+    config: DriveConfig, *, steps: int = 6000, progress: Callable[[int, int], None] | None = None
+) -> RecordingBenchmark:
+    """Record the same drives in each way; only the recorder's work is measured.
+
+    One drive is left alone, in the other each behavior is latched in turn, for a third of the time.
+
+    Raises:
+        PdtuiError: robot, policy or map cannot be had.
+    """
+    loop = build_loop(config)
+    drives = {"nothing is pressed": _driven(loop, config.seed, steps, ())}
+    if loop.map.behaviors:
+        drives["behaviors in turn"] = _driven(loop, config.seed, steps, tuple(loop.map.behaviors))
+    costs = []
+    for kept in ACTIVATIONS_KEPT:
+        for name, records in drives.items():
+            info = replace(loop.info, activations=kept, dt=1.0 / RATE)
+            costs.append(RecordingCost(kept, name, *_cost(info, records)))
+            if progress is not None:
+                progress(len(costs), len(ACTIVATIONS_KEPT) * len(drives))
+    return RecordingBenchmark(loop.policy.units, steps, tuple(costs))
+
+
+def _driven(loop: ControlLoop, seed: int, steps: int, behaviors: Sequence[str]) -> list[StepRecord]:
+    fresh = ControlLoop(loop.robot, loop.policy, loop.map, seed)
+    records = []
+    for step in range(steps):
+        records.append(fresh.advance(_pressed(step, behaviors)))
+    return records
+
+
+def _pressed(step: int, behaviors: Sequence[str]) -> list[Event]:
+    turn, within = divmod(step, _PRESS_EVERY)
+    if behaviors and within == 0:
+        return [Event(step, "behavior", behaviors[turn % len(behaviors)], key="x")]
+    if behaviors and within == _HELD:
+        return [Event(step, "default", key="x")]
+    return []
+
+
+def _cost(info: DriveInfo, records: Sequence[StepRecord]) -> tuple[float, float]:
+    with tempfile.TemporaryDirectory() as folder:
+        recorder = SessionRecorder(Path(folder) / "bench.rrd", info, rows_per_write=PACED_ROWS_PER_WRITE)
+        before, size = time.process_time(), recorder.bytes
+        for record in records:
+            recorder.write(record)
+        recorder.close("finished")
+        used = time.process_time() - before
+        seconds = len(records) / RATE
+        return used / seconds, (recorder.bytes - size) / 1e6 / (seconds / 60)
+
+
+def bench_memory(
+    config: DriveConfig, *, steps: int, progress: Callable[[int, int], None] | None = None
+) -> MemoryBenchmark:
+    """Record a long drive without a screen, see whether it is whole, and replay it, all in this process.
+
+    Raises:
+        ScreenError: there is no ``/proc`` here to read a process's memory from.
+        PdtuiError: robot, policy or map cannot be had.
+    """
+    if not Path("/proc/self/statm").exists():
+        raise ScreenError("the benchmark reads /proc, which this system does not have")
+    every = max(1, steps // _SAMPLES)
+    resident: dict[str, list[int]] = {"recording": [], "replaying": []}
+    seconds: dict[str, float] = {}
+
+    def sample(part: str, done: int) -> None:
+        if done % every == 0:
+            resident[part].append(_resident())
+        if progress is not None:
+            progress(done + (steps if part == "replaying" else 0), 2 * steps)
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "long.rrd"
+        start = time.perf_counter()
+        loop = build_loop(config)
+        names = tuple(loop.map.behaviors)
+        with SessionRecorder(path, replace(loop.info, activations=config.activations)) as recorder:
+            for step in range(steps):
+                recorder.write(loop.advance(_pressed(step, names)))
+                sample("recording", step + 1)
+            recorder.close("finished")
+        seconds["recording"] = time.perf_counter() - start
+        start = time.perf_counter()
+        whole = examine_session(path).whole
+        seconds["examining"] = time.perf_counter() - start
+        start = time.perf_counter()
+        result = replay_session(path, progress=lambda done, _: sample("replaying", done))
+        seconds["replaying"] = time.perf_counter() - start
+        return MemoryBenchmark(steps, path.stat().st_size, seconds, resident, result.verdict, whole)
+
+
+def _resident() -> int:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")

@@ -1,0 +1,82 @@
+"""Commands that draw."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pdtui.cli.shared_options import choice_options, progress_bar_or_none
+from pdtui.core.plain_text import printable
+from pdtui.policies.weights.import_options import ImportOptions
+
+
+@click.group()
+def figure() -> None:
+    """Draw figures as PNGs; needs the extra 'figures'."""
+
+
+@figure.command("episode")
+@click.argument("robot")
+@click.option("--policy", default="", help="Weights; default: the robot's shipped policy.")
+@choice_options
+@click.option("--attribute", "attributes", multiple=True, metavar="NAME", help="May be given again.")
+@click.option(
+    "--unit",
+    "units",
+    multiple=True,
+    metavar="LAYER:INDEX",
+    help="One for each --attribute; default: the unit that matches it best.",
+)
+@click.option("--preset", type=click.Choice(["paper", "authors"]), default="paper", show_default=True)
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1000, show_default=True)
+@click.option("--from", "start", type=click.FloatRange(0), default=0.0, metavar="SECONDS", help="Start here.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(0, min_open=True),
+    default=10.0,
+    show_default=True,
+    help="Show so much.",
+)
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, metavar="FILE.png")
+@click.option("--overwrite", is_flag=True, help="Replace a file that exists already.")
+def episode(
+    robot: str,
+    policy: str,
+    choices: ImportOptions,
+    attributes: tuple[str, ...],
+    units: tuple[str, ...],
+    preset: str,
+    seed: int,
+    start: float,
+    seconds: float,
+    output: Path,
+    overwrite: bool,
+) -> None:
+    """Draw attributes of ROBOT and the units that match them over one episode (figure 2 of the paper).
+
+    ROBOT may be the id of a Gymnasium environment.
+    """
+    from pdtui.pictures.matplotlib_page import check_figure
+    from pdtui.robots import check_robot, trust_module
+
+    trust_module(robot)
+    check_robot(robot)
+    check_figure(output, overwrite)
+    from pdtui.pictures.matched_curves import draw_matched_curves, match_episode
+
+    with progress_bar_or_none("rolling out") as advance:
+        curves = match_episode(
+            robot,
+            policy or robot,
+            attributes=attributes,
+            units=units,
+            choices=choices,
+            preset=preset,
+            seed=seed,
+            progress=advance,
+        )
+    draw_matched_curves(output, curves, start=start, seconds=seconds)
+    for pair in curves.pairs:
+        click.echo(f"{printable(pair.attribute.name)}: unit {pair.unit}, discrepancy {pair.discrepancy:.3g}")
+    click.echo(f"wrote {output}")

@@ -1,0 +1,234 @@
+"""`pdtui sessions`: look at recorded drives, prove them, rescue them, and take them elsewhere."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from pdtui.cli.shared_options import json_option, judging_options, progress_bar_or_none, show_result
+from pdtui.core.errors import PdtuiError, SessionError
+from pdtui.core.plain_text import printable
+
+BROKEN, DIFFERS = 1, 3
+_file = click.argument("file", type=click.Path(path_type=Path))
+_overwrite = click.option("--overwrite", is_flag=True, help="Replace what exists already.")
+
+
+@click.group()
+def sessions() -> None:
+    """List, show, verify, repair, export, compare and open recorded drives."""
+
+
+@sessions.command("list")
+@click.argument("folder", type=click.Path(path_type=Path), default="sessions")
+@json_option
+def list_command(folder: Path, as_json: bool) -> None:
+    """All sessions under FOLDER; broken ones say why."""
+    from pdtui.cli import session_tables
+
+    if not folder.is_dir():
+        raise SessionError(f"{folder}: no such folder")
+    rows = [_row(path) for path in sorted(folder.rglob("*.rrd")) if path.is_file()]
+    if not rows and not as_json:
+        click.echo(f"no sessions under {printable(str(folder))}")
+        return
+    show_result({"sessions": rows}, as_json, lambda: session_tables.list_table(rows, folder))
+
+
+def _row(path: Path) -> dict[str, Any]:
+    from pdtui.sessions.session_header import read_session_header
+
+    row: dict[str, Any] = {"path": str(path), "bytes": path.stat().st_size, "broken": ""}
+    try:
+        heading = read_session_header(path)
+    except SessionError as error:
+        return {**row, "broken": str(error).removeprefix(f"{path}: ")}
+    return {
+        **row,
+        "robot": heading.info.robot,
+        "steps": heading.steps,
+        "seconds": heading.seconds,
+        "keys": heading.keys,
+        "outcome": heading.outcome,
+    }
+
+
+@sessions.command()
+@_file
+@json_option
+def show(file: Path, as_json: bool) -> None:
+    """Who drove what in FILE, key by key, and what it came to."""
+    from pdtui.cli import session_tables
+    from pdtui.sessions.session_reader import read_session
+    from pdtui.sessions.session_summary import summarise_session
+
+    session = read_session(file)
+    summary = summarise_session(session)
+    data = {
+        "path": str(file),
+        "robot": session.info.robot,
+        "policy": session.info.policy,
+        "policy_sha256": session.info.policy_hash,
+        "seed": session.info.seed,
+        "stochastic": session.info.stochastic,
+        "start": session.info.start,
+        "layers": session.info.layers,
+        "activations": session.info.activations,
+        "map": session.info.map_text,
+        "created": session.created,
+        "outcome": session.outcome,
+        "versions": session.versions,
+        **asdict(summary),
+        "events": [asdict(event) for event in session.events],
+        "endings": session.endings,
+    }
+    show_result(data, as_json, lambda: session_tables.show_table(session, summary))
+
+
+@sessions.command()
+@click.argument("files", type=click.Path(path_type=Path), nargs=-1, required=True)
+@click.option("--policy", default="", help="The sessions' weights, where they are elsewhere now.")
+@judging_options
+@json_option
+def verify(files: tuple[Path, ...], policy: str, judging: dict[str, Any], as_json: bool) -> None:
+    """See whether FILES are whole and repeat, digest by digest.
+
+    Exit codes: 0 all do; 1 a file is broken, not whole or cannot be replayed; 3 a drive does not repeat.
+    """
+    found = [_verified(file, policy, judging, as_json) for file in files]
+    if as_json:
+        click.echo(json.dumps({"sessions": found}, indent=2))
+    if any(row["repeats"] is False for row in found):
+        sys.exit(DIFFERS)
+    if not all(row["whole"] and row["repeats"] for row in found):
+        sys.exit(BROKEN)
+
+
+def _verified(file: Path, policy: str, judging: dict[str, Any], as_json: bool) -> dict[str, Any]:
+    from pdtui.drive.replay import replay_session
+    from pdtui.sessions.session_repair import examine_session
+
+    row: dict[str, Any] = {"path": str(file), "whole": False, "repeats": None}
+    try:
+        row["whole"] = examine_session(file).whole
+        with progress_bar_or_none("replaying", quiet=as_json) as advance:
+            result = replay_session(file, policy=policy, progress=advance, **judging)
+        row |= {"repeats": result.passed, "identical": result.identical, **asdict(result)}
+        lines = [result.verdict if row["whole"] else f"not whole: `pdtui sessions repair`; {result.verdict}"]
+        if not result.identical:
+            lines += [f"  {line}" for line in (*map(str, result.deviations[:5]), *result.environment)]
+    except PdtuiError as error:
+        row["broken"] = str(error).removeprefix(f"{file}: ")
+        lines = [f"broken: {row['broken']}"]
+    if not as_json:
+        click.echo(printable(f"{file}: {lines[0]}"))
+        for line in lines[1:]:
+            click.echo(printable(line))
+    return row
+
+
+@sessions.command()
+@_file
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="A new file; default: *.repaired.rrd beside FILE.",
+)
+@click.option("--in-place", is_flag=True, help="Replace FILE itself.")
+def repair(file: Path, output: Path | None, in_place: bool) -> None:
+    """Cut the torn tail of FILE and give it an end: a new file that opens and replays as far as it goes."""
+    from pdtui.sessions.session_repair import examine_session, repair_session
+
+    if in_place and output is not None:
+        raise SessionError("--in-place replaces the file; -o writes another: choose one")
+    if examine_session(file).whole:
+        click.echo(f"{printable(str(file))}: whole; nothing to repair")
+        return
+    target = file if in_place else output or file.with_suffix(".repaired.rrd")
+    if target.exists() and not in_place:
+        raise SessionError(f"{target}: exists already; a repaired session is a new file")
+    repaired = repair_session(file, target)
+    said = (
+        f"{repaired.steps} steps ({repaired.seconds:g} s), {repaired.keys} keys, outcome '{repaired.outcome}'"
+    )
+    click.echo(printable(f"wrote {target}: {said}"))
+
+
+@sessions.command()
+@_file
+@click.option("--stream", help="What to export; without it and --keys, the streams are listed.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="A .parquet or .csv file.")
+@click.option("--keys", type=click.Path(path_type=Path), help="Write the keystrokes to this text file.")
+@_overwrite
+def export(file: Path, stream: str | None, output: Path | None, keys: Path | None, overwrite: bool) -> None:
+    """Write a stream of FILE as a table, or its keystrokes as text for `pdtui drive --headless --keys`."""
+    from pdtui.sessions.session_export import STREAMS, export_stream
+
+    if (stream is None) != (output is None):
+        raise SessionError("--stream says what, -o where: give both")
+    if stream is not None and output is not None:
+        rows = export_stream(file, stream, output, overwrite=overwrite)
+        click.echo(printable(f"wrote {output}: {rows} rows"))
+    if keys is not None:
+        _export_keys(file, keys, overwrite)
+    if stream is None and keys is None:
+        for name, (says, _) in STREAMS.items():
+            click.echo(f"{name:<12} {says}")
+
+
+def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
+    from pdtui.drive.keystrokes import write_keystrokes
+    from pdtui.sessions.session_header import read_session_header
+
+    if output.exists() and not overwrite:
+        raise SessionError(f"{output}: exists already; --overwrite replaces it")
+    heading = read_session_header(file)
+    text = write_keystrokes(heading.events)
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise SessionError(f"{output}: cannot be written: {error.strerror}") from error
+    without = len(heading.events) - heading.keys
+    note = f"; {without} events had no key and are not in it" if without else ""
+    click.echo(printable(f"wrote {output}: {heading.keys} keys of {heading.steps} steps{note}"))
+
+
+@sessions.command()
+@click.argument("a", type=click.Path(path_type=Path))
+@click.argument("b", type=click.Path(path_type=Path))
+@json_option
+def compare(a: Path, b: Path, as_json: bool) -> None:
+    """The first step in which sessions A and B differ, and by how much after it; exit with 3 if they do."""
+    from pdtui.cli import session_tables
+    from pdtui.sessions.session_comparison import compare_sessions
+    from pdtui.sessions.session_reader import read_session
+
+    result = compare_sessions(read_session(a), read_session(b))
+    show_result(asdict(result), as_json, lambda: session_tables.compare_table(result))
+    if result.first_difference is not None or result.lengths[0] != result.lengths[1]:
+        sys.exit(DIFFERS)
+
+
+@sessions.command("open")
+@_file
+@click.option("--web", is_flag=True, help="Serve it to a browser on this machine.")
+def open_command(file: Path, web: bool) -> None:
+    """Open FILE in the Rerun viewer, laid out; it listens on 127.0.0.1 only."""
+    from pdtui.sessions.session_header import read_session_header
+    from pdtui.sessions.viewer.viewer_address import viewer_command
+
+    read_session_header(file)  # the viewer shows an empty window for what is no session
+    try:
+        code = subprocess.run(viewer_command(file, web=web), check=False).returncode
+    except OSError as error:
+        raise SessionError(f"the viewer cannot be started: {error}") from error
+    if code:
+        raise SessionError(f"{file}: the viewer ended with code {code}")

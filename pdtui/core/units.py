@@ -1,0 +1,131 @@
+"""Hidden units by address, and the stimulation that overwrites them."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from pdtui.core.errors import PolicyError
+
+ADDRESS = re.compile(r"([\w.]{1,200}):(\d{1,9})")
+"""``layer:index``, the layer by its number or its name."""
+
+_NAME = re.compile(r"[\w.]{1,200}")
+
+
+class LayerWidths(tuple[int, ...]):
+    """Widths of a policy's hidden layers, and the names that its layers have besides their numbers.
+
+    Args:
+        widths: units of each layer.
+        names: of each layer, the one to show first. A name that two layers share names neither, and one that
+            reads as a number would be taken for the layer's.
+
+    Attributes:
+        names: those that are left; empty for a layer that is known by its number alone.
+    """
+
+    names: tuple[tuple[str, ...], ...]
+
+    def __new__(cls, widths: Iterable[int], names: Sequence[Sequence[str]] = ()) -> LayerWidths:
+        layers = super().__new__(cls, widths)
+        uses = Counter(name for own in names for name in set(own))
+        layers.names = tuple(
+            tuple(
+                name
+                for name in dict.fromkeys(own)
+                if uses[name] == 1 and _NAME.fullmatch(name) and not name.isdecimal()
+            )
+            for own in names
+        )
+        return layers
+
+
+def describe_layers(layers: Sequence[int]) -> str:
+    """The layers in words, for messages: ``layers 0..1 of 256 units``."""
+    if any(_names(layers, layer) for layer in range(len(layers))):
+        return "layers " + ", ".join(
+            f"{layer} ({shown[0]}) of {width} units"
+            if (shown := _names(layers, layer))
+            else f"{layer} of {width} units"
+            for layer, width in enumerate(layers)
+        )
+    if len(set(layers)) == 1 and len(layers) > 1:
+        return f"layers 0..{len(layers) - 1} of {layers[0]} units"
+    return "layers " + ", ".join(f"{layer} of {width} units" for layer, width in enumerate(layers))
+
+
+def parse_unit(address: str, layers: Sequence[int]) -> int:
+    """Flat index of ``layer:index`` in a policy with these layer widths.
+
+    The layer is a number, or one of its names where `layers` are `LayerWidths` with names: ``conv1:37``. A
+    unit of a layer of any shape counts in C order.
+
+    Raises:
+        PolicyError: not an address, or no such unit.
+    """
+    match = ADDRESS.fullmatch(address)
+    if match is None:
+        raise PolicyError(f"unit '{address}': expected layer:index, such as 0:12")
+    layer, index = _layer(match[1], layers), int(match[2])
+    if layer is None or index >= layers[layer]:
+        raise PolicyError(f"unit {address} does not exist; the policy has {describe_layers(layers)}")
+    return sum(layers[:layer]) + index
+
+
+def format_unit(flat: int, layers: Sequence[int]) -> str:
+    """``layer:index`` of a flat index, by the layer's name where it has one."""
+    layer, index = locate_unit(flat, layers)
+    return f"{next(iter(_names(layers, layer)), layer)}:{index}"
+
+
+def locate_unit(flat: int, layers: Sequence[int]) -> tuple[int, int]:
+    """Number of the layer and index in it of a flat index.
+
+    Raises:
+        PolicyError: there are fewer units.
+    """
+    for layer, width in enumerate(layers):
+        if flat < width:
+            return layer, flat
+        flat -= width
+    raise PolicyError(f"unit index beyond the policy's {describe_layers(layers)}")
+
+
+def _names(layers: Sequence[int], layer: int) -> tuple[str, ...]:
+    names = layers.names if isinstance(layers, LayerWidths) else ()
+    return names[layer] if layer < len(names) else ()
+
+
+def _layer(name: str, layers: Sequence[int]) -> int | None:
+    if name.isdecimal():
+        return int(name) if int(name) < len(layers) else None
+    return next((layer for layer in range(len(layers)) if name in _names(layers, layer)), None)
+
+
+@dataclass(frozen=True)
+class Stimulation:
+    """Units and the outputs that overwrite them in one control step.
+
+    Attributes:
+        units: flat indices, layer by layer.
+        values: the output v of each.
+    """
+
+    units: tuple[int, ...] = ()
+    values: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, values: Mapping[int, float]) -> Stimulation:
+        """From a mapping of flat index to v."""
+        return cls(tuple(values), tuple(values.values()))
+
+    def by_address(self, layers: Sequence[int]) -> dict[str, float]:
+        """Outputs v by the addresses of their units."""
+        pairs = zip(self.units, self.values, strict=True)
+        return {format_unit(unit, layers): value for unit, value in pairs}
+
+
+NO_STIMULATION = Stimulation()

@@ -1,0 +1,225 @@
+"""Up and down for each attribute: the best confirmed unit, or two units whose side effects cancel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.units import Stimulation
+from pdtui.dissection.dissection_settings import DissectionSettings
+from pdtui.probing.confirmation import exceeds_random
+from pdtui.probing.effect_probe import EffectCurves, EffectProber, PlanEffects, bootstrap_interval
+from pdtui.spectra.monitor import MonitoredEpisode, StartState, StepProgress
+from pdtui.stimulation.stimulation_map import MeasuredEffect
+
+_KEPT = 0.7
+_SAME = 0.99
+
+
+@dataclass(frozen=True)
+class AttributeMover:
+    """What moves one attribute one way.
+
+    Attributes:
+        column: of the attribute.
+        sign: 1 for up, −1 for down.
+        stimulation: one unit, or two.
+        measured: change of the attribute, over starts that chose nothing.
+        side: largest change of any other attribute, in parts of that attribute's usual spread.
+        main: change of this one, in the same measure.
+        alone: `side` of the best single unit, where a second one was added to cancel it, else None.
+    """
+
+    column: int
+    sign: int
+    stimulation: Stimulation
+    measured: MeasuredEffect
+    side: float
+    main: float
+    alone: float | None = None
+
+
+def movable_columns(attributes: Sequence[Attribute], episodes: Sequence[MonitoredEpisode]) -> list[int]:
+    """Columns that behaviors are proposed for: what the body does, where it varies at all.
+
+    Left out are a torque, which is what the policy commands; the reward, which is what the world says of it;
+    what only runs on, such as a position along the way, since it is somewhere else whatever one does; and
+    what shows the same as an earlier column (the speed of a robot that only goes forward).
+
+    Args:
+        attributes: of the robot.
+        episodes: unstimulated.
+    """
+    values = np.concatenate([episode.attributes for episode in episodes])
+    kept: list[int] = []
+    for column, attribute in enumerate(attributes):
+        series = values[:, column]
+        if attribute.unit == "N m" or attribute.name == "reward":
+            continue
+        if not np.isfinite(series).all() or np.ptp(series) == 0:
+            continue
+        if not attribute.wraps and all(_runs_on(episode.attributes[:, column]) for episode in episodes):
+            continue
+        if any(abs(np.corrcoef(series, values[:, other])[0, 1]) > _SAME for other in kept):
+            continue
+        kept.append(column)
+    return kept
+
+
+def _runs_on(series: Floats) -> bool:
+    """Whether most of what changes is progress, the same way and about as fast in both halves."""
+    half = len(series) // 2
+    if half < 2:
+        return False
+    progress, changed = [], []
+    for part in (series[:half], series[half : 2 * half]):
+        progress.append(float(part[-1] - part[0]))
+        changed.append(float(np.abs(np.diff(part)).sum()))
+    first, second = progress
+    steady = first * second > 0 and 0.5 < second / first < 2.0
+    return steady and all(abs(made) > 0.5 * all_ for made, all_ in zip(progress, changed, strict=True))
+
+
+def find_attribute_movers(
+    prober: EffectProber,
+    columns: Sequence[int],
+    spread: Floats,
+    screen: EffectCurves,
+    refined: EffectCurves,
+    starts: Sequence[StartState],
+    plan: DissectionSettings,
+    progress: StepProgress | None = None,
+) -> tuple[AttributeMover, ...]:
+    """Up and down for each attribute that a confirmed unit moves.
+
+    Effects are means over the last two thirds of roll-outs that are much longer than those of the sweeps: a
+    unit that only shifts the phase of the gait moves an attribute for half a step, and then not at all.
+
+    Args:
+        prober: measures.
+        columns: of the attributes; also those whose side effects count.
+        spread: usual standard deviation of every attribute, shape (J,).
+        screen: every unit.
+        refined: the units to choose from.
+        starts: that neither sweep saw. The first half decides between units, the other half gives the
+            figures.
+        plan: how much to try, and how long.
+        progress: called with (directions done, directions).
+    """
+    found = []
+    half, steps = len(starts) // 2, plan.steer_steps
+    asked = [(column, sign) for column in columns for sign in (1, -1)]
+
+    def probe(plans: Sequence[Stimulation], some: Sequence[StartState]) -> PlanEffects:
+        return prober.probe(plans, some, steps=steps, measure_from=steps // 3)
+
+    for done, (column, sign) in enumerate(asked, start=1):
+        singles = _singles(column, sign, screen, refined, plan.steer_singles)
+        lasting = _lasting(probe(singles, starts[:half]), column, sign) if singles else None
+        if lasting is not None:
+            single = singles[lasting]
+            pairs = _cancelling(single, column, sign, columns, spread, refined)[: plan.steer_pairs]
+            plans = [single, *pairs]
+            best = _choose(probe(plans, starts[:half]), column, sign, columns, spread) if pairs else 0
+            chosen = [single] if best == 0 else [plans[best], single]
+            one = _describe(probe(chosen, starts[half:]), chosen, column, sign, columns, spread)
+            if one is not None:
+                found.append(one)
+        if progress is not None:
+            progress(done, len(asked))
+    return tuple(found)
+
+
+def _singles(
+    column: int, sign: int, screen: EffectCurves, refined: EffectCurves, count: int
+) -> list[Stimulation]:
+    """The units, each at its best output, that move the attribute that way most surely.
+
+    Only inside the units' safe ranges, and only those that move it more than units drawn at random.
+    """
+    robust = refined.robust(column, float(sign)).copy()
+    for row, unit in enumerate(refined.units):
+        alive = refined.survived(unit)
+        for dose, value in enumerate(refined.values):
+            sure = robust[row, dose] > 0 and abs(value) <= alive
+            effect = float(np.nanmean(refined.effects[row, dose, :, column])) if sure else 0.0
+            if not sure or not exceeds_random(effect, value, column, screen):
+                robust[row, dose] = 0.0
+    furthest = robust.max(axis=1)
+    rows = [int(row) for row in np.argsort(-furthest, kind="stable")[:count] if furthest[row] > 0]
+    return [
+        Stimulation((refined.units[row],), (refined.values[int(np.argmax(robust[row]))],)) for row in rows
+    ]
+
+
+def _lasting(result: PlanEffects, column: int, sign: int) -> int | None:
+    """The plan that moved the attribute that way from every start without a fall, and most surely."""
+    weakest = np.where(np.isfinite(result.effects[..., column]), sign * result.effects[..., column], -np.inf)
+    sure = np.where(result.falls.any(axis=1), -np.inf, weakest.min(axis=1))
+    best = int(np.argmax(sure))
+    return best if sure[best] > 0 else None
+
+
+def _cancelling(
+    single: Stimulation, column: int, sign: int, columns: Sequence[int], spread: Floats, refined: EffectCurves
+) -> list[Stimulation]:
+    """Second units that, if effects add up, keep most of the main effect and undo the side effects."""
+    mean = np.nan_to_num(refined.effects).mean(axis=2) / np.where(spread > 0, spread, 1.0)
+    mean[refined.falls.any(axis=2)] = np.nan
+    others = [other for other in columns if other != column]
+    if not others:
+        return []
+    row, dose = refined.units.index(single.units[0]), refined.values.index(single.values[0])
+    both = mean + mean[row, dose]
+    main, side = sign * both[..., column], np.abs(both[..., others]).max(axis=-1)
+    alone = np.abs(mean[row, dose, others]).max()
+    allowed = (main >= _KEPT * sign * mean[row, dose, column]) & (side <= _KEPT * alone)
+    allowed[row] = False
+    ranked = np.argsort(np.where(allowed, side, np.inf), axis=None, kind="stable")[: int(allowed.sum())]
+    plans = []
+    for index in ranked:
+        other, value = (int(number) for number in np.unravel_index(int(index), side.shape))
+        values = {single.units[0]: single.values[0], refined.units[other]: refined.values[value]}
+        plans.append(Stimulation.of(dict(sorted(values.items()))))
+    return plans
+
+
+def _parts(
+    result: PlanEffects, row: int, column: int, sign: int, columns: Sequence[int], spread: Floats
+) -> tuple[float, float]:
+    """Main and largest side effect of one plan, in parts of the usual spread."""
+    mean = np.nan_to_num(result.effects[row]).mean(axis=0) / np.where(spread > 0, spread, 1.0)
+    others = [abs(float(mean[other])) for other in columns if other != column]
+    return sign * float(mean[column]), max(others, default=0.0)
+
+
+def _choose(result: PlanEffects, column: int, sign: int, columns: Sequence[int], spread: Floats) -> int:
+    """The plan of least side effect among those that keep most of the first one's main effect."""
+    main, side = _parts(result, 0, column, sign, columns, spread)
+    best, least = 0, _KEPT * side
+    for row in range(1, len(result.effects)):
+        kept, beside = _parts(result, row, column, sign, columns, spread)
+        if not result.falls[row].any() and kept >= _KEPT * main and beside < least:
+            best, least = row, beside
+    return best
+
+
+def _describe(
+    result: PlanEffects,
+    chosen: Sequence[Stimulation],
+    column: int,
+    sign: int,
+    columns: Sequence[int],
+    spread: Floats,
+) -> AttributeMover | None:
+    samples, falls = result.effects[0, :, column], result.falls[0]
+    low, high = bootstrap_interval(samples, 0)
+    if not (sign * low > 0 and sign * high > 0) or falls.mean() > 0.2:
+        return None
+    main, side = _parts(result, 0, column, sign, columns, spread)
+    alone = None if len(chosen) == 1 else _parts(result, 1, column, sign, columns, spread)[1]
+    measured = MeasuredEffect(float(np.nanmean(samples)), low, high, int(falls.sum()), len(falls))
+    return AttributeMover(column, sign, chosen[0], measured, side, main, alone)

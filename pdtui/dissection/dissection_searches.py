@@ -1,0 +1,130 @@
+"""The searches of one dissection: a behavior for each goal, a controller for what can be held."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.core.units import Stimulation
+from pdtui.dissection.dissection_settings import DissectionSettings
+from pdtui.probing.effect_probe import EffectCurves, EffectProber
+from pdtui.robots.robot import Robot
+from pdtui.search.behavior_goals import STANDING, BehaviorGoal, goals_for
+from pdtui.search.behavior_search import BehaviorSearch, FoundBehavior, SearchStarts
+from pdtui.search.controller_search import ControllerSearch, FoundController, HeldAttribute
+from pdtui.search.imprints import find_imprints
+from pdtui.search.unit_sets import UnitSetPool, draw_unit_sets
+from pdtui.spectra.monitor import StepProgress, monitor_episodes
+
+_IMPRINT_SEEDS = 1000
+"""Beyond the first seed of a dissection: no other stage has these."""
+
+
+class TimeShare:
+    """Shares what is left of a time budget fairly among the searches to come."""
+
+    def __init__(self, began: float, minutes: float | None) -> None:
+        self._end = None if minutes is None else began + 60 * minutes
+
+    def share(self, left: int) -> Callable[[], bool]:
+        """Whether the next search's part of the time is over, when `left` searches are still to run."""
+        if self._end is None:
+            return lambda: False
+        now = time.monotonic()
+        until = now + max(0.0, self._end - now) / max(1, left)
+        return lambda: time.monotonic() >= until
+
+
+@dataclass(frozen=True)
+class DissectionSearches:
+    """What all searches of one dissection share.
+
+    Attributes:
+        prober: measures.
+        world: the robot, for its attributes.
+        plan: how much to do.
+        seed: of every random choice.
+        clock: shares the time.
+        stage: gives the progress callback of a stage, by its name.
+        known: sets of units from elsewhere, where searches begin too.
+    """
+
+    prober: EffectProber
+    world: Robot
+    plan: DissectionSettings
+    seed: int
+    clock: TimeShare
+    stage: Callable[[str], StepProgress | None]
+    known: Sequence[Stimulation] = ()
+
+    def run(
+        self, screen: EffectCurves, refined: EffectCurves, starts: SearchStarts
+    ) -> tuple[tuple[FoundBehavior, ...], tuple[FoundController, ...]]:
+        """A behavior for each goal, and a controller for each attribute, that means anything here."""
+        goals, targets = goals_for(self.world.attributes, refined.unperturbed), self._targets(refined)
+        if not goals and not targets:
+            return (), ()
+        pool = self.pool(starts)
+        return self._behaviors(goals, (screen, refined), pool, starts), self._holds(
+            targets, refined, pool, starts
+        )
+
+    def _behaviors(
+        self,
+        goals: Sequence[BehaviorGoal],
+        sweeps: Sequence[EffectCurves],
+        pool: UnitSetPool,
+        starts: SearchStarts,
+    ) -> tuple[FoundBehavior, ...]:
+        found = []
+        for number, goal in enumerate(goals):
+            column = self.world.attribute_index(goal.aim.attribute)
+            search = BehaviorSearch(self.prober, goal, column, starts, self.seed + number, self.plan.search)
+            deadline = self.clock.share(len(goals) - number + 2)
+            found.append(search.run(sweeps, pool, deadline, self.stage(f"search: {goal.name}")))
+        return tuple(found)
+
+    def pool(self, starts: SearchStarts) -> UnitSetPool:
+        """Random sets and imprints, probed once for all searches."""
+        crew, sizes, imprint = self.prober.crew, self.plan.search, self.plan.imprint
+        seeds = range(self.seed + _IMPRINT_SEEDS, self.seed + _IMPRINT_SEEDS + imprint.episodes)
+        episodes = monitor_episodes(self.world, crew.policy, seeds, imprint.steps)
+        plans = [
+            *self.known,
+            *draw_unit_sets(crew.policy.units, sizes, self.seed),
+            *find_imprints(
+                episodes, self.world.attributes, crew.policy.layers, imprint, sizes.bounds.largest
+            ),
+        ]
+        few = starts.search[: sizes.quick_starts]
+        return UnitSetPool(self.prober, plans, few, sizes.quick_steps, self.stage("sets of units"))
+
+    def _targets(self, sweep: EffectCurves) -> list[HeldAttribute]:
+        """Heading and speed, where the robot has them; a robot that stands has no speed to hold."""
+        names = [attribute.name for attribute in self.world.attributes]
+        wanted = [HeldAttribute("yaw", (-0.8, -0.4, 0.4, 0.8), True)] if "yaw" in names else []
+        if "speed" in names:
+            usual = float(np.mean(sweep.unperturbed[:, names.index("speed")]))
+            if usual > STANDING:
+                wanted.append(HeldAttribute("speed", (0.4 * usual, 0.7 * usual), False))
+        return wanted
+
+    def _holds(
+        self, targets: Sequence[HeldAttribute], sweep: EffectCurves, pool: UnitSetPool, starts: SearchStarts
+    ) -> tuple[FoundController, ...]:
+        """The best controllers, as long as the time is not up."""
+        held = []
+        for number, target in enumerate(targets):
+            column = self.world.attribute_index(target.attribute)
+            deadline = self.clock.share(len(targets) - number)
+            search, held_out = starts.search[:4], (*starts.selection[:6], *starts.held_out[:6])
+            searcher = ControllerSearch(self.prober, target, self.plan.hold)
+            opposites = pool.opposites(column, self.plan.hold.pairs)
+            held.append(searcher.run(sweep, column, opposites, search, held_out, deadline))
+            progress = self.stage(f"search: hold {target.attribute}")
+            if progress is not None:
+                progress(1, 1)
+        return tuple(one for one in held if one is not None)

@@ -1,0 +1,192 @@
+"""What a dissection found, as plain data."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pdtui.core.units import format_unit
+from pdtui.dissection.attribute_movers import AttributeMover
+from pdtui.dissection.dissection_result import Dissection
+from pdtui.probing.confirmation import (
+    BEST,
+    PrimitiveConfirmation,
+    best_probed,
+    confirm_unit,
+    matching_hit_rate,
+)
+from pdtui.spectra.matching_presets import preset_values
+
+
+def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str, Any]:
+    """The findings as data that JSON can hold; numbers that do not exist are None.
+
+    Args:
+        dissection: the findings.
+        matches: how many of the nearest units to list for each attribute.
+    """
+    return {
+        "robot": dissection.robot,
+        "policy": dissection.policy,
+        "sha256": dissection.policy_hash,
+        "preset": dissection.preset.name,
+        "settings": preset_values(dissection.preset),
+        "settings_changed": list(dissection.preset.changed),
+        "seed": dissection.seed,
+        "episodes": list(dissection.matching.used),
+        "too_short": [list(pair) for pair in dissection.matching.skipped],
+        "unit_flaws": {
+            format_unit(unit, dissection.layers): flaw
+            for unit, flaw in dissection.matching.unit_flaws.items()
+        },
+        "attributes": [
+            _attribute(dissection, column, matches) for column in range(len(dissection.attributes))
+        ],
+        "shortened": dissection.shortened,
+        "movable": [dissection.attributes[column].name for column in dissection.movable],
+        "steered": [_steered(dissection, one) for one in dissection.steered],
+        "side_effects": _side_effects(dissection),
+        "behaviors": [_behavior(dissection, number) for number in range(len(dissection.behaviors))],
+        "holds": [_hold(dissection, number) for number in range(len(dissection.holds))],
+        "rollouts": dissection.rollouts,
+        "control_steps": dissection.control_steps,
+        "minutes": round(dissection.minutes, 2),
+    }
+
+
+def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, Any]:
+    attribute = dissection.attributes[column]
+    matching, phase, layers = dissection.matching, dissection.phase, dissection.layers
+    ranked = matching.ranked(column)
+    rate = matching_hit_rate(column, dissection.screen, matching, dissection.refined, dissection.controls)
+    first = None
+    if ranked.size:
+        first = confirm_unit(int(ranked[0]), column, dissection.screen, dissection.refined, dissection.seed)
+    return {
+        "name": attribute.name,
+        "unit": attribute.unit,
+        "flaw": matching.flaws.get(attribute.name),
+        "unwrapped": attribute.wraps and dissection.preset.angles == "unwrapped",
+        # Of an attribute that is left out there is no predominant frequency.
+        "frequency": float(dissection.preset.frequencies(dissection.dt)[phase.bins[column]])
+        if ranked.size
+        else None,
+        "matches": [
+            {
+                "unit": format_unit(int(unit), layers),
+                "flaw": matching.unit_flaws.get(int(unit)),
+                "discrepancy": _number(matching.discrepancy[column, unit]),
+                "level_share": _number(matching.level_share[column, unit]),
+                "rho": _number(phase.plain[column, unit]),
+                "rho_circular": _number(phase.circular[column, unit]),
+                "rho_disagree": bool(phase.disagree[column, unit]),
+            }
+            for unit in ranked[:matches]
+        ],
+        "first_match": None if first is None else _confirmation(dissection, column, first),
+        "probed": [
+            _confirmation(dissection, column, one)
+            for one in best_probed(column, dissection.screen, dissection.refined, dissection.seed)
+        ],
+        "hits": {
+            "first": rate.first,
+            **{f"best_{count}": _number(share) for count, share in zip(BEST, rate.best, strict=True)},
+            "random": _number(rate.random),
+            "rank_correlation": _number(rate.correlation),
+            "held_out_matching": _number(rate.held_out_matching),
+            "held_out_probing": _number(rate.held_out_probing),
+        },
+    }
+
+
+def _confirmation(dissection: Dissection, column: int, one: PrimitiveConfirmation) -> dict[str, Any]:
+    rho = float(dissection.phase.rho(dissection.preset)[column, one.unit])
+    return {
+        "unit": format_unit(one.unit, dissection.layers),
+        "value": one.value,
+        "effect": _number(one.measured.effect),
+        "low": _number(one.measured.low),
+        "high": _number(one.measured.high),
+        "confirmed": one.confirmed,
+        "both_ways": one.both_ways,
+        "survived": one.survived,
+        "rho": _number(rho),
+        # ρ > 0 says that a higher output goes with a higher attribute.
+        "sign_agrees": bool(rho * one.value * one.measured.effect > 0),
+    }
+
+
+def _steered(dissection: Dissection, one: AttributeMover) -> dict[str, Any]:
+    return {
+        "attribute": dissection.attributes[one.column].name,
+        "direction": "up" if one.sign > 0 else "down",
+        "units": one.stimulation.by_address(dissection.layers),
+        "effect": _number(one.measured.effect),
+        "low": _number(one.measured.low),
+        "high": _number(one.measured.high),
+        "falls": one.measured.falls,
+        "of": one.measured.of,
+        "main": _number(one.main),
+        "side": _number(one.side),
+        "side_alone": None if one.alone is None else _number(one.alone),
+    }
+
+
+def _side_effects(dissection: Dissection) -> dict[str, Any]:
+    """Refined units × attributes at the largest screened outputs, in parts of each attribute's spread."""
+    matrices = {
+        f"{value:g}": [[_number(cell) for cell in row] for row in parts]
+        for value, parts in dissection.side_effects().items()
+    }
+    return {
+        "units": [format_unit(unit, dissection.layers) for unit in dissection.refined.units],
+        "controls": [format_unit(unit, dissection.layers) for unit in dissection.controls],
+        "attributes": [attribute.name for attribute in dissection.attributes],
+        "by_value": matrices,
+    }
+
+
+def _behavior(dissection: Dissection, number: int) -> dict[str, Any]:
+    found = dissection.behaviors[number]
+    return {
+        "name": found.goal.name,
+        "attribute": found.goal.aim.attribute,
+        "direction": found.goal.aim.direction,
+        "enough": found.goal.enough,
+        "units": found.stimulation.by_address(dissection.layers),
+        "reached": found.reached,
+        "effect": _number(found.change.effect),
+        "gain": _number(found.gain.effect),
+        "low": _number(found.gain.low),
+        "high": _number(found.gain.high),
+        "success": found.success,
+        "falls": found.falls,
+        "value": _number(found.value),
+        "unperturbed": _number(found.unperturbed),
+        "score": _number(found.score),
+        "search_score": _number(found.search_score),
+        "rollouts": found.rollouts,
+    }
+
+
+def _hold(dissection: Dissection, number: int) -> dict[str, Any]:
+    held = dissection.holds[number]
+    return {
+        "attribute": held.pid.attribute,
+        "units": held.weights.by_address(dissection.layers),
+        "kp": held.pid.kp,
+        "ki": held.pid.ki,
+        "kd": held.pid.kd,
+        "limit": held.pid.limit,
+        "holds": held.holds,
+        "error": _number(held.error),
+        "uncontrolled": _number(held.uncontrolled),
+        "falls": held.falls,
+        "targets": list(held.targets),
+        "relative": held.relative,
+    }
+
+
+def _number(value: Any) -> float | None:
+    number = float(value)
+    return number if math.isfinite(number) else None

@@ -1,0 +1,131 @@
+"""What `pdtui pursue` runs: search for a task's stimulation, then write the behavior into a map."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from rich.console import RenderableType
+from rich.text import Text
+
+from pdtui.core.errors import MapError
+from pdtui.core.units import Stimulation, parse_unit
+from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
+from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.robots.tasks.task import mean_figures
+from pdtui.robots.tasks.task_lookup import find_task
+from pdtui.search.task_run import TimedStimulation
+from pdtui.search.task_search import FoundTask, TaskSearch, TaskSearchSettings
+from pdtui.stimulation.map_reader import load_map
+from pdtui.stimulation.map_text import outputs_table
+from pdtui.stimulation.map_writer import add_behavior, rewrite_map
+from pdtui.stimulation.stimulation_map import StimulationMap
+
+
+@dataclass(frozen=True)
+class WrittenBehavior:
+    """What was found and where it was written."""
+
+    result: FoundTask
+    units: dict[str, float]
+    seconds: float | None
+    output: Path
+
+    def as_dict(self) -> dict[str, Any]:
+        """The form that ``--json`` prints."""
+        held = self.result.verdicts
+        return {
+            "task": self.result.task.name,
+            "magnitudes": self.units,
+            "period": self.seconds,
+            "held_out": {
+                "walks": len(held),
+                "done": sum(verdict.success for verdict in held),
+                "by_itself": sum(verdict.success for verdict in self.result.untouched),
+                "figures": mean_figures(held),
+            },
+            "rollouts": self.result.rollouts,
+            "map": str(self.output),
+        }
+
+    def text(self) -> RenderableType:
+        """What the command prints."""
+        told = self.as_dict()
+        held = told["held_out"]
+        lasts = "" if self.seconds is None else f" for {self.seconds:g} s"
+        figures = ", ".join(f"{name} {value:.2f}" for name, value in held["figures"].items())
+        return Text(
+            f"{told['task']}: {len(self.units)} units{lasts}; done on {held['done']} of {held['walks']} "
+            f"walks that the search did not see, by itself on {held['by_itself']}; {figures}\n"
+            f"wrote {self.output} ({told['rollouts']} roll-outs)"
+        )
+
+
+def search_task_into_map(
+    robot: str,
+    task: str,
+    policy: str,
+    output: Path,
+    *,
+    choices: ImportOptions = NO_OPTIONS,
+    seed: int,
+    workers: int,
+    minutes: float,
+    sizes: TaskSearchSettings,
+    progress: Callable[[int, int], None] | None = None,
+) -> WrittenBehavior:
+    """Search, and write the behavior into a map: a new file, or one of this policy.
+
+    A behavior of the task that the map has already is where the search begins, too, and is replaced.
+
+    Raises:
+        MapError: no such task, or the map is of another policy or cannot be written.
+        PdtuiError: the robot or the policy cannot be had.
+    """
+    wanted = find_task(task, robot)
+    known = load_map(output) if output.exists() else None
+    with RolloutPool(robot, policy, workers, choices) as crew:
+        if known is not None:
+            known.check(robot, crew.policy.layers, crew.policy.sha256)
+        begin = [] if known is None else _known(known, task, crew)
+        until = time.monotonic() + 60.0 * minutes
+        pursuit = TaskSearch(crew, wanted, seed, sizes)
+        result = pursuit.run(begin, lambda: time.monotonic() >= until, progress)
+        dt, addressed = crew.robot.control_dt, result.burst.stimulation.by_address(crew.policy.layers)
+        if known is None:
+            _new_map(output, robot, crew.policy.name, crew.policy.sha256, choices)
+    seconds = None if result.burst.steps is None else round(result.burst.steps * dt, 6)
+    entry: dict[str, Any] = {"name": wanted.name, "key": wanted.key, "says": wanted.says}
+    if seconds is not None:
+        entry["period"] = seconds
+    entry |= {"task": wanted.name, "magnitudes": outputs_table(addressed)}
+    rewrite_map(output, lambda text: add_behavior(text, entry, str(output)))
+    return WrittenBehavior(result, addressed, seconds, output)
+
+
+def _known(stimulation_map: StimulationMap, task: str, crew: RolloutPool) -> list[TimedStimulation]:
+    """The map's own behavior for the task."""
+    found = []
+    for behavior in stimulation_map.behaviors.values():
+        if behavior.task == task and behavior.mode == "fixed":
+            addressed = stimulation_map.units_of(behavior).items()
+            values = {parse_unit(address, crew.policy.layers): value for address, value in addressed}
+            steps = None if behavior.period is None else round(behavior.period / crew.robot.control_dt)
+            found.append(TimedStimulation(Stimulation.of(values), steps))
+    return found
+
+
+def _new_map(path: Path, robot: str, policy: str, sha256: str, choices: ImportOptions) -> None:
+    document = tomlkit.document()
+    document["schema"], document["robot"] = 1, robot
+    given = {name: value for name, value in vars(choices).items() if value}
+    document["policy"] = {"name": policy, "sha256": sha256, **given}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(tomlkit.dumps(document), encoding="utf-8")
+    except OSError as error:
+        raise MapError(f"{path}: cannot be written: {error.strerror}") from error

@@ -1,0 +1,120 @@
+"""The screen's end of a drive that runs in another process."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING
+
+from pdtui.core.errors import PdtuiError
+from pdtui.drive.drive_protocol import PaceRequest
+from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
+
+if TYPE_CHECKING:
+    from pdtui.drive.drive_config import DriveConfig
+
+_PATIENCE = 60.0
+"""For the end of the recording, on a busy machine: a process that is killed leaves it without one; s."""
+
+
+def _simulate(connection: Connection, config: DriveConfig) -> None:
+    # What the recording library prints when the disk is full, or a viewer gone, would go over the screen.
+    os.environ.setdefault("RUST_LOG", "off")
+    from pdtui.drive.server import serve_drive  # torch and the simulator load here, not under the screen
+
+    serve_drive(connection, config)
+
+
+class DriveClient:
+    """Starts the simulation's process; start it before the screen takes the terminal.
+
+    Args:
+        config: the drive.
+    """
+
+    def __init__(self, config: DriveConfig) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=_simulate, args=(theirs, config), name="pdtui simulation")
+        self._process.start()
+        theirs.close()
+        self._last_words = ""
+        self.failed = False
+        """Whether the drive ended with an error, once it is closed."""
+        self._asked = False
+        self._recording = config.recording
+
+    @property
+    def pid(self) -> int:
+        """Of the simulation's process."""
+        return self._process.pid or 0
+
+    def poll(self) -> DriveFacts | DriveSnapshot | None:
+        """The newest message that has arrived, or None; see `DriveLink.poll`."""
+        message = self._receive()
+        if isinstance(message, DriveFacts) or (message is None and not self._asked):
+            self._send("frame", None)
+            self._asked = True
+        elif isinstance(message, DriveSnapshot):
+            self._send("frame", None)
+        if isinstance(message, PdtuiError):
+            raise message
+        if isinstance(message, str):
+            self._last_words = message
+            raise PdtuiError(message)
+        return message
+
+    def press(self, key: str) -> None:
+        """Send a key that changes the run."""
+        self._send("press", key)
+
+    def pace(self, request: PaceRequest) -> None:
+        """Change the pacing."""
+        self._send("pace", request)
+
+    def close(self) -> str:
+        """End the drive, wait until the recording is whole, and say how it ended."""
+        self._send("close", None)
+        deadline = time.monotonic() + _PATIENCE
+        while not self._last_words and time.monotonic() < deadline:
+            try:
+                message = self._receive(timeout=0.1)
+            except PdtuiError as error:
+                message = error
+            if isinstance(message, str | PdtuiError):
+                self._last_words, self.failed = str(message), isinstance(message, PdtuiError)
+            elif message is None and not self._process.is_alive():
+                break
+        self._process.join(timeout=max(0.0, deadline - time.monotonic()))
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        self._connection.close()
+        return self._last_words or self._death()
+
+    def _receive(self, timeout: float = 0.0) -> DriveFacts | DriveSnapshot | PdtuiError | str | None:
+        try:
+            if not self._connection.poll(timeout):
+                return None
+            message: DriveFacts | DriveSnapshot | PdtuiError | str = self._connection.recv()
+        except (EOFError, OSError):
+            self._process.join(timeout=1.0)
+            return PdtuiError(self._death())
+        return message
+
+    def _send(self, kind: str, value: str | None) -> None:
+        try:
+            self._connection.send((kind, value))
+        except OSError:
+            return  # the process is gone; the next poll says why
+
+    def _death(self) -> str:
+        code = self._process.exitcode
+        how = (
+            f"was killed by {signal.Signals(-code).name}" if code and code < 0 else f"ended with code {code}"
+        )
+        line = f"the simulation's process {how}"
+        return f"{line}; the recording up to then is in {self._recording}" if self._recording else line

@@ -1,0 +1,250 @@
+"""The control loop: a function of robot, policy, map, seed and events. It knows no clock."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pdtui.core.attributes import Floats
+from pdtui.core.bodies import RobotState
+from pdtui.core.errors import KeystrokeError, MapError, SimulationDiverged
+from pdtui.core.events import Event
+from pdtui.core.step_record import StepRecord
+from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.runtime.recurrent_state import PolicyState
+from pdtui.robots.robot import Robot
+from pdtui.sessions.drive_info import DriveInfo
+from pdtui.stimulation.latch import Latch
+from pdtui.stimulation.stimulation_map import StimulationMap
+
+SNAPSHOT_EVERY = 10
+SNAPSHOTS_KEPT = 240
+
+
+@dataclass(frozen=True)
+class _Moment:
+    robot: RobotState
+    policy: PolicyState
+    latch: list[Any]
+    noise: Mapping[str, Any]
+    episode: int
+
+
+class ControlLoop:
+    """Advances one control step at a time.
+
+    Args:
+        robot: the world; the loop resets it.
+        policy: the network that acts.
+        stimulation_map: the behaviors that events may latch.
+        seed: of the robot's first reset and of the action noise.
+        stochastic: draw actions from the policy's distribution instead of taking its mean.
+        start: state in which episodes start, empty for the robot's usual one.
+
+    Raises:
+        PolicyError: a unit of the map does not exist.
+        MapError: the robot has no command that a behavior of the map sets.
+        RobotError: the robot has no such start.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        policy: Policy,
+        stimulation_map: StimulationMap,
+        seed: int,
+        *,
+        stochastic: bool = False,
+        start: str = "",
+    ) -> None:
+        _check_commands(robot, stimulation_map)
+        self.robot, self.policy, self.map, self.seed = robot, policy, stimulation_map, seed
+        self.start = robot.check_start(start)
+        self.step = 0
+        self.episode = 0
+        self.latch = Latch(stimulation_map, policy.layers, robot.attributes, robot.control_dt)
+        self._noise = np.random.default_rng(seed) if stochastic else None
+        self._ended = False
+        self._moments: OrderedDict[int, _Moment] = OrderedDict()
+        self._observation, _ = robot.reset(seed=seed, options=self._options)
+        policy.reset()
+        self.attributes: Floats = robot.read_attributes()
+
+    @property
+    def info(self) -> DriveInfo:
+        """What determines this run, besides its events."""
+        return DriveInfo(
+            robot=self.robot.name,
+            seed=self.seed,
+            policy=self.policy.name,
+            policy_hash=self.policy.sha256,
+            map_text=self.map.text,
+            stochastic=self._noise is not None,
+            start=self.start,
+            dt=self.robot.control_dt,
+            attributes=self.robot.attributes,
+            links=self.robot.links,
+            layers=self.policy.layers,
+            obstacles=len(self.robot.obstacles) > 0,
+        )
+
+    @property
+    def _options(self) -> dict[str, str] | None:
+        return {"start": self.start} if self.start else None
+
+    @property
+    def rewindable(self) -> tuple[int, ...]:
+        """Steps to which a rewind can go, oldest first."""
+        return tuple(self._moments)
+
+    def advance(self, events: Sequence[Event] = ()) -> StepRecord:
+        """Apply the events, then run one control step.
+
+        A robot that fell in the step before starts its next episode first. A simulation that diverges gives
+        a record that says so; the loop cannot go on after it.
+
+        Raises:
+            EventError: an event that does not fit the map or the present state.
+        """
+        if self._ended:
+            self._start_episode()
+        if self.step % SNAPSHOT_EVERY == 0:
+            self._remember()
+        for event in events:
+            self._apply(event)
+        stimulation = self.latch.stimulate(self.attributes)
+        if self.robot.set_commands({**self.robot.commands, **self.latch.commands}):
+            self._observation = self.robot.observe()
+        behaviors = self.latch.active
+        acted = self.policy.act(self._observation, stimulation, self._noise)
+        diverged, ended, reward, cost, finished = False, "", 0.0, 0.0, False
+        try:
+            self._observation, gained, terminated, truncated, details = self.robot.step(acted.action)
+            reward, cost = float(gained), float(details["cost"])
+            finished = bool(details.get("finished", False))
+            if terminated or truncated:
+                ended = str(details.get("reason", "the episode is over"))
+        except SimulationDiverged as error:
+            diverged, ended = True, str(error)
+        self.attributes = self.robot.read_attributes()
+        record = StepRecord(
+            self.step,
+            self.episode,
+            tuple(events),
+            behaviors,
+            stimulation,
+            acted.natural,
+            acted.action,
+            acted.activations,
+            self.attributes,
+            self.robot.read_poses(),
+            reward,
+            cost,
+            self.robot.digest(),
+            ended,
+            diverged,
+            finished,
+            self.robot.obstacles,
+        )
+        self.step += 1
+        self.latch.tick()
+        self._ended = bool(ended)
+        return record
+
+    def _apply(self, event: Event) -> None:
+        if event.step != self.step:
+            raise KeystrokeError(f"event for step {event.step} given to step {self.step}")
+        match event.kind:
+            case "reset":
+                self._start_episode()
+            case "rewind":
+                self._rewind(event.value)
+            case _:
+                self._latch_event(event)
+
+    def _latch_event(self, event: Event) -> None:
+        match event.kind:
+            case "behavior":
+                self.latch.press(event.name, self.attributes)
+            case "default":
+                self.latch.clear()
+            case "target":
+                self.latch.set_target(event.name, event.value)
+            case "factor":
+                self.latch.set_factor(event.name, event.value)
+            case _:
+                raise KeystrokeError(f"step {event.step}: unknown event '{event.kind}'")
+
+    @contextmanager
+    def rehearsal(self) -> Iterator[Callable[[Event], None]]:
+        """Yield a function that does to the latch what an event of this step will; undone at the end.
+
+        So one can see what a key means after those that were pressed before the same step.
+        """
+        kept = self.latch.save()
+
+        def rehearse(event: Event) -> None:
+            if event.kind == "reset":
+                self.latch.clear()
+            elif event.kind == "rewind":
+                self.latch.load(self._moments[int(event.value)].latch)
+            else:
+                self._latch_event(event)
+
+        if self._ended:
+            self.latch.clear()  # the next step begins an episode
+        try:
+            yield rehearse
+        finally:
+            self.latch.load(kept)
+
+    def _start_episode(self) -> None:
+        self._observation, _ = self.robot.reset(options=self._options)
+        self.policy.reset()
+        self.attributes = self.robot.read_attributes()
+        self.latch.clear()
+        self.episode += 1
+        self._ended = False
+
+    def _remember(self) -> None:
+        noise = self._noise.bit_generator.state if self._noise is not None else {}
+        self._moments[self.step] = _Moment(
+            self.robot.snapshot(), self.policy.snapshot(), self.latch.save(), noise, self.episode
+        )
+        while len(self._moments) > SNAPSHOTS_KEPT:
+            self._moments.popitem(last=False)
+
+    def _rewind(self, value: float) -> None:
+        step = int(value) if math.isfinite(value) else -1
+        if step not in self._moments:
+            known = f"{self.rewindable[0]}..{self.rewindable[-1]}" if self._moments else "none yet"
+            raise KeystrokeError(
+                f"cannot rewind to step {step}; kept is every {SNAPSHOT_EVERY}th step of {known}"
+            )
+        moment = self._moments[step]
+        self.robot.restore(moment.robot)
+        self.policy.restore(moment.policy)
+        self.latch.load(moment.latch)
+        if self._noise is not None:
+            self._noise.bit_generator.state = moment.noise
+        self.episode = moment.episode
+        self._observation = self.robot.observe()
+        self.attributes = self.robot.read_attributes()
+        self._ended = False
+
+
+def _check_commands(robot: Robot, stimulation_map: StimulationMap) -> None:
+    for behavior in stimulation_map.behaviors.values():
+        for name in behavior.commands:
+            if name not in robot.commands:
+                known = f"there are {', '.join(robot.commands)}" if robot.commands else "it has none"
+                raise MapError(
+                    f"{stimulation_map.source}: behavior '{behavior.name}': {robot.name} has no command "
+                    f"'{name}'; {known}"
+                )

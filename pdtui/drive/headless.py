@@ -1,0 +1,142 @@
+"""Putting a drive together, and running one without a screen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pdtui.core.errors import DriveEnded, KeystrokeError, PdtuiError, SimulationDiverged, error_in_one_line
+from pdtui.core.events import Event
+from pdtui.core.step_record import StepRecord
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.keystrokes import key_meanings
+from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.runtime.policy_fit import check_fit
+from pdtui.policies.weights.import_options import WorldSpaces
+from pdtui.policies.weights.policy_loading import load_policy
+from pdtui.robots import make_robot
+from pdtui.robots.robot import Robot
+from pdtui.sessions.writer.session_recorder import SessionRecorder
+
+
+@dataclass(frozen=True)
+class DriveSummary:
+    """How a drive without a screen went.
+
+    Attributes:
+        steps: control steps.
+        seconds: simulated time, s.
+        falls: episodes that ended.
+        involvement: control steps in which a key was pressed.
+        mean: mean of every attribute, by name.
+    """
+
+    steps: int
+    seconds: float
+    falls: int
+    involvement: int
+    mean: dict[str, float]
+
+
+def build_loop(config: DriveConfig, robot: Robot | None = None, policy: Policy | None = None) -> ControlLoop:
+    """Load robot and policy, where they are not given, and set the loop at step 0.
+
+    Raises:
+        PdtuiError: the robot, the policy or the map cannot be had, or they do not fit each other.
+    """
+    robot, wanted = robot or make_robot(config.robot), config.stimulation_map
+    policy = policy or load_policy(
+        config.policy or wanted.policy,
+        config.robot,
+        choices=wanted.choices,
+        spaces=WorldSpaces.of_world(robot),
+        folders=(Path(wanted.source).parent,),
+    )
+    wanted.check(config.robot, policy.layers, policy.sha256, force=config.force)
+    check_fit(policy, robot, config.robot)
+    return ControlLoop(robot, policy, wanted, config.seed, stochastic=config.stochastic, start=config.start)
+
+
+def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:
+    """The events of keys pressed before the loop's next step.
+
+    Raises:
+        EventError: a key means nothing in the present state.
+    """
+    events = []
+    for key, meaning in zip(keys, key_meanings(keys, loop), strict=True):
+        if isinstance(meaning, str):
+            raise KeystrokeError(f"step {loop.step}: key '{key}': {meaning}")
+        events.append(meaning)
+    return events
+
+
+def drive_keys(loop: ControlLoop, presses: Mapping[int, Sequence[str]], steps: int) -> Iterator[StepRecord]:
+    """Drive from keystrokes, unpaced.
+
+    Keys of one step are read in their order: what the second means depends on what the first did.
+
+    Raises:
+        EventError: a key means nothing in the state it meets.
+        SimulationDiverged: after the record of the step that diverged.
+    """
+    for _ in range(steps):
+        record = loop.advance(key_events(presses.get(loop.step, ()), loop))
+        yield record
+        if record.diverged:
+            raise SimulationDiverged(f"step {record.step}: {record.ended}")
+
+
+def drive_headless(
+    loop: ControlLoop,
+    presses: Mapping[int, Sequence[str]],
+    steps: int,
+    recorder: SessionRecorder | None,
+    ended: Callable[[], str] = str,
+) -> DriveSummary:
+    """Drive from keystrokes without a screen, recording if a recorder is given, and sum it up.
+
+    Args:
+        loop: the drive, before its first step.
+        presses: keys by the control step before which they are pressed.
+        steps: control steps.
+        recorder: takes every step; it is closed at the end, however that comes.
+        ended: asked after each step; why to end there, empty to go on.
+
+    Raises:
+        DriveEnded: `ended` said so.
+        PdtuiError: as `drive_keys`; the recording is whole all the same.
+    """
+    falls = involvement = done = 0
+    total = np.zeros(len(loop.robot.attributes))
+    outcome = "stopped"
+    try:
+        for record in drive_keys(loop, presses, steps):
+            if recorder is not None:
+                recorder.write(record)
+            done += 1
+            falls += bool(record.ended)
+            involvement += any(event.key for event in record.events)
+            total += record.attributes
+            if reason := ended():
+                raise DriveEnded(f"{reason}: {done} steps{_recorded(recorder)}")
+        outcome = "finished"
+    except Exception as error:
+        outcome = str(error) if isinstance(error, PdtuiError) else error_in_one_line(error)
+        raise
+    finally:
+        if recorder is not None:
+            recorder.close(outcome)
+    means = {
+        attribute.name: float(value / max(done, 1))
+        for attribute, value in zip(loop.robot.attributes, total, strict=True)
+    }
+    return DriveSummary(done, done * loop.robot.control_dt, falls, involvement, means)
+
+
+def _recorded(recorder: SessionRecorder | None) -> str:
+    return "" if recorder is None else f", recorded in {recorder.path}"

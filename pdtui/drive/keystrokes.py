@@ -1,0 +1,140 @@
+"""From pressed keys to events: on the screen and from keystroke files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from pdtui.core.errors import KeystrokeError
+from pdtui.core.events import Event
+from pdtui.core.step_record import ActiveBehavior
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.stimulation.stimulation_map import StimulationMap
+
+MAX_BYTES = 10_000_000
+"""Of a keystroke file; a key in every step of an hour has 2 million."""
+FACTOR_STEP = 1.25
+REWIND_SECONDS = 3.0
+_LINE = re.compile(r"(\d{1,9})\s+(\S+)")
+_ARROWS = {"up": 1, "left": 1, "down": -1, "right": -1}
+
+
+def run_keys(stimulation_map: StimulationMap) -> tuple[str, ...]:
+    """Every key that can change a run driven with this map."""
+    fixed = ("up", "down", "left", "right", "plus", "minus", "r", "backspace")
+    return (
+        stimulation_map.default_key,
+        *(behavior.key for behavior in stimulation_map.behaviors.values()),
+        *fixed,
+    )
+
+
+def key_event(key: str, loop: ControlLoop) -> Event | str:
+    """The event that a key means in the loop's present state, or a sentence why it means nothing."""
+    step = loop.step
+    if key == loop.map.default_key:
+        return Event(step, "default", key=key)
+    behavior = loop.map.behavior_of_key(key)
+    if behavior is not None:
+        return Event(step, "behavior", behavior.name, key=key)
+    active = loop.latch.active
+    if key in _ARROWS:
+        return _move_target(key, loop, active)
+    if key in ("plus", "minus"):
+        if not active:
+            return "no behavior is latched whose strength could change"
+        latest = active[-1]
+        change = FACTOR_STEP if key == "plus" else 1.0 / FACTOR_STEP
+        return Event(step, "factor", latest.name, latest.factor * change, key)
+    if key == "r":
+        return Event(step, "reset", key=key)
+    if key == "backspace":
+        wanted = step - round(REWIND_SECONDS / loop.robot.control_dt)
+        earlier = [kept for kept in loop.rewindable if kept <= wanted]
+        if not earlier:
+            return "nothing to rewind to yet"
+        return Event(step, "rewind", value=float(earlier[-1]), key=key)
+    return f"no behavior has key '{key}'"
+
+
+def key_meanings(keys: Iterable[str], loop: ControlLoop) -> list[Event | str]:
+    """What keys mean that are pressed before the same step, each after those before it; see `key_event`."""
+    meanings: list[Event | str] = []
+    with loop.rehearsal() as rehearse:
+        for key in keys:
+            meanings.append(meaning := key_event(key, loop))
+            if isinstance(meaning, Event):
+                rehearse(meaning)
+    return meanings
+
+
+def _move_target(key: str, loop: ControlLoop, active: tuple[ActiveBehavior, ...]) -> Event | str:
+    """Left and right prefer a heading, up and down anything else, where both are held."""
+    held = [view for view in active if view.target is not None]
+    if not held:
+        return "no target is held; a behavior of mode pid holds one"
+
+    def turns(view: ActiveBehavior) -> bool:
+        pid = loop.map.behaviors[view.name].pid
+        assert pid is not None
+        return loop.robot.attributes[loop.robot.attribute_index(pid.attribute)].wraps
+
+    chosen = next((view for view in held if turns(view) == (key in ("left", "right"))), held[-1])
+    pid = loop.map.behaviors[chosen.name].pid
+    assert pid is not None
+    assert chosen.target is not None
+    return Event(loop.step, "target", chosen.name, chosen.target + _ARROWS[key] * pid.step, key)
+
+
+def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, list[str]]:
+    """Key presses by control step, from a text file with a line ``STEP KEY`` for each.
+
+    ``#`` starts a comment.
+
+    Raises:
+        EventError: the file cannot be read, or a line is not what was expected; the line is named.
+    """
+    try:
+        with path.open("rb") as file:  # it may be a pipe
+            read = file.read(MAX_BYTES + 1)
+        if len(read) > MAX_BYTES:
+            raise KeystrokeError(f"{path}: expected at most {MAX_BYTES} bytes of keystrokes, there are more")
+        lines = read.decode("utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise KeystrokeError(f"{path}: cannot be read as keystrokes: {error}") from error
+    known = run_keys(stimulation_map)
+    presses: dict[int, list[str]] = {}
+    last = 0
+    for number, line in enumerate(lines, start=1):
+        content = line.split("#")[0].strip()
+        if not content:
+            continue
+        match = _LINE.fullmatch(content)
+        if match is None:
+            raise KeystrokeError(f"{path}:{number}: expected 'STEP KEY', found {content[:40]!r}")
+        step, key = int(match[1]), match[2]
+        if key not in known:
+            raise KeystrokeError(
+                f"{path}:{number}: key '{key[:40]}' does nothing; keys are {', '.join(known)}"
+            )
+        if step < last:
+            raise KeystrokeError(
+                f"{path}:{number}: step {step} comes after step {last}; steps must not go back"
+            )
+        last = step
+        presses.setdefault(step, []).append(key)
+    return presses
+
+
+def write_keystrokes(events: Iterable[Event]) -> str:
+    """The key presses among events as the text of a keystroke file.
+
+    Raises:
+        EventError: a key is no single word, so that the file would say something else.
+    """
+    pressed = [event for event in events if event.key]
+    for event in pressed:
+        if _LINE.fullmatch(f"{event.step} {event.key}") is None or "#" in event.key:
+            raise KeystrokeError(f"step {event.step}: {event.key[:40]!r} is no name of a key")
+    return "".join(f"{event.step} {event.key}\n" for event in pressed)

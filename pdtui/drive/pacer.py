@@ -1,0 +1,70 @@
+"""When the next control step is due: real time, slower, faster, paused, single steps."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+from pdtui.drive.drive_protocol import PaceRequest
+
+SLOWEST, FASTEST = 1 / 16, 16.0
+_LAG_FORGIVEN = 0.25
+
+
+class Pacer:
+    """Decides how long to wait; the caller brings the clock, so that nothing here reads one.
+
+    Args:
+        dt: simulated time of a control step, s.
+        now: present time, s.
+    """
+
+    def __init__(self, dt: float, now: float) -> None:
+        self._dt = dt
+        self.speed, self.paused = 1.0, False
+        self._due = now
+        self._single = 0
+        self._marks: list[float] = []
+
+    def request(self, pace: PaceRequest, now: float) -> None:
+        """Change the pace. A single step pauses first.
+
+        Raises:
+            ValueError: no such request.
+        """
+        match pace:
+            case "pause":
+                self.paused = not self.paused
+            case "step":
+                self._single += self.paused
+                self.paused = True
+            case "slower":
+                self.speed = max(SLOWEST, self.speed / 2)
+            case "faster":
+                self.speed = min(FASTEST, self.speed * 2)
+            case _:
+                raise ValueError(f"unknown pace '{pace}'; there are {', '.join(get_args(PaceRequest))}")
+        self._due = now
+        self._marks = []
+
+    def wait(self, now: float) -> float | None:
+        """Seconds until the next step, 0 if it is due; None while paused."""
+        if self._single:
+            return 0.0
+        return None if self.paused else max(0.0, self._due - now)
+
+    def stepped(self, now: float) -> None:
+        """A control step was done."""
+        if self._single:
+            self._single -= 1
+            return
+        self._due += self._dt / self.speed
+        if now - self._due > _LAG_FORGIVEN:
+            self._due = now  # too slow for this speed: go on from here rather than run after it
+        self._marks = [*self._marks[-40:], now]
+
+    @property
+    def achieved(self) -> float:
+        """Speed factor of the last steps."""
+        if self.paused or len(self._marks) < 2 or self._marks[-1] <= self._marks[0]:
+            return 0.0 if self.paused else self.speed
+        return (len(self._marks) - 1) * self._dt / (self._marks[-1] - self._marks[0])

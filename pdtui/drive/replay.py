@@ -1,0 +1,230 @@
+"""Run a session again and compare, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pdtui.core.attributes import Floats
+from pdtui.core.errors import PdtuiError, SessionError
+from pdtui.core.events import events_by_step
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless import build_loop
+from pdtui.policies.runtime.policy import Policy
+from pdtui.robots.robot import Robot
+from pdtui.sessions.environment_versions import (
+    environment_versions,
+    numeric_version_differences,
+    version_differences,
+)
+from pdtui.sessions.session_comparison import (
+    AttributeDeviation,
+    attribute_differences,
+    attribute_spread,
+    summarise_deviations,
+)
+from pdtui.sessions.session_reader import Session, read_session
+from pdtui.stimulation.map_policy import locate_policy
+from pdtui.stimulation.map_reader import parse_map
+
+TOLERANCE = 1e-6
+"""In standard deviations of the attribute over the session, for `HORIZON`.
+
+Measured with the shipped Ant policy: 11 drives of 8 s and more, computed with AVX-512 and again as an older
+processor would (OPENBLAS_CORETYPE=Nehalem, ATEN_CPU_CAPABILITY=default). Two of them left other bits. In
+those, attributes stay within 1e-10 for 2 s and within 1e-6 for 3.6 s; then contacts amplify the last bits,
+and a drive may have nothing to do with its session after 6 s. A change that is meant is larger at once:
+weights changed by 1e-5 of themselves move an attribute by more than 1e-5 in the first two steps of each of 10
+drives.
+"""
+
+HORIZON = 2.0
+"""Simulated time for which another machine's drive has to agree, s."""
+
+
+@dataclass(frozen=True)
+class ReplayResult:
+    """How a replay compares with its session.
+
+    Attributes:
+        steps: control steps that were compared.
+        first_difference: the first control step whose digest differs; None if none does.
+        change: by how much the attribute that differs most does so in that step, in its unit.
+        detail: that attribute and its change, in words.
+        environment: how machine and versions differ from the session's.
+        total: control steps of the session.
+        dt: simulated time of a control step, s.
+        deviations: how far each attribute is off from the first difference on, worst first.
+        agreed: control steps, from the first, in which every attribute is within the tolerance.
+        tolerance: in standard deviations of each attribute; None where only the same bits will do.
+        judged: control steps that have to be within the tolerance.
+        stopped: why the replay could not go on after it had departed from the session; empty if it could.
+    """
+
+    steps: int
+    first_difference: int | None
+    change: float
+    detail: str
+    environment: tuple[str, ...]
+    total: int = 0
+    dt: float = 0.0
+    deviations: tuple[AttributeDeviation, ...] = ()
+    agreed: int = 0
+    tolerance: float | None = None
+    judged: int = 0
+    stopped: str = ""
+
+    @property
+    def identical(self) -> bool:
+        """Whether every step left the same digest."""
+        return self.first_difference is None
+
+    @property
+    def passed(self) -> bool:
+        """Whether the session repeats: bit for bit, or elsewhere within the tolerance."""
+        return self.identical or (self.tolerance is not None and self.agreed >= self.judged)
+
+    @property
+    def verdict(self) -> str:
+        """The result in one line."""
+        if self.identical:
+            return f"identical: {self.steps} steps"
+        where = f"step {self.first_difference} of {self.total}"
+        if self.tolerance is None:
+            return f"differs: {where}: {self.detail}"
+        kept = (
+            f"{self.agreed} steps ({self.agreed * self.dt:g} s) are within {self.tolerance:g} of the spread"
+        )
+        if self.passed:
+            return f"repeats within tolerance: bits differ from {where} on; the first {kept}"
+        return f"differs: {where}: {self.detail}; only the first {kept}, expected were {self.judged}"
+
+
+def config_of(session: Session, source: str, policy: str = "") -> DriveConfig:
+    """The drive that repeats a session.
+
+    Raises:
+        MapError: the map inside the session is broken.
+        PolicyError: it names a file that lies outside of the session's folder and the working directory.
+    """
+    info = session.info
+    stimulation_map = parse_map(info.map_text, f"{source} (map)")
+    stimulation_map = locate_policy(stimulation_map, policy)
+    # A drive that was forced had other weights than its map was made for; a replay wants the session's own.
+    stimulation_map = replace(stimulation_map, policy_hash=info.policy_hash)
+    return DriveConfig(
+        robot=info.robot,
+        stimulation_map=stimulation_map,
+        seed=info.seed,
+        policy=policy,
+        stochastic=info.stochastic,
+        start=info.start,
+        script=session.events,
+        digests=tuple(int(digest) for digest in session.digests),
+    )
+
+
+def replay_session(
+    path: Path,
+    *,
+    policy: str | Policy = "",
+    robot: Robot | None = None,
+    strict: bool = False,
+    tolerance: float = TOLERANCE,
+    horizon: float = HORIZON,
+    force: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> ReplayResult:
+    """Run a session from its file and its policy alone, comparing every step.
+
+    With the machine and the versions that recorded it, every digest must be the same. Elsewhere sums may be
+    rounded otherwise, and a robot that touches the ground amplifies that until nothing agrees any more:
+    there, the attributes have to agree for the first seconds.
+
+    Args:
+        path: the session.
+        policy: the policy or its weights file, where the one that the map names is elsewhere now.
+        robot: the robot, where its name is not known.
+        strict: every digest must be the same, wherever this runs.
+        tolerance: elsewhere, in standard deviations of each attribute over the session.
+        horizon: elsewhere, the simulated time for which they have to agree, s.
+        force: run although the policy is not the session's.
+        progress: called with steps done and steps in all.
+
+    Raises:
+        PdtuiError: the session cannot be read, its policy cannot be had, or an event does not fit although
+            nothing had differed before it.
+    """
+    session = read_session(path)
+    given = policy if isinstance(policy, Policy) else None
+    config = config_of(session, str(path), policy if isinstance(policy, str) else "given")
+    loop = build_loop(replace(config, force=force), robot, given)
+    if loop.robot.attributes != session.info.attributes:
+        raise SessionError(f"{path}: the robot measures other attributes now; nothing can be compared")
+    first, changes, stopped = _run(session, loop, progress)
+    here = environment_versions()
+    elsewhere = bool(numeric_version_differences(session.versions, here)) and not strict
+    spread = attribute_spread(session.attributes)
+    wrong = np.flatnonzero((changes > tolerance * spread).any(axis=1))
+    agreed = (first or 0) + (int(wrong[0]) if wrong.size else len(changes))
+    found = summarise_deviations(changes, session.info.attributes, first, spread) if first is not None else ()
+    return ReplayResult(
+        steps=session.steps if first is None else first + len(changes),
+        first_difference=first,
+        change=found[0].first if found else 0.0,
+        detail=_detail(found),
+        environment=tuple(version_differences(session.versions, here)),
+        total=session.steps,
+        dt=session.info.dt,
+        deviations=found,
+        agreed=session.steps if first is None else agreed,
+        tolerance=tolerance if elsewhere else None,
+        judged=min(session.steps, round(horizon / session.info.dt)),
+        stopped=stopped,
+    )
+
+
+def _run(
+    session: Session, loop: ControlLoop, progress: Callable[[int, int], None] | None
+) -> tuple[int | None, Floats, str]:
+    """The first step that differs, how far attributes are off from there on, and why that ended early."""
+    events = events_by_step(session.events)
+    first: int | None = None
+    changes = []
+    stopped = ""
+    for step, digest in enumerate(session.digests.tolist()):
+        try:
+            record = loop.advance(events.get(step, ()))
+        except PdtuiError as error:
+            if first is None:
+                raise
+            # A robot that fell elsewhere than in the session no longer does what the keys ask of it.
+            stopped = f"step {step}: {error}"
+            break
+        if first is None and record.digest != digest:
+            first = step
+        if first is not None:
+            changes.append(
+                attribute_differences(record.attributes, session.attributes[step], session.info.attributes)
+            )
+        if progress is not None:
+            progress(step + 1, session.steps)
+        if record.diverged and step + 1 < session.steps:
+            if first is None:
+                raise SessionError(f"{session.path}: step {step} diverges, but {session.steps} are recorded")
+            stopped = f"step {step}: {record.ended}"
+            break
+    return first, np.array(changes).reshape(-1, len(session.info.attributes)), stopped
+
+
+def _detail(found: tuple[AttributeDeviation, ...]) -> str:
+    if not found:
+        return "the simulator's state differs, no attribute does"
+    worst = found[0]
+    if worst.first == 0.0:
+        return f"the simulator's state differs; attributes do later: {worst}"
+    return f"{worst.attribute} is off by {worst.first:.3g} {worst.unit}"

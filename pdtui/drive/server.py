@@ -1,0 +1,215 @@
+"""The simulation's own process: keys come down the pipe, snapshots go up, the newest wins."""
+
+from __future__ import annotations
+
+import signal
+import time
+from contextlib import suppress
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from pdtui.core.errors import PdtuiError, SessionError, error_in_one_line
+from pdtui.core.events import Event, events_by_step
+from pdtui.core.step_record import StepRecord
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.drive_snapshot import DriveFacts
+from pdtui.drive.headless import build_loop
+from pdtui.drive.keystrokes import key_meanings
+from pdtui.drive.pacer import Pacer
+from pdtui.drive.snapshot_builder import SnapshotBuilder
+from pdtui.sessions.writer.session_recorder import SessionRecorder
+
+_IDLE = 0.05
+PACED_ROWS_PER_WRITE = 4
+
+
+class DriveServer:
+    """One drive, paced, at the far end of a pipe.
+
+    A snapshot is sent only when the screen has asked for one, so a screen that sleeps never blocks the drive.
+    """
+
+    def __init__(self, connection: Connection, config: DriveConfig) -> None:
+        self._connection, self._order = connection, config
+        self._loop: ControlLoop = build_loop(config)
+        self._observer = SnapshotBuilder(self._loop)
+        self._recorder: SessionRecorder | None = None
+        if config.recording:
+            path, viewer = Path(config.recording), config.viewer
+            if viewer is not None and not viewer.listens:
+                self._observer.notice, viewer = viewer.absence, None
+            info = replace(self._loop.info, activations=config.activations)
+            self._recorder = SessionRecorder(path, info, rows_per_write=PACED_ROWS_PER_WRITE, viewer=viewer)
+        self._pacer = Pacer(self._loop.robot.control_dt, time.monotonic())
+        self._pressed: list[str] = []
+        self._wanted = False
+        self._closing = ""
+        self._finished = ""
+        self.failed = False
+        self._script = events_by_step(config.script or ())
+
+    def facts(self) -> None:
+        """Tell the screen what there is to see."""
+        loop = self._loop
+        self._connection.send(
+            DriveFacts(
+                title=loop.robot.title,
+                policy=loop.policy.name,
+                seed=loop.seed,
+                dt=loop.robot.control_dt,
+                attributes=loop.robot.attributes,
+                links=loop.robot.links,
+                layers=loop.policy.layers,
+                recording=self._order.recording,
+            )
+        )
+
+    def run(self) -> None:
+        """Drive until the screen closes, a signal comes, or the simulation cannot go on."""
+        try:
+            while not self._closing:
+                self._serve()
+                if self._wanted:
+                    self._send_snapshot()
+        except Exception as error:
+            if not isinstance(error, PdtuiError):
+                self._closing = error_in_one_line(error)
+            raise
+        finally:
+            self._close_recording()
+
+    def stop(self, reason: str) -> None:
+        """End the drive after the present step; safe in a signal handler."""
+        self._closing = reason
+
+    def outcome(self) -> str:
+        """How the drive ended, in one line."""
+        line = f"{self._finished or self._closing}: {self._loop.step} steps"
+        place = self._order.recording
+        return f"{line}, recorded in {place}" if place and place not in line else line
+
+    def _serve(self) -> None:
+        """Wait for the next step or a request, whichever is first."""
+        wait = None if self._finished else self._pacer.wait(time.monotonic())
+        try:
+            while self._connection.poll(_IDLE if wait is None else wait):
+                self._handle(*self._connection.recv())
+                wait = 0.0
+        except (EOFError, OSError):
+            self._closing = self._closing or "the screen went away"
+        if self._closing or self._finished:
+            return
+        due = self._pacer.wait(time.monotonic())
+        if due is not None and due <= 0.0:
+            self._advance()
+
+    def _handle(self, kind: str, value: Any) -> None:
+        match kind:
+            case "press":
+                self._pressed.append(value)
+            case "pace":
+                self._pacer.request(value, time.monotonic())
+            case "frame":
+                self._wanted = True
+            case "close":
+                self._closing = self._closing or "stopped"
+
+    def _advance(self) -> None:
+        record = self._loop.advance(self._events())
+        if self._recorder is not None:
+            self._record(self._recorder, record)
+        self._observer.see(record)
+        self._pacer.stepped(time.monotonic())
+        if record.diverged:
+            self._finished, self.failed = record.ended, True
+            self._close_recording()
+        if self._order.script is not None:
+            self._compare(record.step, record.digest)
+
+    def _record(self, recorder: SessionRecorder, record: StepRecord) -> None:
+        try:
+            recorder.write(record)
+        except SessionError as error:
+            # What is not recorded cannot be repeated: the drive ends here, and the screen says why.
+            self._finished, self.failed = str(error), True
+            with suppress(SessionError):
+                recorder.close(str(error))
+
+    def _events(self) -> list[Event]:
+        if self._order.script is not None:
+            return self._script.get(self._loop.step, [])
+        events = []
+        for meaning in key_meanings(self._pressed, self._loop):
+            if isinstance(meaning, Event):
+                events.append(meaning)
+            else:
+                self._observer.notice = meaning
+        self._pressed = []
+        return events
+
+    def _compare(self, step: int, digest: int) -> None:
+        if digest != self._order.digests[step]:
+            self._finished, self.failed = f"step {step} differs from the session", True
+        elif step + 1 == len(self._order.digests):
+            self._finished = f"identical, {step + 1} steps"
+
+    def _send_snapshot(self) -> None:
+        snapshot = self._observer.snapshot(
+            paused=self._pacer.paused,
+            speed=self._pacer.speed,
+            achieved=self._pacer.achieved,
+            recorded_bytes=0 if self._recorder is None else self._recorder.bytes,
+            finished=self._finished,
+        )
+        self._wanted = False
+        try:
+            self._connection.send(snapshot)
+        except OSError:
+            self._closing = "the screen went away"
+
+    def _close_recording(self) -> None:
+        if self._recorder is not None:
+            self._recorder.close(self._finished or self._closing or "an error ended the drive")
+
+
+def serve_drive(connection: Connection, config: DriveConfig) -> None:
+    """Entry of the process. What ends it early goes up the pipe as an exception or a line of text."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # ctrl+c is the screen's to handle
+    simulation: DriveServer | None = None
+    early: list[str] = []
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        reason = f"ended by {signal.Signals(number).name}"
+        early.append(reason)
+        if simulation is not None:
+            simulation.stop(reason)
+
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, stop)
+    try:
+        simulation = DriveServer(connection, config)
+        for reason in early:
+            simulation.stop(reason)
+        simulation.facts()
+        simulation.run()
+        outcome = simulation.outcome()
+        _send_quietly(connection, PdtuiError(outcome) if simulation.failed else outcome)
+    except PdtuiError as error:
+        _send_quietly(connection, error)
+    except ConnectionError:
+        return  # the screen went away while robot and policy were loading
+    except Exception as error:
+        # A traceback would be drawn over by the screen.
+        said = error_in_one_line(error) if simulation is None else simulation.outcome()
+        _send_quietly(connection, PdtuiError(f"the simulation failed: {said}"))
+
+
+def _send_quietly(connection: Connection, message: str | PdtuiError) -> None:
+    try:
+        connection.send(message)
+    except OSError:
+        return

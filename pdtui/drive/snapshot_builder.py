@@ -1,0 +1,96 @@
+"""Gathers records between two frames into the snapshot that the screen draws."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pdtui.core.attributes import Floats
+from pdtui.core.bodies import NO_OBSTACLES
+from pdtui.core.step_record import ActiveBehavior, StepRecord
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.drive.drive_snapshot import DriveSnapshot, StimulatedUnit
+from pdtui.sessions.episode_statistics import EpisodeStatisticsCounter
+
+_ROWS_KEPT = 4000
+
+
+class SnapshotBuilder:
+    """Collects since the last snapshot; nothing is lost when frames are skipped.
+
+    Args:
+        loop: the drive that is watched.
+    """
+
+    def __init__(self, loop: ControlLoop) -> None:
+        self._loop = loop
+        self._rows = {name: row for row, name in enumerate(loop.map.behaviors)}
+        self._history: list[np.ndarray] = []
+        self._path: list[tuple[float, float, float]] = []
+        self._restarted = False
+        self._episode = 0
+        self._involvement = 0
+        self._tallies = EpisodeStatisticsCounter(loop.info)
+        self._obstacles: Floats = NO_OBSTACLES
+        self._last: StepRecord | None = None
+        self.notice = ""
+
+    def see(self, record: StepRecord) -> None:
+        """Take in one control step."""
+        began = record.episode != self._episode or any(event.kind == "rewind" for event in record.events)
+        if began:
+            self._restarted, self._path = True, []
+            self._episode = record.episode
+        row = self._rows[record.behaviors[-1].name] if record.behaviors else -1
+        self._history.append(record.attributes)
+        if len(record.poses):
+            self._path.append((float(record.poses[0, 0]), float(record.poses[0, 1]), float(row)))
+        del self._history[:-_ROWS_KEPT], self._path[:-_ROWS_KEPT]
+        keyed = any(event.key for event in record.events)
+        self._involvement += keyed
+        self._tallies.add(record.episode, keyed=keyed, cost=record.cost, attributes=record.attributes)
+        for event in record.events:
+            if event.kind == "rewind":
+                self.notice = f"rewound to step {int(event.value)}"
+            elif event.kind == "reset":
+                self.notice = f"started over: episode {record.episode}"
+        if record.ended:
+            self.notice = record.ended
+        self._last = record
+
+    def snapshot(
+        self, *, paused: bool, speed: float, achieved: float, recorded_bytes: int, finished: str
+    ) -> DriveSnapshot:
+        """What has come since the last call, and the latest of the rest."""
+        loop, last = self._loop, self._last
+        active: tuple[ActiveBehavior, ...] = loop.latch.active
+        units: tuple[StimulatedUnit, ...] = ()
+        if last is not None and active:
+            stimulated = zip(last.stimulation.units, last.natural, last.stimulation.values, strict=True)
+            units = tuple(StimulatedUnit(*view) for view in stimulated)
+        size = len(loop.robot.attributes)
+        others = loop.robot.obstacles is not self._obstacles
+        self._obstacles = loop.robot.obstacles
+        snapshot = DriveSnapshot(
+            step=loop.step,
+            time=loop.step * loop.robot.control_dt,
+            episode=loop.episode,
+            active=active,
+            units=units,
+            activations=np.zeros(loop.policy.units, np.float32) if last is None else last.activations,
+            attributes=loop.attributes,
+            poses=loop.robot.read_poses() if last is None else last.poses,
+            history=np.array(self._history).reshape(-1, size),
+            path=np.array(self._path).reshape(-1, 3),
+            restarted=self._restarted,
+            paused=paused,
+            speed=speed,
+            achieved=achieved,
+            involvement=self._involvement,
+            recorded_bytes=recorded_bytes,
+            notice=self.notice,
+            finished=finished,
+            tally=self._tallies.of(loop.episode),
+            obstacles=self._obstacles if others else None,
+        )
+        self._history, self._path, self._restarted, self.notice = [], [], False, ""
+        return snapshot

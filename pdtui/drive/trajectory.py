@@ -1,0 +1,131 @@
+"""A drive without a screen as arrays, one row a control step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.attributes import Floats, column_of
+from pdtui.core.errors import PdtuiError, error_in_one_line
+from pdtui.core.events import Event
+from pdtui.core.step_record import StepRecord
+from pdtui.core.units import Stimulation, parse_unit
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.drive.headless import drive_keys
+from pdtui.sessions.drive_info import DriveInfo
+from pdtui.sessions.writer.session_recorder import SessionRecorder
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """S control steps of one drive.
+
+    ``drive["vx"]`` is the series of an attribute, ``drive.unit("0:12")`` that of a hidden unit, shape (S,).
+
+    Attributes:
+        info: what determined the run, besides its events.
+        attributes: in their units, after each step, shape (S, J).
+        activations: every hidden unit as the next layer saw it, shape (S, U), float32.
+        actions: shape (S, A), float32.
+        rewards, costs: shape (S,).
+        episodes: number of the episode, shape (S,).
+        digests: of the simulator's state after each step, shape (S,).
+        behaviors: names of those active in each step.
+        stimulations: units and the outputs that overwrote them, for each step.
+        events: everything that changed the run, in its order.
+        endings: why an episode ended by itself, by the step with which it did.
+    """
+
+    info: DriveInfo
+    attributes: Floats = field(repr=False)
+    activations: NDArray[np.float32] = field(repr=False)
+    actions: NDArray[np.float32] = field(repr=False)
+    rewards: Floats = field(repr=False)
+    costs: Floats = field(repr=False)
+    episodes: NDArray[np.int64] = field(repr=False)
+    digests: NDArray[np.int64] = field(repr=False)
+    behaviors: tuple[tuple[str, ...], ...] = field(repr=False)
+    stimulations: tuple[Stimulation, ...] = field(repr=False)
+    events: tuple[Event, ...] = field(repr=False)
+    endings: dict[int, str] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.digests)
+
+    def __getitem__(self, attribute: str) -> Floats:
+        return self.attributes[:, column_of(attribute, self.info.attributes, self.info.robot)]
+
+    def __repr__(self) -> str:
+        seconds = len(self) * self.info.dt
+        return (
+            f"<Drive of {self.info.robot} by {self.info.policy}: {len(self)} steps ({seconds:g} s), "
+            f"{len(self.events)} events, {len(self.endings)} falls>"
+        )
+
+    def unit(self, address: str) -> NDArray[np.float32]:
+        """Activations of one unit, shape (S,).
+
+        Raises:
+            PolicyError: no such unit.
+        """
+        return self.activations[:, parse_unit(address, self.info.layers)]
+
+
+def drive_trajectory(
+    loop: ControlLoop,
+    keys: Mapping[int, str | Sequence[str]],
+    steps: int,
+    recorder: SessionRecorder | None = None,
+) -> Trajectory:
+    """Drive from keystrokes, as fast as it goes.
+
+    Args:
+        loop: the drive, before its first step.
+        keys: one key, or several, by the control step before which they are pressed.
+        steps: control steps.
+        recorder: takes every step; it is closed at the end, however that comes.
+
+    Raises:
+        EventError: a key means nothing in the state it meets.
+        SimulationDiverged: the simulation cannot go on; the recording is whole all the same.
+    """
+    presses = {step: [pressed] if isinstance(pressed, str) else pressed for step, pressed in keys.items()}
+    records: list[StepRecord] = []
+    outcome = "stopped"
+    try:
+        for record in drive_keys(loop, presses, steps):
+            records.append(record)
+            if recorder is not None:
+                recorder.write(record)
+        outcome = "finished"
+    except Exception as error:
+        outcome = str(error) if isinstance(error, PdtuiError) else error_in_one_line(error)
+        raise
+    finally:
+        if recorder is not None:
+            recorder.close(outcome)
+    return _arrays(loop, records)
+
+
+def _arrays(loop: ControlLoop, records: Sequence[StepRecord]) -> Trajectory:
+    def stack(values: list[Any], kind: Any, *width: int) -> NDArray[Any]:
+        return np.array(values, kind).reshape(len(records), *width)
+
+    return Trajectory(
+        info=loop.info,
+        attributes=stack([record.attributes for record in records], np.float64, len(loop.robot.attributes)),
+        activations=stack([record.activations for record in records], np.float32, loop.policy.units),
+        actions=np.array([record.action for record in records], np.float32),
+        rewards=stack([record.reward for record in records], np.float64),
+        costs=stack([record.cost for record in records], np.float64),
+        episodes=stack([record.episode for record in records], np.int64),
+        digests=stack([record.digest for record in records], np.int64),
+        behaviors=tuple(tuple(one.name for one in record.behaviors) for record in records),
+        stimulations=tuple(record.stimulation for record in records),
+        events=tuple(event for record in records for event in record.events),
+        endings={record.step: record.ended for record in records if record.ended},
+    )

@@ -1,0 +1,202 @@
+"""`pdtui evaluate`: what every behavior of a map does, against the default, on seeds it was not chosen on.
+
+Each seed is driven twice from the same reset: once untouched, once with the behavior latched from
+`STIMULATED_FROM` on. Figures are means over the last `WINDOW` control steps; an effect is the paired
+difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from pdtui.core.attributes import Floats
+from pdtui.core.events import Event
+from pdtui.core.intervals import confidence_interval
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless import build_loop
+from pdtui.drive.loop_cache import cached_loop, drive_worker_pool
+from pdtui.evaluation.task_evaluation import TaskEvaluation, TaskRun, run_task, summarise_task
+from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
+
+STEPS = 400
+STIMULATED_FROM = 100
+WINDOW = 200
+
+
+@dataclass(frozen=True)
+class BehaviorEvaluation:
+    """One behavior over all seeds.
+
+    Attributes:
+        behavior: its name.
+        measure: attribute, its unit and what is wanted of it.
+        effect: mean over seeds of the paired difference to the default, in the attribute's unit.
+        low, high: 95 % interval of `effect` (Student's t over seeds).
+        value: mean of the attribute with the behavior.
+        default: mean of the attribute without it.
+        right_sign: seeds on which the robot stayed up and moved as wanted: the difference has the wanted
+            sign and, unless the aim is ``raise`` or ``lower``, so has the attribute itself; for ``stop``, it
+            is under a fifth of the default's.
+        falls: seeds on which the robot fell with the behavior.
+        default_falls: seeds on which it fell without.
+    """
+
+    behavior: str
+    measure: str
+    effect: float
+    low: float
+    high: float
+    value: float
+    default: float
+    right_sign: int
+    falls: int
+    default_falls: int
+
+
+@dataclass(frozen=True)
+class MapEvaluation:
+    """All behaviors of a map."""
+
+    robot: str
+    policy: str
+    seeds: tuple[int, ...]
+    behaviors: tuple[BehaviorEvaluation, ...]
+    tasks: tuple[TaskEvaluation, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """The form that ``--json`` prints."""
+        return {
+            "robot": self.robot,
+            "policy": self.policy,
+            "seeds": list(self.seeds),
+            "behaviors": [asdict(result) for result in self.behaviors],
+            "tasks": [asdict(result) for result in self.tasks],
+        }
+
+    def measured(self) -> dict[str, MeasuredEffect]:
+        """Effects by behavior, as maps hold them."""
+        return {
+            one.behavior: MeasuredEffect(one.effect, one.low, one.high, one.falls, len(self.seeds))
+            for one in self.behaviors
+        }
+
+
+@dataclass(frozen=True)
+class _Run:
+    mean: Floats
+    fell: bool
+
+
+def evaluate_map(
+    config: DriveConfig,
+    seeds: Sequence[int],
+    *,
+    workers: int = 2,
+    progress: Callable[[int, int], None] | None = None,
+) -> MapEvaluation:
+    """Measure every behavior of the order's map that has an aim or a task.
+
+    Args:
+        config: robot, map and policy; its seed is not used.
+        seeds: of the resets.
+        workers: processes.
+        progress: called with runs done and runs in all.
+
+    Raises:
+        PdtuiError: robot, policy or map cannot be had.
+    """
+    known = config.stimulation_map.behaviors.values()
+    tasked = [b for b in known if b.task]
+    behaviors = [b for b in known if b.aim is not None and b.pid is None]
+    loop = build_loop(config)
+    names = ["", *(b.name for b in behaviors)] if behaviors else []
+    jobs: list[_Job] = [(config, name, seed, "aim") for name in names for seed in seeds]
+    jobs += [(config, b.name, seed, kind) for b in tasked for kind in ("task", "untouched") for seed in seeds]
+    runs: dict[tuple[str, int, str], Any] = {}
+    with drive_worker_pool(workers) as pool:
+        results: Iterable[_Run | TaskRun] = pool.imap(_run_job, jobs)
+        for done, ((_, name, seed, kind), run) in enumerate(zip(jobs, results, strict=True), start=1):
+            runs[name, seed, kind] = run
+            if progress is not None:
+                progress(done, len(jobs))
+    return MapEvaluation(
+        config.robot,
+        loop.policy.name,
+        tuple(seeds),
+        tuple(_summarise(loop, behavior, runs, seeds) for behavior in behaviors),
+        tuple(
+            summarise_task(
+                behavior,
+                config.robot,
+                [runs[behavior.name, seed, "task"] for seed in seeds],
+                [runs[behavior.name, seed, "untouched"] for seed in seeds],
+            )
+            for behavior in tasked
+        ),
+    )
+
+
+_Job = tuple[DriveConfig, str, int, str]
+"""A drive, a behavior's name, a seed, and what to run: ``aim``, ``task`` or ``untouched``."""
+
+
+def _run_job(job: _Job) -> _Run | TaskRun:
+    config, name, seed, kind = job
+    loop = cached_loop(config)
+    if kind == "aim":
+        return run_behavior(loop, name, seed)
+    return run_task(loop, loop.map.behaviors[name], seed, untouched=kind == "untouched")
+
+
+def run_behavior(built: ControlLoop, name: str, seed: int) -> _Run:
+    """One episode; an empty name drives the default. A fallen robot's figures end where it fell."""
+    loop = ControlLoop(built.robot, built.policy, built.map, seed)
+    rows: list[Floats] = []
+    for step in range(STEPS):
+        events = [Event(step, "behavior", name)] if name and step == STIMULATED_FROM else []
+        record = loop.advance(events)
+        rows.append(record.attributes)
+        if record.ended:
+            break
+    fell = len(rows) < STEPS
+    window = rows[-WINDOW:] if not fell else rows[min(STIMULATED_FROM, len(rows) - 1) :]
+    return _Run(np.mean(window, axis=0), fell)
+
+
+def _summarise(
+    loop: ControlLoop, behavior: Behavior, runs: dict[tuple[str, int, str], Any], seeds: Sequence[int]
+) -> BehaviorEvaluation:
+    assert behavior.aim is not None
+    column = loop.robot.attribute_index(behavior.aim.attribute)
+    with_it = np.array([runs[behavior.name, seed, "aim"].mean[column] for seed in seeds])
+    default = np.array([runs["", seed, "aim"].mean[column] for seed in seeds])
+    fell = np.array([runs[behavior.name, seed, "aim"].fell for seed in seeds])
+    effect = with_it - default
+    sign = behavior.aim.sign
+    if behavior.aim.direction == "stop":
+        right = np.abs(with_it) < 0.2 * np.abs(default)
+        wanted = "near 0"
+    elif behavior.aim.direction in ("raise", "lower"):
+        right = effect * sign > 0
+        wanted = "more" if sign > 0 else "less"
+    else:
+        right = (with_it * sign > 0) & (effect * sign > 0)
+        wanted = "> 0" if sign > 0 else "< 0"
+    low, high = confidence_interval(effect)
+    return BehaviorEvaluation(
+        behavior.name,
+        f"{behavior.aim.attribute} ({loop.robot.attributes[column].unit}), wanted {wanted}",
+        float(effect.mean()),
+        low,
+        high,
+        float(with_it.mean()),
+        float(default.mean()),
+        int((right & ~fell).sum()),
+        int(fell.sum()),
+        int(sum(runs["", seed, "aim"].fell for seed in seeds)),
+    )

@@ -1,0 +1,96 @@
+"""What behaviors accomplish: each seed is driven with the behavior and without, and both are judged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.core.attributes import Floats, unwrap_angles
+from pdtui.core.events import Event
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.robots.tasks.task import RunTrace, Task, TaskVerdict, mean_figures
+from pdtui.robots.tasks.task_lookup import find_task
+from pdtui.search.task_run import walk_steps
+from pdtui.stimulation.stimulation_map import Behavior
+
+
+@dataclass(frozen=True)
+class TaskEvaluation:
+    """One behavior over all seeds.
+
+    Attributes:
+        behavior: its name.
+        task: what it is for.
+        wanted: what counts as done.
+        done: seeds on which it was done with the behavior,
+        by_itself: and without.
+        falls: seeds on which the robot fell with the behavior.
+        figures: means over seeds of what was measured, with the behavior.
+        figures_by_itself: the same, without.
+    """
+
+    behavior: str
+    task: str
+    wanted: str
+    done: int
+    by_itself: int
+    falls: int
+    figures: dict[str, float]
+    figures_by_itself: dict[str, float]
+
+
+@dataclass(frozen=True)
+class TaskRun:
+    """One run, judged."""
+
+    verdict: TaskVerdict
+    fell: bool
+
+
+def run_task(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bool) -> TaskRun:
+    """One run of a behavior's task through the control loop, as a drive would do it.
+
+    Raises:
+        MapError: the robot has no such task.
+    """
+    task = find_task(behavior.task, built.robot.name)
+    loop = ControlLoop(built.robot, built.policy, built.map, seed, start=task.start)
+    walk = walk_steps(task, seed)
+    rows: list[Floats] = [loop.attributes]
+    fell = False
+    for step in range(walk + task.steps):
+        pressed = step == walk and not untouched
+        record = loop.advance([Event(step, "behavior", behavior.name)] if pressed else [])
+        rows.append(record.attributes)
+        fell = bool(record.ended)
+        if fell:
+            break
+    if len(rows) <= walk + 1:
+        return TaskRun(TaskVerdict(False, 0.0, {}), True)
+    return TaskRun(_judge(task, loop, np.array(rows), walk, fell), fell)
+
+
+def _judge(task: Task, loop: ControlLoop, rows: Floats, walk: int, fell: bool) -> TaskVerdict:
+    attributes = loop.robot.attributes
+    return task.judge(
+        RunTrace(attributes, rows[: walk + 1], unwrap_angles(rows[walk + 1 :], attributes), fell)
+    )
+
+
+def summarise_task(
+    behavior: Behavior, robot: str, runs: Sequence[TaskRun], untouched: Sequence[TaskRun]
+) -> TaskEvaluation:
+    """The figures of one behavior."""
+    task = find_task(behavior.task, robot)
+    return TaskEvaluation(
+        behavior.name,
+        task.name,
+        task.wanted,
+        sum(run.verdict.success for run in runs),
+        sum(run.verdict.success for run in untouched),
+        sum(run.fell for run in runs),
+        mean_figures(run.verdict for run in runs),
+        mean_figures(run.verdict for run in untouched),
+    )

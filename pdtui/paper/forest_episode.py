@@ -1,0 +1,220 @@
+"""One episode in the forest, and what counts of it, whoever drove: nobody, a program, or a person."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pdtui.core.errors import SessionError
+from pdtui.core.events import Event
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.drive.headless import key_events
+from pdtui.drive.keystrokes import write_keystrokes
+from pdtui.paper.key_dynamics import KeyDynamics, ObservedDrive
+from pdtui.paper.scripted_operator import DEFAULT, ScriptedOperator, operator_keys
+from pdtui.robots.legged.terrain import AHEAD
+from pdtui.sessions.schema import ActivationsKept
+from pdtui.sessions.session_reader import read_session
+from pdtui.sessions.writer.session_recorder import SessionRecorder
+
+FOREST, ROUGH = "forest", "rough"
+_UNTOUCHED = 60
+_HELD = (30, 110)
+
+
+@dataclass(frozen=True)
+class ForestEpisode:
+    """How one episode went.
+
+    Attributes:
+        seed: of the forest.
+        reward: the episode's return.
+        distance: along x, m.
+        collisions: trees that the robot ran into.
+        fell: whether it ended with a fall.
+        crossed: whether it ended at the forest's far end.
+        steps: control steps.
+        presses: keys pressed.
+        pressed_steps: control steps before which one was pressed.
+    """
+
+    seed: int
+    reward: float
+    distance: float
+    collisions: float
+    fell: bool
+    crossed: bool
+    steps: int
+    presses: int
+    pressed_steps: int
+
+
+def drive_forest_episode(
+    loop: ControlLoop,
+    steps: int,
+    operator: ScriptedOperator | None = None,
+    recorder: SessionRecorder | None = None,
+) -> tuple[ForestEpisode, tuple[Event, ...]]:
+    """Drive one episode: up to a fall, the forest's far end, or so many steps.
+
+    Args:
+        loop: before its first step, in the forest.
+        steps: at most.
+        operator: presses the keys; None leaves the policy alone.
+        recorder: takes every step; the caller closes it.
+
+    Returns:
+        What counts, and all events.
+    """
+    column = loop.robot.attribute_index("distance")
+    yaw = loop.robot.attribute_index("yaw")
+    keys = operator_keys(loop.map) if operator is not None else {}
+    place = loop.robot.read_poses()[0]
+    rewards, costs, distances, events, fell = [], [], [], [], False
+    for _ in range(steps):
+        pressed: list[Event] = []
+        if operator is not None:
+            name = operator.look(float(place[0]), float(place[1]), float(loop.attributes[yaw]))
+            pressed = key_events([keys[name]] if name else [], loop)
+        record = loop.advance(pressed)
+        if recorder is not None:
+            recorder.write(record)
+        place = record.poses[0]
+        rewards.append(record.reward)
+        costs.append(record.cost)
+        distances.append(float(record.attributes[column]))
+        events += pressed
+        fell = bool(record.ended)
+        if fell or distances[-1] >= AHEAD:
+            break
+    return _sum_up(loop.seed, rewards, costs, distances, events, fell), tuple(events)
+
+
+def record_forest_episode(
+    loop: ControlLoop, steps: int, operator: ScriptedOperator, path: Path, activations: ActivationsKept
+) -> ForestEpisode:
+    """As `drive_forest_episode`, saved as a person's drive is: a session, and beside it a keystroke file.
+
+    Raises:
+        SessionError: the session exists already, or cannot be written.
+    """
+    if path.exists():
+        raise SessionError(f"{path}: exists already; a drive is recorded into a new file")
+    with SessionRecorder(path, replace(loop.info, activations=activations)) as recorder:
+        run, events = drive_forest_episode(loop, steps, operator, recorder)
+    keys = path.with_suffix(".keys")
+    try:
+        keys.write_text(write_keystrokes(events))
+    except OSError as error:
+        raise SessionError(f"{keys}: cannot be written: {error.strerror}") from error
+    return run
+
+
+def read_forest_episode(path: Path, robot: str, steps: int) -> tuple[ForestEpisode, str]:
+    """What counts of a recorded drive: its first episode, which its seed determines, up to the same end.
+
+    Args:
+        path: the session.
+        robot: that it has to be of.
+        steps: at most.
+
+    Returns:
+        What counts, and the policy's name.
+
+    Raises:
+        SessionError: it cannot be read, is of another robot or not of a forest, or goes back in time.
+    """
+    session = read_session(path)
+    info = session.info
+    if (info.robot, info.start) != (robot, FOREST):
+        where = f"start '{info.start}'" if info.start else "the usual start"
+        raise SessionError(
+            f"{path}: expected a drive of {robot} with start '{FOREST}', "
+            f"found one of {info.robot} with {where}"
+        )
+    back = next((event.step for event in session.events if event.kind == "rewind"), None)
+    if back is not None:
+        raise SessionError(f"{path}: step {back} goes back in time; a drive that counts only goes on")
+    if not session.steps:
+        raise SessionError(f"{path}: it has no steps")
+    names = [attribute.name for attribute in info.attributes]
+    if "distance" not in names:
+        raise SessionError(f"{path}: expected the attribute 'distance', there are {', '.join(names)}")
+    distances = session.attributes[:, names.index("distance")]
+    ends = [*np.flatnonzero(session.episodes != 0), *(np.flatnonzero(distances >= AHEAD) + 1), steps]
+    count = int(min([session.steps, *ends]))
+    run = _sum_up(
+        info.seed,
+        session.rewards[:count].tolist(),
+        session.costs[:count].tolist(),
+        distances[:count].tolist(),
+        [event for event in session.events if event.step < count],
+        count - 1 in session.endings,
+    )
+    return run, info.policy
+
+
+def _sum_up(
+    seed: int,
+    rewards: Sequence[float],
+    costs: Sequence[float],
+    distances: Sequence[float],
+    events: Sequence[Event],
+    fell: bool,
+) -> ForestEpisode:
+    pressed = [event.step for event in events if event.key]
+    return ForestEpisode(
+        seed,
+        float(np.sum(rewards)),
+        distances[-1],
+        float(np.sum(costs)),
+        fell,
+        not fell and distances[-1] >= AHEAD,
+        len(rewards),
+        len(pressed),
+        len(set(pressed)),
+    )
+
+
+def try_keys(loop: ControlLoop, steps: int) -> ObservedDrive:
+    """Press the operator's keys in random order, each held for half a second to two, to see what they do.
+
+    Args:
+        loop: before its first step; its seed decides on the keys, too.
+        steps: at most.
+    """
+    keys = list(operator_keys(loop.map).values())
+    rng = np.random.default_rng(loop.seed)
+    yaw = loop.robot.attribute_index("yaw")
+
+    def where() -> list[float]:
+        return [*loop.robot.read_poses()[0, :2].tolist(), float(loop.attributes[yaw])]
+
+    places, choices, latched, until = [where()], [], 0, _UNTOUCHED
+    order: list[int] = []
+    for step in range(steps):
+        pressed = step == until
+        if pressed:
+            order = order or [int(one) for one in rng.permutation(len(keys)) if one != latched]
+            latched = order.pop(0)
+            until = step + int(rng.integers(*_HELD))
+        ended = loop.advance(key_events([keys[latched]] if pressed else [], loop)).ended
+        places.append(where())
+        choices.append(latched)
+        if ended:
+            return ObservedDrive(np.array(places), np.array(choices), True)
+    return ObservedDrive(np.array(places), np.array(choices), False)
+
+
+def operator_for(loop: ControlLoop, responses: dict[str, KeyDynamics]) -> ScriptedOperator:
+    """The operator of one drive: it sees this forest."""
+    dt = loop.robot.control_dt
+    periods = {
+        name: max(1, round(loop.map.behaviors[name].period / dt))  # type: ignore[operator]
+        for name in responses
+        if name != DEFAULT and loop.map.behaviors[name].period is not None
+    }
+    return ScriptedOperator(responses, loop.robot.obstacles, dt, periods)

@@ -1,0 +1,108 @@
+"""What the forest experiment found: figures of each condition, over repeats."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from pdtui.paper.forest_episode import ForestEpisode
+from pdtui.paper.key_dynamics import KeyDynamics
+
+
+@dataclass(frozen=True)
+class RepeatSpread:
+    """Mean over repeats, and their standard deviation (n − 1); NaN for a single repeat."""
+
+    mean: float
+    std: float
+
+
+@dataclass(frozen=True)
+class ForestConditionResult:
+    """One condition over all repeats; figures are per episode.
+
+    Attributes:
+        condition: in words.
+        policy: name of the weights.
+        reward: return.
+        distance: along x, m.
+        collisions: trees that the robot ran into.
+        presses: keys pressed.
+        involvement: control steps before which a key was pressed.
+        falls: episodes that ended with a fall, of `episodes`.
+        crossed: episodes that reached the forest's far end.
+        episodes: in all.
+        runs: every episode.
+    """
+
+    condition: str
+    policy: str
+    reward: RepeatSpread
+    distance: RepeatSpread
+    collisions: RepeatSpread
+    presses: RepeatSpread
+    involvement: RepeatSpread
+    falls: int
+    crossed: int
+    episodes: int
+    runs: tuple[ForestEpisode, ...]
+
+
+@dataclass(frozen=True)
+class ForestResult:
+    """All conditions that were measured.
+
+    Attributes:
+        robot: that was driven.
+        seeds: of the forests; empty where only sessions were scored.
+        repeats: into which the seeds are divided in their order.
+        steps: control steps an episode lasts at most.
+        seconds: the same in simulated time.
+        conditions: in the order in which they are printed.
+        left_out: conditions that were not measured, and why.
+        keys: what the operator found out about its keys; empty without it.
+        key_seeds: on which.
+        sessions: files that were scored.
+    """
+
+    robot: str
+    seeds: tuple[int, ...]
+    repeats: int
+    steps: int
+    seconds: float
+    conditions: tuple[ForestConditionResult, ...]
+    left_out: dict[str, str]
+    keys: dict[str, KeyDynamics]
+    key_seeds: tuple[int, ...]
+    sessions: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The form that ``--json`` prints."""
+        return asdict(self)
+
+
+def summarise_condition(
+    condition: str, policy: str, runs: Sequence[ForestEpisode], repeats: int
+) -> ForestConditionResult:
+    """The figures of one condition; consecutive runs make a repeat."""
+
+    def spread(name: str) -> RepeatSpread:
+        values = np.array([float(getattr(run, name)) for run in runs]).reshape(repeats, -1).mean(axis=1)
+        return RepeatSpread(float(values.mean()), float(values.std(ddof=1)) if repeats > 1 else float("nan"))
+
+    return ForestConditionResult(
+        condition,
+        policy,
+        spread("reward"),
+        spread("distance"),
+        spread("collisions"),
+        spread("presses"),
+        spread("pressed_steps"),
+        sum(run.fell for run in runs),
+        sum(run.crossed for run in runs),
+        len(runs),
+        tuple(runs),
+    )

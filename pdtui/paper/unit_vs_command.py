@@ -1,0 +1,212 @@
+"""`pdtui evaluate --experiment tracking`: does a stimulated unit steer as precisely as a trained command?
+
+The paper's control-precision experiment (section 4): the same headings are held by a PID on a command that
+the policy was trained to follow, and by a PID on the output of a hidden unit with that command at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+from scipy import stats
+
+from pdtui.core.attributes import Floats
+from pdtui.core.errors import MapError
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.search.target_drives import STEPS_EACH, TargetDrive, TargetDriver, TargetDriveResult
+from pdtui.search.tracking_figures import HEADINGS, TargetTracking, seed_errors, summarise_tracking
+from pdtui.stimulation.stimulation_map import Behavior
+
+ATTRIBUTE = "yaw"
+ControlMeans = Literal["command", "units", "both"]
+
+
+@dataclass(frozen=True)
+class ErrorRatio:
+    """Mean |error| with units over that with the command.
+
+    Attributes:
+        value: ratio of the means over seeds.
+        low, high: 95 % interval, bootstrapped over seeds in pairs.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class HeadingController:
+    """One behavior that holds the heading.
+
+    Attributes:
+        map: where it is from.
+        robot, policy: names.
+        by: what its controller's output goes to.
+        driven: the commands and units that it goes to.
+        asked: what the policy is asked for besides.
+        tracking: its figures.
+        ratio: to the map's behavior by command; None for that one, and where there is none.
+        values: headings by seed and step, shape (seeds, targets × 100), rad; NaN after a fall.
+    """
+
+    map: str
+    robot: str
+    policy: str
+    by: ControlMeans
+    driven: tuple[str, ...]
+    asked: dict[str, float]
+    tracking: TargetTracking
+    ratio: ErrorRatio | None
+    values: Floats
+
+
+@dataclass(frozen=True)
+class UnitCommandComparison:
+    """The experiment.
+
+    Attributes:
+        seeds: of the drives, the same for all.
+        targets: rad, in the order in which they were set.
+        dt: s per control step.
+        rows: by map, then in the order of its behaviors.
+    """
+
+    seeds: tuple[int, ...]
+    targets: tuple[float, ...]
+    dt: float
+    rows: tuple[HeadingController, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The form that ``--json`` prints."""
+        rows = [
+            {
+                "map": row.map,
+                "robot": row.robot,
+                "policy": row.policy,
+                "by": row.by,
+                "driven": list(row.driven),
+                "commands": row.asked,
+                **{name: value for name, value in asdict(row.tracking).items() if name != "default_error"},
+                "ratio": None if row.ratio is None else asdict(row.ratio),
+            }
+            for row in self.rows
+        ]
+        return {
+            "experiment": "tracking",
+            "seeds": list(self.seeds),
+            "targets": list(self.targets),
+            "steps_each": STEPS_EACH,
+            "rows": rows,
+        }
+
+
+def control_means(behavior: Behavior) -> ControlMeans:
+    """What a behavior's controller moves."""
+    if behavior.commands and behavior.magnitudes:
+        return "both"
+    return "command" if behavior.commands else "units"
+
+
+def compare_unit_with_command(
+    configs: Sequence[DriveConfig],
+    seeds: Sequence[int],
+    *,
+    targets: Sequence[float] = HEADINGS,
+    workers: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> UnitCommandComparison:
+    """Hold headings with every behavior of mode ``pid`` on the yaw angle that the maps have.
+
+    Args:
+        configs: robots, maps and policies; their seeds are not used.
+        seeds: of the resets.
+        targets: headings, rad, 100 control steps each.
+        workers: processes.
+        progress: called with drives done and drives in all.
+
+    Raises:
+        MapError: a map has no such behavior, or maps are of robots with other control steps.
+        PdtuiError: robot, policy or map cannot be had.
+    """
+    found = [(config, _holding(config)) for config in configs]
+    total, before = len(seeds) * sum(len(behaviors) for _, behaviors in found), 0
+    rows: list[HeadingController] = []
+    steps: dict[str, float] = {}
+    for config, behaviors in found:
+
+        def tell(done: int, before: int = before) -> None:
+            if progress is not None:
+                progress(before + done, total)
+
+        with TargetDriver(config, workers) as followers:
+            steps[config.stimulation_map.source] = followers.loop.robot.control_dt
+            drives = [
+                TargetDrive(ATTRIBUTE, one.name, seed, tuple(targets)) for one in behaviors for seed in seeds
+            ]
+            rows += _rows(followers, behaviors, followers.run(drives, tell), len(seeds))
+        before += len(seeds) * len(behaviors)
+    if len(set(steps.values())) > 1:
+        told = ", ".join(f"{source} has {dt:g} s" for source, dt in steps.items())
+        raise MapError(f"expected maps of robots with one control step, found: {told}")
+    return UnitCommandComparison(tuple(seeds), tuple(targets), next(iter(steps.values())), tuple(rows))
+
+
+def _holding(config: DriveConfig) -> list[Behavior]:
+    wanted = config.stimulation_map
+    found = [b for b in wanted.behaviors.values() if b.pid is not None and b.pid.attribute == ATTRIBUTE]
+    if not found:
+        held = ", ".join(b.pid.attribute for b in wanted.behaviors.values() if b.pid is not None) or "none"
+        raise MapError(
+            f"{wanted.source}: no behavior of mode pid holds '{ATTRIBUTE}', which the experiment is about; "
+            f"held are: {held}"
+        )
+    return found
+
+
+def _rows(
+    followers: TargetDriver, behaviors: Sequence[Behavior], followed: Sequence[TargetDriveResult], count: int
+) -> list[HeadingController]:
+    loop = followers.loop
+    parts = [list(followed[number * count :][:count]) for number in range(len(behaviors))]
+    by_command = next(
+        (p for b, p in zip(behaviors, parts, strict=True) if control_means(b) == "command"), None
+    )
+    return [
+        HeadingController(
+            loop.map.source,
+            loop.robot.name,
+            loop.policy.name,
+            control_means(behavior),
+            (*behavior.commands, *loop.map.units_of(behavior)),
+            {name: value for name, value in loop.robot.commands.items() if name not in behavior.commands},
+            summarise_tracking(part, followers.attribute(ATTRIBUTE).unit),
+            None if by_command is None or part is by_command else paired_ratio(part, by_command),
+            np.array([one.values.ravel() for one in part]),
+        )
+        for behavior, part in zip(behaviors, parts, strict=True)
+    ]
+
+
+def paired_ratio(units: Sequence[TargetDriveResult], command: Sequence[TargetDriveResult]) -> ErrorRatio:
+    """Ratio of mean |errors| over the same seeds, of which both drives came to the first target."""
+    above, below = seed_errors(units), seed_errors(command)
+    both = np.isfinite(above) & np.isfinite(below)
+    above, below = above[both], below[both]
+    if not len(above):
+        return ErrorRatio(float("nan"), 0.0, float("inf"))
+    value = float(above.mean() / below.mean())
+    if len(above) < 2:
+        return ErrorRatio(value, 0.0, float("inf"))
+    drawn = stats.bootstrap(
+        (above, below),
+        lambda a, b, axis: a.mean(axis=axis) / b.mean(axis=axis),
+        paired=True,
+        vectorized=True,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    ).confidence_interval
+    return ErrorRatio(value, float(drawn.low), float(drawn.high))

@@ -1,0 +1,201 @@
+"""Headings over time: what holds them, and how far off it is; as a PNG and as a recording for the viewer."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from rich.table import Table
+
+from pdtui.core.angles import wrap_angles
+from pdtui.core.attributes import Floats
+from pdtui.core.errors import PictureError
+from pdtui.pictures.markdown_report import table_to_markdown
+from pdtui.pictures.matplotlib_page import check_matplotlib, figure_page
+from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, to_hex
+from pdtui.pictures.report_file import open_report_file
+
+APP, TIME = "pdtui-tracking", "time"
+PROPERTY = "tracking"
+_BAND = (5.0, 95.0)
+_HEADINGS, _ERRORS, _FIGURES = "/headings", "/errors", "/figures"
+
+
+@dataclass(frozen=True)
+class TrackedHeading:
+    """What holds the heading.
+
+    Attributes:
+        name: of the behavior, and of its policy where several are compared.
+        note: its figures, for the legend.
+        values: headings by seed and control step, shape (seeds, T), rad; NaN after a fall.
+    """
+
+    name: str
+    note: str
+    values: Floats
+
+
+@dataclass(frozen=True)
+class HeadingFigure:
+    """What the pictures show.
+
+    Attributes:
+        title: above everything.
+        target: at each control step, rad, shape (T,).
+        dt: s per control step.
+        held: what is compared.
+        figures: the table that is printed.
+        summary: what ``--json`` prints.
+    """
+
+    title: str
+    target: Floats
+    dt: float
+    held: tuple[TrackedHeading, ...]
+    figures: Table
+    summary: Mapping[str, Any]
+
+    @property
+    def seeds(self) -> int:
+        """How many drives each one has."""
+        return len(self.held[0].values)
+
+
+@dataclass(frozen=True)
+class HeadingCurve:
+    """One behavior over time.
+
+    Attributes:
+        held: it.
+        color: of it everywhere.
+        mean, low, high: of the heading over the seeds that are still up, and the middle 90 % of them, rad;
+            shape (T,), NaN where none is.
+        error: mean |error|, the same.
+    """
+
+    held: TrackedHeading
+    color: RgbColor
+    mean: Floats
+    low: Floats
+    high: Floats
+    error: Floats
+
+
+def heading_curves(shown: HeadingFigure) -> list[HeadingCurve]:
+    """What both pictures draw."""
+    curves = []
+    for number, held in enumerate(shown.held):
+        errors = np.abs(wrap_angles(shown.target - held.values))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # of steps that no seed reached
+            low, high = np.nanpercentile(held.values, _BAND, axis=0)
+            mean, error = np.nanmean(held.values, axis=0), np.nanmean(errors, axis=0)
+        curves.append(HeadingCurve(held, CYCLE[number % len(CYCLE)], mean, low, high, error))
+    return curves
+
+
+def check_heading_pictures(paths: Sequence[Path], overwrite: bool) -> None:
+    """Find out before minutes of work whether the pictures can be written.
+
+    Raises:
+        PictureError: another kind of file, one that exists already, or matplotlib is missing.
+    """
+    for path in paths:
+        if path.suffix not in (".png", ".rrd"):
+            raise PictureError(f"{path}: expected a name that ends in .png or .rrd")
+        if path.suffix == ".png":
+            check_matplotlib()
+        if path.exists() and not overwrite:
+            raise PictureError(f"{path}: exists already; --overwrite replaces it")
+
+
+def draw_heading_pictures(paths: Sequence[Path], shown: HeadingFigure) -> None:
+    """Write every picture, by the ending of its name.
+
+    Raises:
+        PictureError: a file cannot be written, or matplotlib is missing.
+    """
+    for path in paths:
+        if path.suffix == ".png":
+            draw_heading_figure(path, shown)
+        else:
+            write_heading_recording(path, shown)
+
+
+def draw_heading_figure(path: Path, shown: HeadingFigure) -> None:
+    """Two panels: headings on their target with the middle 90 % of seeds, and mean |error|.
+
+    Raises:
+        PictureError: matplotlib is not installed, or the file cannot be written.
+    """
+    times: Floats = np.arange(len(shown.target), dtype=np.float64) * shown.dt
+    with figure_page(path, 4.2, shown.title) as figure:
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        above.plot(times, shown.target, color="black", linewidth=0.9, linestyle="--", label="target")
+        for curve in heading_curves(shown):
+            color, held = to_hex(curve.color), curve.held
+            above.fill_between(times, curve.low, curve.high, color=color, alpha=0.2, linewidth=0.0)
+            above.plot(times, curve.mean, color=color, label=f"{held.name}: {held.note}")
+            below.plot(times, curve.error, color=color)
+        above.set_title(f"{shown.seeds} seeds: mean and middle 90 %")
+        above.set_ylabel("heading (rad)")
+        above.set_xlim(0.0, float(times[-1]))
+        below.set_ylabel("mean |error| (rad)")
+        below.set_xlabel("time (s)")
+        below.set_ylim(bottom=0.0)
+        legend = above.get_legend_handles_labels()
+        figure.legend(*legend, loc="outside lower left", ncols=min(3, len(legend[0])))
+
+
+def write_heading_recording(path: Path, shown: HeadingFigure) -> None:
+    """The same as a recording: headings, errors, and the figures as a table; ``--json`` as a property.
+
+    Raises:
+        PictureError: the file cannot be written.
+    """
+    moments = rr.TimeColumn(TIME, duration=np.arange(len(shown.target)) * shown.dt)
+    with open_report_file(path, APP, _layout(shown)) as recording:
+
+        def curve(entity: str, values: Floats, name: str, color: RgbColor, width: float) -> None:
+            style = rr.SeriesLines(names=[name], colors=[color], widths=[width])
+            rr.log(entity, style, static=True, recording=recording, strict=True)
+            columns = rr.Scalars.columns(scalars=values)
+            rr.send_columns(entity, [moments], columns, recording=recording, strict=True)
+
+        recording.send_recording_name(shown.title)
+        recording.send_property(PROPERTY, rr.AnyValues(summary=json.dumps(shown.summary)))
+        table = rr.TextDocument(table_to_markdown(shown.figures), media_type=rr.MediaType.MARKDOWN)
+        rr.log(_FIGURES, table, static=True, recording=recording, strict=True)
+        curve(f"{_HEADINGS}/target", shown.target, "target", GREY, 1.5)
+        for one in heading_curves(shown):
+            name = one.held.name
+            part = rr.escape_entity_path_part(name)
+            red, green, blue = one.color
+            faint = (red // 2, green // 2, blue // 2)
+            for end, values in (("low", one.low), ("high", one.high)):
+                curve(f"{_HEADINGS}/{part}/{end}", values, f"{name}, {end} end of 90 %", faint, 0.7)
+            curve(f"{_HEADINGS}/{part}/mean", one.mean, name, one.color, 2.0)
+            curve(f"{_ERRORS}/{part}", one.error, name, one.color, 1.5)
+
+
+def _layout(shown: HeadingFigure) -> rrb.Blueprint:
+    views = rrb.Vertical(
+        rrb.TimeSeriesView(
+            origin=_HEADINGS, name=f"Heading (rad), mean and middle 90 % of {shown.seeds} seeds"
+        ),
+        rrb.Horizontal(
+            rrb.TimeSeriesView(origin=_ERRORS, name=f"Mean |error| (rad) of {shown.seeds} seeds"),
+            rrb.TextDocumentView(origin=_FIGURES, name="Figures"),
+            column_shares=[3, 2],
+        ),
+        row_shares=[3, 2],
+    )
+    return rrb.Blueprint(views, rrb.TimePanel(timeline=TIME, state="hidden"), collapse_panels=True)

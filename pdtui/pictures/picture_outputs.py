@@ -1,0 +1,72 @@
+"""Which pictures of a dissection are asked for, and whether they can be written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pdtui.core.errors import PictureError
+from pdtui.dissection.dissection_result import Dissection
+
+
+@dataclass(frozen=True)
+class PictureOutputs:
+    """Where the pictures of one dissection go.
+
+    Attributes:
+        report: the recording.
+        figures: folder of the PNGs; None draws none.
+        overwrite: whether files that exist are replaced.
+    """
+
+    report: Path
+    figures: Path | None
+    overwrite: bool
+
+    def check(self) -> None:
+        """Find out before minutes of work whether its pictures can be written.
+
+        Raises:
+            PictureError: a file exists already or cannot be written, or matplotlib is missing.
+        """
+        if self.report.suffix != ".rrd":
+            raise PictureError(f"{self.report}: expected a name that ends in .rrd; the viewer opens no other")
+        found = [self.report] if self.report.exists() else []
+        if self.figures is not None:
+            from pdtui.pictures.dissection_figures import existing_figures
+            from pdtui.pictures.matplotlib_page import check_matplotlib
+
+            check_matplotlib()
+            found += existing_figures(self.figures)
+        if found and not self.overwrite:
+            raise PictureError(f"{found[0]}: exists already; --overwrite replaces it")
+        for folder in (self.report.parent, *([] if self.figures is None else [self.figures])):
+            _check_writable(folder)
+
+    def draw(self, dissection: Dissection) -> list[Path]:
+        """Write them.
+
+        Returns:
+            the files.
+
+        Raises:
+            PictureError: a file cannot be written.
+        """
+        from pdtui.pictures.dissection_report import write_dissection_report
+
+        write_dissection_report(self.report, dissection)
+        if self.figures is None:
+            return [self.report]
+        from pdtui.pictures.dissection_figures import draw_dissection_figures
+
+        return [self.report, *draw_dissection_figures(self.figures, dissection)]
+
+
+def _check_writable(folder: Path) -> None:
+    probe = folder / ".pdtui.part"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise PictureError(f"{folder}: cannot be written: {error.strerror}") from error

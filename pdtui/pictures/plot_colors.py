@@ -1,0 +1,42 @@
+"""Colours that people with any colour vision can tell apart (Okabe and Ito, 2008)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.attributes import Floats
+
+RgbColor = tuple[int, int, int]
+
+ORANGE: RgbColor = (230, 159, 0)
+SKY: RgbColor = (86, 180, 233)
+GREEN: RgbColor = (0, 158, 115)
+BLUE: RgbColor = (0, 114, 178)
+VERMILLION: RgbColor = (213, 94, 0)
+PURPLE: RgbColor = (204, 121, 167)
+GREY: RgbColor = (150, 150, 150)
+
+CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
+
+
+def to_hex(color: RgbColor) -> str:
+    """``#rrggbb``."""
+    return "#" + bytes(color).hex()
+
+
+def diverging(values: Floats, limit: float) -> NDArray[np.uint8]:
+    """Vermillion below zero, white at zero, blue above; full at ±limit, grey where there is no number.
+
+    Args:
+        values: any shape.
+        limit: magnitude from which the colours stay the same.
+
+    Returns:
+        red, green and blue: shape (..., 3).
+    """
+    part = np.clip(np.nan_to_num(values) / limit, -1.0, 1.0)[..., None]
+    ends = np.where(part < 0, np.array(VERMILLION), np.array(BLUE))
+    colors = np.rint(255 + np.abs(part) * (ends - 255.0)).astype(np.uint8)
+    result: NDArray[np.uint8] = np.where(np.isfinite(values)[..., None], colors, np.uint8(GREY[0]))
+    return result

@@ -1,0 +1,46 @@
+"""A recording of pictures that opens laid out in the Rerun viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.recording_stream import is_enabled
+
+from pdtui.core.errors import PictureError
+
+
+@contextmanager
+def open_report_file(path: Path, app: str, layout: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
+    """A recording that is in its file when the block ends without an error.
+
+    Args:
+        path: the file; its folder is made, an existing file is replaced once the recording is whole.
+        app: what made it; viewers keep what a user rearranges by this name.
+        layout: how it opens.
+
+    Raises:
+        PictureError: the file cannot be written.
+    """
+    partial = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        recording = rr.RecordingStream(app)
+        if not is_enabled(recording):
+            raise PictureError(f"{path}: cannot be written: the environment says RERUN=off")
+        recording.set_sinks(rr.FileSink(partial), default_blueprint=layout)
+        try:
+            yield recording
+        finally:
+            recording.disconnect()
+        partial.replace(path)
+    except OSError as error:
+        raise PictureError(f"{path}: cannot be written: {error.strerror}") from error
+    except RuntimeError as error:
+        raise PictureError(f"{path}: cannot be written: {error}") from error
+    finally:
+        with suppress(OSError):
+            partial.unlink()

@@ -1,0 +1,120 @@
+"""From what a file states, the user's choices and the world's spaces to a network that is whole."""
+
+from __future__ import annotations
+
+import torch
+
+from pdtui.core.errors import PolicyError
+from pdtui.policies.importers.partial_policy import PartialPolicy
+from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions, WorldSpaces
+from pdtui.policies.weights.policy_network import Head, NetworkSpec, PolicyNetwork
+
+
+def assemble_network(
+    found: PartialPolicy, choices: ImportOptions, spaces: WorldSpaces | None, source: str
+) -> PolicyNetwork:
+    """Complete what was found; what is still open then is asked for.
+
+    Raises:
+        PolicyError: something is open, and the message lists the choices; or the shapes do not fit the world.
+    """
+    if len(found.layers) < 2:
+        raise PolicyError(
+            f"{source}: expected a hidden layer before the head, found {len(found.layers)} layers"
+        )
+    output = _output(found, spaces)
+    outputs, observations = found.layers[-1].shape[0], found.layers[0].shape[1]
+    actions = outputs // 2 if output == "gaussian pair" else outputs
+    discrete = output == "categorical"
+    if spaces is not None:
+        spaces.check(source, observations, 1 if discrete else actions, actions if discrete else 0)
+    head, squash = _head(found, output, choices, source)
+    low, high = _bounds(found, squash, spaces, actions, source) if not discrete else ((), ())
+    spec = NetworkSpec(
+        robot="",
+        observations=observations,
+        layers=tuple(layer.shape[0] for layer in found.layers[:-1]),
+        activation=choices.activation or found.activation or _ask_activation(found, source),
+        actions=actions,
+        head=head,
+        action_low=low,
+        action_high=high,
+        command=f"imported from {found.origin}",
+        log_std="parameter" if found.log_std is not None else "output",
+        log_std_low=found.log_std_low,
+        log_std_high=found.log_std_high,
+        log_std_rule=found.log_std_rule,
+        mean_limit=found.mean_limit,
+        observation_clip=found.statistics.clip if found.statistics else 0.0,
+    )
+    network = PolicyNetwork(spec)
+    network.load_tensors(_tensors(found, network, source))
+    return network.eval()
+
+
+def _output(found: PartialPolicy, spaces: WorldSpaces | None) -> str:
+    """What the head puts out; where the file leaves it open, by the world's spaces."""
+    if found.output != "unknown pair":
+        return found.output
+    outputs = found.layers[-1].shape[0]
+    if spaces is not None and spaces.choices:
+        return "categorical"
+    if spaces is not None and outputs == 2 * spaces.actions:
+        return "gaussian pair"
+    return "action"
+
+
+def _head(found: PartialPolicy, output: str, choices: ImportOptions, source: str) -> tuple[Head, str]:
+    if output == "categorical":
+        return "categorical", "none"
+    squash = choices.squash or found.squash
+    if not squash:
+        raise PolicyError(
+            f"{source}: {found.origin} does not say how outputs become actions; choose with --squash "
+            f"{'|'.join(SQUASH_NAMES)}: none takes them as they are, tanh squashes them into the bounds, "
+            "clip clips them to the bounds"
+        )
+    drawn = output == "gaussian pair" or found.log_std is not None
+    if squash == "tanh":
+        return ("squashed_gaussian" if drawn else "tanh"), squash
+    return ("gaussian" if drawn else "mean"), squash
+
+
+def _bounds(
+    found: PartialPolicy, squash: str, spaces: WorldSpaces | None, actions: int, source: str
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    if squash == "none":
+        return (), ()
+    low, high = found.low, found.high
+    if not low and spaces is not None:
+        low, high = spaces.low, spaces.high
+    if not low:
+        raise PolicyError(
+            f"{source}: {found.origin} does not hold the bounds of the {actions} actions, which --squash "
+            f"{squash} needs, and no world gave them; --squash none takes outputs as they are"
+        )
+    if len(low) != actions or len(high) != actions:
+        raise PolicyError(f"{source}: expected bounds of {actions} actions, found {len(low)} and {len(high)}")
+    return low, high
+
+
+def _ask_activation(found: PartialPolicy, source: str) -> str:
+    raise PolicyError(
+        f"{source}: {found.origin} does not say the activation function of its "
+        f"{len(found.layers) - 1} hidden layers; choose with --activation {'|'.join(ACTIVATION_NAMES)}"
+    )
+
+
+def _tensors(found: PartialPolicy, network: PolicyNetwork, source: str) -> dict[str, torch.Tensor]:
+    tensors = dict(network.state_dict())
+    for number, layer in enumerate(found.layers[:-1]):
+        tensors[f"hidden.{number}.weight"], tensors[f"hidden.{number}.bias"] = layer.weight, layer.bias
+    tensors["head.weight"], tensors["head.bias"] = found.layers[-1].weight, found.layers[-1].bias
+    if "log_std" in tensors and found.log_std is not None:
+        tensors["log_std"] = found.log_std.reshape(-1).float()
+    if found.statistics is not None:
+        tensors["normaliser.mean"] = found.statistics.mean.float()
+        tensors["normaliser.std"] = found.statistics.std.float()
+        if bool((found.statistics.std <= 0).any()):
+            raise PolicyError(f"{source}: statistics of the observation: expected positive deviations")
+    return tensors

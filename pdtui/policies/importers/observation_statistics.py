@@ -1,0 +1,88 @@
+"""Running statistics of the observation from a file: ``.npz``, ``.json`` or ``.safetensors``.
+
+It holds ``mean`` and ``var``, each (observations,), and optionally ``clip_obs`` and ``epsilon``: the
+observation becomes ``clip((o − mean) / sqrt(var + epsilon), ± clip_obs)``, as VecNormalize of
+Stable-Baselines3 does it. With ``std`` instead of ``var`` it is divided by that.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import torch
+
+from pdtui.core.errors import PolicyError
+from pdtui.policies.importers.file_kind import FileKind, file_kind_of
+from pdtui.policies.importers.partial_policy import ObservationStatistics
+from pdtui.policies.importers.tensor_files import Tensors, flatten_tensors, from_npz, from_safetensors
+from pdtui.policies.importers.zip_archive import ZipArchive, read_bounded
+
+_EPSILON = 1e-8
+HOW_TO_CONVERT = (
+    "in the Python that trained it: v = VecNormalize.load(FILE, env); numpy.savez('normaliser.npz', "
+    "mean=v.obs_rms.mean, var=v.obs_rms.var, clip_obs=v.clip_obs, epsilon=v.epsilon)"
+)
+
+
+def read_statistics(path: Path, observations: int) -> ObservationStatistics:
+    """Statistics of observations of this length.
+
+    Raises:
+        PolicyError: unreadable, a pickle, or of another shape.
+    """
+    tensors = _tensors(path)
+    if "mean" not in tensors or not {"var", "std"} & tensors.keys():
+        raise PolicyError(
+            f"{path}: expected 'mean' and 'var' of the observation, found {', '.join(tensors) or 'nothing'}"
+        )
+    mean, spread = tensors["mean"].double(), tensors.get("var", tensors.get("std"))
+    assert spread is not None
+    for name, tensor in (("mean", mean), ("var" if "var" in tensors else "std", spread)):
+        if tuple(tensor.shape) != (observations,):
+            raise PolicyError(
+                f"{path}: '{name}': expected shape ({observations},) as the policy observes, found "
+                f"{tuple(tensor.shape)}"
+            )
+        if not bool(torch.isfinite(tensor).all()) or (name != "mean" and bool((tensor < 0).any())):
+            raise PolicyError(f"{path}: '{name}': expected finite numbers, variances not below 0")
+    clip, epsilon = _number(tensors, "clip_obs", 0.0, path), _number(tensors, "epsilon", _EPSILON, path)
+    std = torch.sqrt(spread.double() + epsilon) if "var" in tensors else spread.double()
+    return ObservationStatistics(mean.float(), std.float(), clip)
+
+
+def _tensors(path: Path) -> Tensors:
+    content = read_bounded(path)
+    match file_kind_of(content):
+        case FileKind.ZIP:
+            return from_npz(ZipArchive(content, str(path)))
+        case FileKind.SAFETENSORS:
+            return flatten_tensors(from_safetensors(content, str(path)))
+        case FileKind.PICKLE:
+            raise PolicyError(
+                f"{path}: a pickle, which can run anything when it is read, so pdtui reads none. "
+                f"{HOW_TO_CONVERT}"
+            )
+        case _:
+            return _from_json(content, path)
+
+
+def _from_json(content: bytes, path: Path) -> Tensors:
+    try:
+        data = json.loads(content)
+        if not isinstance(data, dict):
+            raise ValueError(f"expected an object, found {type(data).__name__}")
+        numbers = {name: value for name, value in data.items() if isinstance(value, list | int | float)}
+        return {name: torch.tensor(value, dtype=torch.float64) for name, value in numbers.items()}
+    except (ValueError, TypeError, RecursionError, RuntimeError) as error:
+        raise PolicyError(f"{path}: expected statistics as .npz, .json or .safetensors: {error}") from error
+
+
+def _number(tensors: Tensors, name: str, default: float, path: Path) -> float:
+    if name not in tensors:
+        return default
+    tensor = tensors[name]
+    if tensor.numel() != 1 or not math.isfinite(float(tensor)) or float(tensor) < 0:
+        raise PolicyError(f"{path}: '{name}': expected one number, not below 0")
+    return float(tensor)

@@ -1,0 +1,217 @@
+"""Stable-Baselines3 ``.zip``: PPO, A2C, SAC, TD3 and DDPG with an MlpPolicy.
+
+The archive holds ``data``, a JSON of readable fields beside pickles in base64, and ``policy.pth``, the
+tensors. Only the readable fields are read: for a pickled object, Stable-Baselines3 writes the text of each of
+its parts beside the pickle, which is where the activation function and the bounds of the action stand.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from typing import Any
+
+from torch import nn
+
+from pdtui.core.errors import PolicyError
+from pdtui.policies.importers.partial_policy import (
+    LinearLayer,
+    PartialPolicy,
+    check_layer_chain,
+    describe_tensors,
+    read_layer_sequence,
+    read_linear_layer,
+    split_mean_and_deviation_head,
+)
+from pdtui.policies.importers.tensor_files import Tensors, flatten_tensors, from_torch
+from pdtui.policies.importers.zip_archive import ZipArchive
+from pdtui.policies.weights.import_options import NO_NORMALISER, ImportOptions
+from pdtui.policies.weights.policy_network import ACTIVATIONS
+
+_MAX_DATA = 64 << 20
+_CLASS = re.compile(r"<class '([\w.]+)'>")
+_FUNCTION = re.compile(r"<function ([\w.<>]+)\.__init__ at")
+OTHER_NETWORKS = "export such a network as TorchScript, or load it from Python"
+
+
+def is_sb3(names: tuple[str, ...]) -> bool:
+    """Whether these are the entries of a Stable-Baselines3 archive."""
+    return "data" in names and "policy.pth" in names
+
+
+def import_sb3(archive: ZipArchive, choices: ImportOptions) -> PartialPolicy:
+    """The policy of a Stable-Baselines3 archive.
+
+    Args:
+        archive: the open file.
+        choices: only to see whether the statistics of VecNormalize, which are not in the file, were given.
+
+    Raises:
+        PolicyError: no MlpPolicy of the algorithms above, or a damaged file.
+    """
+    source, data = archive.source, _data(archive)
+    tensors = flatten_tensors(from_torch(archive.read("policy.pth"), f"{source}: policy.pth"))
+    _check_flat(tensors, data, source)
+    if _normalised(data) and not choices.normaliser:
+        raise PolicyError(
+            f"{source}: trained behind VecNormalize, whose statistics are another file: give them with "
+            f"--normaliser FILE, or --normaliser {NO_NORMALISER} if it normalised rewards only"
+        )
+    return _Reader(source, data, tensors).found()
+
+
+def _normalised(data: dict[str, Any]) -> bool:
+    """Whether the model was trained behind VecNormalize, as far as the readable part of the file shows.
+
+    PPO and A2C keep an observation of before the normalisation only there. The off-policy algorithms keep
+    one in any case; it is stored in double precision there and the normalised one is not, so that texts of
+    different length tell. In a world that observes in single precision nothing tells.
+    """
+    own, seen = data.get("_last_original_obs"), data.get("_last_obs")
+    if not isinstance(own, dict) or "buffer_size" not in data:
+        return own is not None
+    texts = [part.get(":serialized:", "") if isinstance(part, dict) else "" for part in (own, seen)]
+    return len(texts[0]) != len(texts[1])
+
+
+class _Reader:
+    def __init__(self, source: str, data: dict[str, Any], tensors: Tensors) -> None:
+        self._source, self._data, self._tensors = source, data, tensors
+        self._kwargs = _parts(data, "policy_kwargs")
+        self._actions = _parts(data, "action_space")
+
+    def found(self) -> PartialPolicy:
+        if "action_net.weight" in self._tensors:
+            return self._actor_critic()
+        if "actor.latent_pi.0.weight" in self._tensors:
+            return self._sac()
+        if "actor.mu.0.weight" in self._tensors:
+            name = "DDPG" if str(self._kwargs.get("n_critics")) == "1" else "TD3"
+            layers = read_layer_sequence(self._tensors, "actor.mu")
+            low, high = self._bounds()
+            return PartialPolicy(
+                self._origin(name), layers, "action", self._activation("relu"), "tanh", low, high
+            )
+        raise PolicyError(
+            f"{self._source}: expected an actor of PPO, A2C, SAC, TD3 or DDPG, found "
+            f"{_policy_class(self._data)} with tensors {describe_tensors(self._tensors)}"
+        )
+
+    def _actor_critic(self) -> PartialPolicy:
+        origin = self._origin("PPO" if "clip_range" in self._data else "A2C")
+        hidden = read_layer_sequence(self._tensors, "mlp_extractor.shared_net") + read_layer_sequence(
+            self._tensors, "mlp_extractor.policy_net"
+        )
+        layers = check_layer_chain([*hidden, read_linear_layer(self._tensors, "action_net")], "mlp_extractor")
+        activation = self._activation("tanh")
+        kind = str(self._actions.get(":type:", ""))
+        if "MultiDiscrete" in kind or "MultiBinary" in kind:
+            raise PolicyError(
+                f"{self._source}: expected continuous actions or one discrete choice, found {kind}"
+            )
+        log_std = self._tensors.get("log_std")
+        if log_std is None:
+            return PartialPolicy(origin, layers, "categorical", activation)
+        low, high = self._bounds()
+        # State-dependent exploration has a matrix here, whose noise is no Gaussian of one step.
+        drawn = log_std if log_std.ndim == 1 else None
+        squashed = log_std.ndim == 2 and self._kwargs.get("squash_output") in (True, "True")
+        squash = "tanh" if squashed else "none" if self._unbounded() else "clip"
+        return PartialPolicy(origin, layers, "action", activation, squash, low, high, drawn)
+
+    def _sac(self) -> PartialPolicy:
+        hidden = read_layer_sequence(self._tensors, "actor.latent_pi")
+        activation, (low, high) = self._activation("relu"), self._bounds()
+        origin = self._origin("SAC")
+        if "actor.log_std.weight" in self._tensors:
+            head = split_mean_and_deviation_head(
+                read_linear_layer(self._tensors, "actor.mu"),
+                read_linear_layer(self._tensors, "actor.log_std"),
+            )
+            layers = check_layer_chain([*hidden, head], "actor")
+            return PartialPolicy(
+                origin,
+                layers,
+                "gaussian pair",
+                activation,
+                "tanh",
+                low,
+                high,
+                log_std_low=-20.0,
+                log_std_high=2.0,
+            )
+        limited = "actor.mu.0.weight" in self._tensors
+        mean: LinearLayer = read_linear_layer(self._tensors, "actor.mu.0" if limited else "actor.mu")
+        limit = float(self._kwargs.get("clip_mean", 2.0)) if limited else 0.0
+        layers = check_layer_chain([*hidden, mean], "actor")
+        return PartialPolicy(origin, layers, "action", activation, "tanh", low, high, mean_limit=limit)
+
+    def _activation(self, default: str) -> str:
+        """What `policy_kwargs` says; else the default, where Stable-Baselines3's own class surely had it."""
+        text = self._kwargs.get("activation_fn")
+        if text is None:
+            module = str(_parts(self._data, "policy_class").get("__module__", ""))
+            return default if module.startswith("stable_baselines3.") else ""
+        match = _CLASS.fullmatch(str(text))
+        kind = getattr(nn, match[1].rpartition(".")[2], None) if match else None
+        # An activation that pdtui does not know is asked for, as one that is not stated.
+        return next((name for name, known in ACTIVATIONS.items() if known is kind), "")
+
+    def _bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Bounds of the action space as its text says, none where that is shortened or unbounded."""
+        low, high = (_numbers(self._actions.get(side)) for side in ("low", "high"))
+        return ((), ()) if self._unbounded() or len(low) != len(high) else (low, high)
+
+    def _unbounded(self) -> bool:
+        return any("inf" in str(self._actions.get(side, "")) for side in ("low", "high"))
+
+    def _origin(self, algorithm: str) -> str:
+        return f"Stable-Baselines3 {algorithm}"
+
+
+def _policy_class(data: dict[str, Any]) -> str:
+    match = _FUNCTION.search(str(_parts(data, "policy_class").get("__init__", "")))
+    return match[1] if match else "a policy of unknown class"
+
+
+def _data(archive: ZipArchive) -> dict[str, Any]:
+    content = archive.read("data")
+    if len(content) > _MAX_DATA:
+        raise PolicyError(f"{archive.source}: entry 'data': expected at most {_MAX_DATA >> 20} MiB")
+    try:
+        data = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise PolicyError(f"{archive.source}: entry 'data': expected JSON: {error}") from error
+    if not isinstance(data, dict):
+        raise PolicyError(
+            f"{archive.source}: entry 'data': expected a JSON object, found {type(data).__name__}"
+        )
+    return data
+
+
+def _check_flat(tensors: Tensors, data: dict[str, Any], source: str) -> None:
+    """Refuse networks that look at images, dictionaries or the past."""
+    for name, tensor in tensors.items():
+        if "features_extractor." in name or "lstm" in name or tensor.ndim > 2:
+            raise PolicyError(
+                f"{source}: expected an MlpPolicy, found {_policy_class(data)} with tensor '{name}' of shape "
+                f" {tuple(tensor.shape)}; {OTHER_NETWORKS}"
+            )
+
+
+def _parts(data: dict[str, Any], name: str) -> dict[str, Any]:
+    """The readable parts of a field; its pickle is left alone."""
+    value = data.get(name)
+    if not isinstance(value, dict):
+        return {}
+    return {key: part for key, part in value.items() if key != ":serialized:"}
+
+
+def _numbers(text: Any) -> tuple[float, ...]:
+    words = str(text if text is not None else "").replace("[", " ").replace("]", " ").split()
+    try:
+        numbers = tuple(float(word) for word in words)
+    except ValueError:
+        return ()
+    return numbers if all(map(math.isfinite, numbers)) else ()

@@ -1,0 +1,138 @@
+"""Named tensors out of ``.npz``, ``.safetensors`` and PyTorch's archives; nothing in them is run.
+
+PyTorch stores the names of its tensors in a pickle. It is read by `torch.load(weights_only=True)`: that is
+not the unpickler of Python but one that knows tensors, containers and numbers only, and calls nothing else
+that the file names. Older PyTorch files that are one bare pickle are refused, as every other pickle is.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import zipfile
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load as load_safetensors
+
+from pdtui.core.errors import PolicyError
+from pdtui.policies.importers.zip_archive import ZipArchive
+
+Tensors = dict[str, torch.Tensor]
+_MAX_NESTING = 6
+_MAX_PICKLE = 64 << 20
+_MAX_HEADER = 10_000
+
+
+def from_npz(archive: ZipArchive) -> Tensors:
+    """Arrays of an ``.npz``, in the order of the file; arrays of Python objects are refused.
+
+    Raises:
+        PolicyError: an entry is no array of numbers, or its shape does not fit its bytes.
+    """
+    return {
+        name.removesuffix(".npy"): torch.from_numpy(_array(archive.read(name), f"{archive.source}: '{name}'"))
+        for name in archive.names
+    }
+
+
+def _array(content: bytes, where: str) -> np.ndarray[Any, Any]:
+    stream = io.BytesIO(content)
+    try:
+        version = np.lib.format.read_magic(stream)
+        form = np.lib.format
+        read = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
+        shape, in_columns, kind = read(stream, max_header_size=_MAX_HEADER)
+    except (ValueError, EOFError) as error:
+        raise PolicyError(f"{where}: not an array that NumPy wrote: {error}") from error
+    if kind.hasobject:
+        raise PolicyError(
+            f"{where}: holds Python objects, which only unpickling could read; pdtui never does"
+        )
+    if kind.kind not in "fiub":
+        raise PolicyError(f"{where}: expected numbers, found {kind}")
+    expected, found = math.prod(shape) * kind.itemsize, len(content) - stream.tell()
+    if expected != found:
+        raise PolicyError(f"{where}: shape {shape} of {kind} takes {expected} bytes, found {found}")
+    flat = np.frombuffer(content, kind, offset=stream.tell())
+    array = flat.reshape(shape, order="F" if in_columns else "C")
+    return np.array(array, kind.newbyteorder("="), order="C")
+
+
+def from_safetensors(content: bytes, source: str) -> Tensors:
+    """Tensors of a safetensors file.
+
+    Raises:
+        PolicyError: it is cut off or damaged.
+    """
+    try:
+        tensors: Tensors = load_safetensors(content)
+    except (SafetensorError, ValueError, KeyError) as error:
+        raise PolicyError(f"{source}: not a whole safetensors file: {error}") from error
+    return tensors
+
+
+def from_torch(content: bytes, source: str) -> dict[str, Any]:
+    """What a PyTorch archive holds: tensors, and containers and numbers around them; see `flatten_tensors`.
+
+    Raises:
+        PolicyError: no such archive, packed, damaged, or with other objects than tensors in it.
+    """
+    archive = ZipArchive(content, source)
+    with zipfile.ZipFile(io.BytesIO(content)) as packed:
+        if any(info.compress_type != zipfile.ZIP_STORED for info in packed.infolist()):
+            raise PolicyError(f"{source}: expected a PyTorch archive, whose entries are never compressed")
+        if any(i.file_size > _MAX_PICKLE for i in packed.infolist() if i.filename.endswith(".pkl")):
+            raise PolicyError(f"{source}: expected names of tensors of at most {_MAX_PICKLE >> 20} MiB")
+    try:
+        loaded = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True, mmap=False)
+    except Exception as error:
+        raise PolicyError(f"{source}: {_reason(error)}; it holds {archive.listing()}") from error
+    return loaded if isinstance(loaded, dict) else {"": loaded}
+
+
+def _reason(error: Exception) -> str:
+    """Why PyTorch's safe reader gave up, in one line."""
+    text = str(error)
+    found = next((line.strip() for line in text.splitlines() if "GLOBAL" in line), "")
+    if found:
+        return (
+            f"holds other objects than tensors, which pdtui does not load ({found[:160]}); save the state "
+            "dict alone: torch.save(model.state_dict(), FILE)"
+        )
+    return f"a PyTorch file that is cut off or damaged: {text.splitlines()[0].split('. ')[0][:160]}"
+
+
+def flatten_tensors(content: Any, prefix: str = "", depth: int = 0) -> Tensors:
+    """All tensors below nested containers, by dotted names, float32 where they are floating point.
+
+    Raises:
+        PolicyError: a tensor claims more numbers than it stores.
+    """
+    if isinstance(content, torch.Tensor):
+        return {prefix: _checked(content, prefix)}
+    if depth > _MAX_NESTING:
+        return {}
+    if isinstance(content, Mapping):
+        items = [(str(name), value) for name, value in content.items()]
+    elif isinstance(content, list | tuple):
+        items = [(str(number), value) for number, value in enumerate(content)]
+    else:
+        return {}
+    tensors: Tensors = {}
+    for name, value in items:
+        tensors |= flatten_tensors(value, f"{prefix}.{name}" if prefix else name, depth + 1)
+    return tensors
+
+
+def _checked(tensor: torch.Tensor, name: str) -> torch.Tensor:
+    if tensor.layout is not torch.strided or tensor.is_quantized or tensor.is_meta:
+        raise PolicyError(f"tensor '{name}': expected plain numbers, found {tensor.layout}")
+    stored = tensor.untyped_storage().nbytes() // tensor.element_size()
+    if tensor.numel() > stored:
+        raise PolicyError(f"tensor '{name}': shape {tuple(tensor.shape)} claims more numbers than are stored")
+    tensor = tensor.detach()
+    return tensor.float().contiguous() if tensor.is_floating_point() else tensor

@@ -1,0 +1,101 @@
+"""Zip archives from anywhere: sizes are bounded before anything is unpacked."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+import zlib
+from pathlib import Path
+
+from pdtui.core.errors import PolicyError
+
+MAX_BYTES = 1 << 30
+_MAX_ENTRIES = 20_000
+_SHOWN = 8
+
+
+class ZipArchive:
+    """The entries of a zip file.
+
+    Args:
+        content: the whole file.
+        source: its name, for messages.
+
+    Raises:
+        PolicyError: it is no whole zip file, or would unpack to more than is bearable.
+    """
+
+    def __init__(self, content: bytes, source: str) -> None:
+        self.source = source
+        try:
+            self._zip = zipfile.ZipFile(io.BytesIO(content))
+        except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError) as error:
+            raise PolicyError(f"{source}: a zip file that is cut off or damaged: {error}") from error
+        if min((info.header_offset for info in self._zip.infolist()), default=0) > 0:
+            # The directory that was found is that of an archive inside, its own being gone.
+            raise PolicyError(
+                f"{source}: a zip file that is cut off or damaged: it has no directory of its own"
+            )
+        self._entries = {info.filename: info for info in self._zip.infolist()}
+        self.names: tuple[str, ...] = tuple(self._entries)
+        total = sum(info.file_size for info in self._entries.values())
+        if len(self.names) > _MAX_ENTRIES or total > MAX_BYTES:
+            raise PolicyError(
+                f"{source}: expected at most {_MAX_ENTRIES} entries of {MAX_BYTES >> 20} MiB in all; the zip "
+                f"would unpack to {len(self.names)} entries of {total >> 20} MiB"
+            )
+
+    def read(self, name: str) -> bytes:
+        """Unpack one entry; never more than the archive's directory says that it holds.
+
+        Raises:
+            PolicyError: it is not there, encrypted, damaged or larger than the directory says.
+        """
+        if name not in self._entries:
+            raise PolicyError(f"{self.source}: no entry '{name}'; there are {self.listing()}")
+        size = self._entries[name].file_size
+        try:
+            with self._zip.open(name) as stream:
+                content = stream.read(size + 1)
+        except (
+            zipfile.BadZipFile,
+            zlib.error,
+            EOFError,
+            RuntimeError,
+            NotImplementedError,
+            OSError,
+        ) as error:
+            raise PolicyError(f"{self.source}: entry '{name}' cannot be unpacked: {error}") from error
+        if len(content) != size:
+            raise PolicyError(
+                f"{self.source}: entry '{name}': expected {size} bytes, found {len(content)}: it is damaged"
+            )
+        return content
+
+    def listing(self) -> str:
+        """The entries in words, for messages."""
+        return shorten(self.names)
+
+
+def shorten(names: tuple[str, ...] | list[str]) -> str:
+    """The first names, and how many more there are; printable whatever they hold."""
+    shown = [name if name.isprintable() else ascii(name) for name in names[:_SHOWN]]
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return (", ".join(name[:80] for name in shown) or "nothing") + more
+
+
+def read_bounded(path: Path) -> bytes:
+    """A whole file of bearable size.
+
+    Raises:
+        PolicyError: it cannot be read, or is too large.
+    """
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise PolicyError(
+                f"{path}: expected a file of at most {MAX_BYTES >> 20} MiB, found {size >> 20} MiB"
+            )
+        return path.read_bytes()
+    except OSError as error:
+        raise PolicyError(f"{path}: cannot be read: {error.strerror}") from error

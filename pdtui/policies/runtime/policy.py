@@ -1,0 +1,204 @@
+"""Run a network one control step at a time, overwriting hidden units on the way."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from pdtui.core.errors import PolicyError
+from pdtui.core.units import NO_STIMULATION, LayerWidths, Stimulation, describe_layers
+from pdtui.policies.runtime import recurrent_state
+from pdtui.policies.runtime.action_decoders import Decoder, mean_action
+from pdtui.policies.runtime.fast_mlp import fast_mlp_of
+from pdtui.policies.runtime.recurrent_state import PolicyState
+from pdtui.policies.runtime.unit_hooks import UnitHooks
+from pdtui.policies.runtime.unit_layers import hidden_modules, name_layers
+
+
+class PolicyStep(NamedTuple):
+    """What one control step of a policy gives.
+
+    Attributes:
+        action: shape (A,), float32.
+        activations: output of every hidden unit as the next layer saw it, shape (U,), float32.
+        natural: what the stimulated units would have put out, in the order of the stimulation.
+    """
+
+    action: NDArray[np.float32]
+    activations: NDArray[np.float32]
+    natural: tuple[float, ...]
+
+
+class Policy:
+    """A network whose hidden units can be read and overwritten.
+
+    A unit's output is taken after its activation function and before the next layer (section 3.3 of the
+    paper). Layers count in the order in which the network calls them; the units of a layer of any shape count
+    in C order. The units of a recurrent layer are its output h: overwriting it is what the next layer reads,
+    while the state that the recurrent layer itself is fed in the next step keeps the natural h. (A cell's h
+    is found again in the state that the network returns if it is there as it is, not stacked with others.)
+
+    A network with a hidden state is called ``module(observation, state) -> (output, state)``. The state is
+    part of the run: whoever resets the world calls `reset`, whoever restores it calls `restore`.
+
+    Args:
+        module: the network; it maps an observation, float32, to its output. The policy works on a copy.
+        observations: length or shape of the observation.
+        hidden: names of the submodules whose outputs are the units; by default every activation function and
+            every recurrent layer.
+        decode: turns the network's output into an action, an array of its own: the next step overwrites the
+            output.
+        batched: whether the network wants a leading axis of length 1 before the observation's own.
+        initial_state: what a recurrent network is fed first: a tensor, or tuples of tensors.
+        name: for messages.
+        sha256: hash of the file that it came from.
+
+    Raises:
+        PolicyError: a name in `hidden` does not exist, there is no hidden layer, or the network cannot take
+            such an observation or hands back another state.
+    """
+
+    def __init__(
+        self,
+        module: nn.Module,
+        observations: int | Sequence[int],
+        *,
+        hidden: Sequence[str] | None = None,
+        decode: Decoder = mean_action,
+        batched: bool = False,
+        initial_state: Any = None,
+        name: str = "policy",
+        sha256: str = "",
+    ) -> None:
+        self.module, self.name, self.sha256 = copy.deepcopy(module).eval(), name, sha256
+        self.shape = (observations,) if isinstance(observations, int) else tuple(observations)
+        self._decode, self._batched = decode, batched
+        self._initial = None if initial_state is None else recurrent_state.clone_state(initial_state)
+        self._state = self._initial
+        self._taps = UnitHooks()
+        plain = hidden is None and initial_state is None and not batched and len(self.shape) == 1
+        self._chain = fast_mlp_of(self.module, self.shape[0]) if plain else None
+        if self._chain is not None:
+            self.layers = LayerWidths(self._chain.layers, [])
+        else:
+            names = self._watch(hidden)
+            self._try()
+            self.layers = LayerWidths((output.size for output in self._taps.outputs), names)
+        if not self.layers:
+            raise PolicyError(
+                f"{name}: the network has no hidden layer to stimulate: no submodule is an activation "
+                "function or a recurrent layer; name the submodules whose outputs are units as `hidden`"
+            )
+        self.units = sum(self.layers)
+        self.reset()
+
+    @property
+    def recurrent(self) -> bool:
+        """Whether the network has a hidden state."""
+        return self._initial is not None
+
+    def reset(self) -> None:
+        """An episode begins: back to the initial hidden state."""
+        if self._initial is not None:
+            self._state = recurrent_state.clone_state(self._initial)
+
+    def snapshot(self) -> PolicyState:
+        """Copy the hidden state; empty for a network without one."""
+        return () if self._initial is None else recurrent_state.state_to_arrays(self._state)
+
+    def restore(self, state: PolicyState) -> None:
+        """Return to a hidden state that `snapshot` gave.
+
+        Raises:
+            PolicyError: it is another network's.
+        """
+        if self._initial is None and not state:
+            return
+        expected = [
+            tuple(tensor.shape)
+            for tensor in recurrent_state.flatten_state(() if self._initial is None else self._initial)
+        ]
+        found = [array.shape for array in state]
+        if expected != found:
+            raise PolicyError(f"{self.name}: expected a hidden state of shapes {expected}, got {found}")
+        self._state = recurrent_state.rebuild_state(
+            self._initial, (torch.from_numpy(array.copy()) for array in state)
+        )
+
+    def _watch(self, hidden: Sequence[str] | None) -> list[list[str]]:
+        chosen = hidden_modules(self.module, hidden, self.name)
+        names = name_layers(self.module, chosen, self._try)
+        for child in chosen:
+            child.register_forward_hook(lambda _module, _inputs, output: self._taps.replace(output))
+        return names
+
+    def _try(self) -> None:
+        self._taps.begin()
+        try:
+            self._call(np.zeros(self.shape))
+            recurrent_state.check_state(self._initial, self._state)
+        except PolicyError as error:
+            raise PolicyError(f"{self.name}: {error}") from error
+        except (RuntimeError, TypeError, ValueError, IndexError) as error:
+            reason = str(error).strip().split("\n")[0]
+            raise PolicyError(
+                f"{self.name}: the network cannot take an observation of shape {self.shape} "
+                f"({'with' if self._batched else 'without'} a batch axis, "
+                f"{'with' if self.recurrent else 'without'} a hidden state): {reason}"
+            ) from error
+
+    def _call(self, observation: NDArray[Any]) -> torch.Tensor:
+        x = torch.from_numpy(observation.astype(np.float32))
+        if self._batched:
+            x = x.unsqueeze(0)
+        with torch.inference_mode():
+            if self._initial is None:
+                output: torch.Tensor = self.module(x)
+                return output
+            output, state = self.module(x, self._state)
+        self._state = recurrent_state.rebuild_state(
+            state, iter(self._taps.natural_of(recurrent_state.flatten_state(state)))
+        )
+        return output
+
+    def act(
+        self,
+        observation: NDArray[Any],
+        stimulation: Stimulation = NO_STIMULATION,
+        rng: np.random.Generator | None = None,
+    ) -> PolicyStep:
+        """One control step.
+
+        Args:
+            observation: of the policy's shape.
+            stimulation: the units to overwrite.
+            rng: draw the action from the policy's distribution with it; without, take the mean action.
+
+        Raises:
+            PolicyError: the observation has another shape, or a unit does not exist.
+        """
+        if observation.shape != self.shape:
+            raise PolicyError(
+                f"{self.name}: expected an observation of shape {self.shape}, got {observation.shape}"
+            )
+        if self._chain is not None:
+            output, activations, found = self._chain.run(observation, stimulation)
+        else:
+            self._taps.begin(stimulation)
+            output = self._call(observation)
+            activations, found = np.concatenate(self._taps.outputs), self._taps.natural
+        action = self._decode(output, rng)
+        try:
+            natural = tuple([found[unit] for unit in stimulation.units])
+        except KeyError as error:
+            raise PolicyError(
+                f"{self.name}: unit number {error} does not exist; "
+                f"the policy has {describe_layers(self.layers)}"
+            ) from None
+        return PolicyStep(action, activations, natural)

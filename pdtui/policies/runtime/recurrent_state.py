@@ -1,0 +1,63 @@
+"""The hidden state of a recurrent network: a tensor, or tuples and lists of tensors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from pdtui.core.errors import PolicyError
+
+PolicyState = tuple[NDArray[Any], ...]
+"""A saved hidden state: its tensors in their order; empty for a network without one."""
+
+
+def flatten_state(state: Any) -> Iterator[torch.Tensor]:
+    """The tensors of a hidden state, in their order.
+
+    Raises:
+        PolicyError: there is something else in it.
+    """
+    if isinstance(state, torch.Tensor):
+        yield state
+    elif isinstance(state, tuple | list):
+        for part in state:
+            yield from flatten_state(part)
+    else:
+        kind = type(state).__name__
+        raise PolicyError(f"recurrent state: expected a tensor, or tuples of tensors, found {kind}")
+
+
+def rebuild_state(template: Any, tensors: Iterator[torch.Tensor]) -> Any:
+    """The tensors in the shape of the template."""
+    if isinstance(template, torch.Tensor):
+        return next(tensors)
+    parts = [rebuild_state(part, tensors) for part in template]
+    return tuple(parts) if isinstance(template, tuple) else parts
+
+
+def clone_state(state: Any) -> Any:
+    """A copy that shares no memory."""
+    return rebuild_state(state, iter([tensor.detach().clone() for tensor in flatten_state(state)]))
+
+
+def state_to_arrays(state: Any) -> PolicyState:
+    """A copy as arrays, which travel between processes."""
+    return tuple(np.array(tensor.detach().numpy()) for tensor in flatten_state(state))
+
+
+def check_state(template: Any, state: Any) -> None:
+    """See that a state that the network gave can be fed to it again.
+
+    Raises:
+        PolicyError: its shapes are not the initial state's (None: the network has no state).
+    """
+    if template is None:
+        return
+    expected = [tuple(tensor.shape) for tensor in flatten_state(template)]
+    found = [tuple(tensor.shape) for tensor in flatten_state(state)]
+    if expected != found:
+        raise PolicyError(f"recurrent state: expected shapes {expected}, the network gave {found}")

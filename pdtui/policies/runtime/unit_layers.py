@@ -1,0 +1,104 @@
+"""Which submodules of a network put out its hidden units, and what their layers are called."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import torch
+from torch import nn
+
+from pdtui.core.errors import PolicyError
+from pdtui.policies.runtime.fast_mlp import ACTIVATION_TYPES
+
+RECURRENT_TYPES: tuple[type[nn.Module], ...] = (nn.RNNBase, nn.RNNCellBase)
+
+
+def hidden_modules(module: nn.Module, hidden: Sequence[str] | None, owner: str) -> dict[nn.Module, str]:
+    """The submodules whose outputs are units, with their names.
+
+    Args:
+        module: the network.
+        hidden: their names; by default every activation function and every recurrent layer.
+        owner: for messages.
+
+    Raises:
+        PolicyError: a name does not exist.
+    """
+    modules = dict(module.named_modules())
+    if hidden is None:
+        return {one: name for name, one in modules.items() if _puts_out_units(one)}
+    missing = [name for name in hidden if name not in modules]
+    if missing:
+        known = ", ".join(name for name in modules if name)
+        raise PolicyError(f"{owner}: no submodule '{missing[0]}'; there are {known}")
+    return {modules[name]: name for name in hidden}
+
+
+def _puts_out_units(module: nn.Module) -> bool:
+    return isinstance(module, (*ACTIVATION_TYPES, *RECURRENT_TYPES)) or getattr(
+        module, "is_activation", False
+    )
+
+
+def _has_weights(module: nn.Module) -> bool:
+    return next(module.parameters(recurse=False), None) is not None
+
+
+def output_tensor(output: Any) -> torch.Tensor:
+    """The tensor that the next layer reads; of a recurrent layer the output h, without its state.
+
+    Raises:
+        PolicyError: there is none.
+    """
+    first = output[0] if isinstance(output, tuple) and output else output
+    if not isinstance(first, torch.Tensor):
+        raise PolicyError(f"a hidden submodule puts out {type(first).__name__}, expected a tensor")
+    return first
+
+
+def name_layers(
+    module: nn.Module, chosen: dict[nn.Module, str], run: Callable[[], object]
+) -> list[list[str]]:
+    """Names of the layers in the order of the calls.
+
+    A layer is called by the submodule whose output goes straight into its activation function (``conv1``),
+    and by the activation function's own name.
+
+    Args:
+        module: the network.
+        chosen: the submodules whose outputs are units.
+        run: runs the network once.
+    """
+    # The tensors stay referred to, so that none takes another's place and identity.
+    producers: list[tuple[torch.Tensor, str]] = []
+    names: list[list[str]] = []
+
+    def produced(name: str) -> Callable[..., None]:
+        def hook(_module: nn.Module, _inputs: Any, output: Any) -> None:
+            if isinstance(output, torch.Tensor):
+                producers.append((output, name))
+
+        return hook
+
+    def visited(name: str) -> Callable[..., None]:
+        def hook(_module: nn.Module, inputs: Any) -> None:
+            feeding = [other for tensor, other in producers if inputs and tensor is inputs[0]]
+            names.append([*feeding[-1:], name])
+
+        return hook
+
+    handles = []
+    for name, one in module.named_modules():
+        if one in chosen and (not _puts_out_units(one) or _has_weights(one)):
+            handles.append(one.register_forward_pre_hook(lambda _module, _inputs, n=name: names.append([n])))
+        elif one in chosen:
+            handles.append(one.register_forward_pre_hook(visited(name)))
+        elif _has_weights(one):
+            handles.append(one.register_forward_hook(produced(name)))
+    try:
+        run()
+    finally:
+        for handle in handles:
+            handle.remove()
+    return names

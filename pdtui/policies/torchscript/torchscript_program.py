@@ -1,0 +1,260 @@
+"""The code of a TorchScript archive, walked as a syntax tree: a network whose submodules can be watched."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from torch import nn
+
+from pdtui.core.errors import PolicyError
+from pdtui.policies.runtime.fast_mlp import ACTIVATION_TYPES
+from pdtui.policies.torchscript.pickle_reader import PickledObject
+from pdtui.policies.torchscript.torchscript_operators import call_operator
+
+_UNITS = {kind.__name__ for kind in ACTIVATION_TYPES} | {
+    "LSTM",
+    "GRU",
+    "RNN",
+    "LSTMCell",
+    "GRUCell",
+    "RNNCell",
+}
+_CASTS: dict[str, Any] = {"int": int, "float": float, "bool": bool}
+_MOST_STATEMENTS = 20_000
+
+
+class TorchScriptProgram:
+    """Functions and methods by their full names.
+
+    Args:
+        texts: source code by the dotted name of its module.
+        constants: the archive's constants.
+
+    Raises:
+        PolicyError: a text is no TorchScript.
+    """
+
+    def __init__(self, texts: Mapping[str, str], constants: tuple[Any, ...]) -> None:
+        self.functions: dict[str, ast.FunctionDef] = {}
+        self.fields: dict[str, dict[str, Any]] = {}
+        self.constants = constants
+        self.statements = 0
+        self._depth = 0
+        for module, text in texts.items():
+            try:
+                body = ast.parse(text).body
+            except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+                raise PolicyError(f"code '{module}': not TorchScript: {error}") from error
+            for node in body:
+                self._define(module, node)
+
+    def _define(self, module: str, node: ast.stmt) -> None:
+        if isinstance(node, ast.FunctionDef):
+            self.functions[f"{module}.{node.name}"] = node
+        elif isinstance(node, ast.ClassDef):
+            kind = f"{module}.{node.name}"
+            for part in node.body:
+                if isinstance(part, ast.FunctionDef):
+                    self.functions[f"{kind}.{part.name}"] = part
+                elif isinstance(part, ast.AnnAssign) and part.value and isinstance(part.target, ast.Name):
+                    self.fields.setdefault(kind, {})[part.target.id] = ast.literal_eval(part.value)
+
+    def call(self, name: str, arguments: list[Any], keywords: dict[str, Any] | None = None) -> Any:
+        """Run a function of the archive.
+
+        Raises:
+            PolicyError: there is none, or it does what pdtui does not do for a file.
+        """
+        function = self.functions.get(name)
+        if function is None:
+            raise PolicyError(f"its code has no '{name[:100]}'")
+        names = [parameter.arg for parameter in function.args.args]
+        defaults = function.args.defaults
+        values = dict(zip(names[len(names) - len(defaults) :], map(ast.literal_eval, defaults), strict=True))
+        values |= dict(zip(names, arguments, strict=False)) | (keywords or {})
+        if self._depth == 0:
+            self.statements = 0
+        self._depth += 1
+        try:
+            return _Frame(self, values).run(function.body)
+        finally:
+            self._depth -= 1
+
+
+class ScriptedModule(nn.Module):
+    """A submodule of the archive; `forward` runs its method of that name."""
+
+    def __init__(
+        self, thing: PickledObject, program: TorchScriptProgram, built: dict[int, ScriptedModule]
+    ) -> None:
+        super().__init__()
+        built[id(thing)] = self
+        self.kind, self._program = thing.kind, program
+        self._plain: dict[str, Any] = dict(program.fields.get(thing.kind, {}))
+        self.is_activation = thing.kind.rpartition(".")[2] in _UNITS
+        for name, value in thing.attributes.items():
+            if isinstance(value, PickledObject):
+                known = built.get(id(value))
+                self.add_module(name, known or ScriptedModule(value, program, built))
+            elif isinstance(value, torch.Tensor) and value.is_floating_point():
+                self.register_parameter(name, nn.Parameter(value, requires_grad=False))
+            elif isinstance(value, torch.Tensor):
+                self.register_buffer(name, value)
+            else:
+                self._plain[name] = False if name == "training" else value
+
+    def forward(self, *arguments: Any, method: str = "forward") -> Any:
+        if f"{self.kind}.{method}" not in self._program.functions:
+            raise PolicyError(f"its class '{self.kind}' has no method '{method}'")
+        return self.run(method, list(arguments))
+
+    def run(self, method: str, arguments: list[Any], keywords: dict[str, Any] | None = None) -> Any:
+        """Run a method."""
+        return self._program.call(f"{self.kind}.{method}", [self, *arguments], keywords)
+
+    def read(self, name: str) -> Any:
+        """An attribute that the archive gives it.
+
+        Raises:
+            PolicyError: it has none of that name.
+        """
+        for table in (self._plain, self._modules, self._parameters, self._buffers):
+            if name in table:
+                return table[name]
+        raise PolicyError(f"its class '{self.kind}' has no attribute '{name[:80]}'")
+
+
+class _Function(str):
+    """Full name of a function that the code holds in a variable."""
+
+
+class _Return(Exception):  # noqa: N818 - it carries a value
+    pass
+
+
+class _Frame:
+    def __init__(self, program: TorchScriptProgram, values: dict[str, Any]) -> None:
+        self._program, self._values = program, values
+
+    def run(self, body: list[ast.stmt]) -> Any:
+        try:
+            self._block(body)
+        except _Return as done:
+            return done.args[0]
+        return None
+
+    def _block(self, body: list[ast.stmt]) -> None:
+        for node in body:
+            self._program.statements += 1
+            if self._program.statements > _MOST_STATEMENTS:
+                raise PolicyError(f"its code runs more than {_MOST_STATEMENTS} statements a step")
+            match node:
+                case ast.Return():
+                    raise _Return(None if node.value is None else self._value(node.value))
+                case ast.Assign(targets=[target]):
+                    self._assign(target, self._value(node.value))
+                case ast.AnnAssign(value=ast.expr() as value):
+                    self._assign(node.target, self._value(value))
+                case ast.If():
+                    self._block(node.body if self._value(node.test) else node.orelse)
+                case ast.Expr():
+                    self._value(node.value)
+                case ast.Pass():
+                    pass
+                case _:
+                    raise PolicyError(
+                        f"its code has a statement '{type(node).__name__}', which pdtui does not run"
+                    )
+
+    def _assign(self, target: ast.expr, value: Any) -> None:
+        if isinstance(target, ast.Tuple | ast.List):
+            for one, part in zip(target.elts, value, strict=True):
+                self._assign(one, part)
+        elif isinstance(target, ast.Name):
+            self._values[target.id] = value
+        else:
+            raise PolicyError("its code changes an attribute, which pdtui does not do for a file")
+
+    def _value(self, node: ast.expr) -> Any:  # noqa: PLR0912 - one case a kind of expression
+        match node:
+            case ast.Constant():
+                return node.value
+            case ast.Name():
+                if node.id not in self._values:
+                    raise PolicyError(f"its code reads '{node.id[:80]}' before it is set")
+                return self._values[node.id]
+            case ast.Tuple():
+                return tuple(self._value(one) for one in node.elts)
+            case ast.List():
+                return [self._value(one) for one in node.elts]
+            case ast.UnaryOp(op=ast.USub()):
+                return -self._value(node.operand)
+            case ast.IfExp():
+                return self._value(node.body if self._value(node.test) else node.orelse)
+            case ast.Subscript():
+                owner, place = self._value(node.value), self._value(node.slice)
+                if isinstance(owner, list | tuple) and isinstance(place, int):
+                    return owner[place]
+            case ast.Attribute(value=ast.Name(id="CONSTANTS")):
+                return self._program.constants[int(node.attr.removeprefix("c"))]
+            case ast.Attribute() if _dotted(node).startswith("__torch__."):
+                return _Function(_dotted(node))
+            case ast.Attribute():
+                owner = self._value(node.value)
+                if isinstance(owner, ScriptedModule):
+                    return owner.read(node.attr)
+            case ast.Call():
+                return self._call(node)
+        raise PolicyError(f"its code says '{ast.unparse(node)[:80]}', which pdtui does not run")
+
+    def _call(self, node: ast.Call) -> Any:
+        name = _dotted(node.func)
+        if name in ("annotate", "unchecked_cast"):
+            return self._value(node.args[1])
+        if name == "uninitialized":
+            return None
+        arguments = [self._value(one) for one in node.args]
+        keywords = {one.arg: self._value(one.value) for one in node.keywords if one.arg is not None}
+        if name == "getattr" and isinstance(arguments[0], ScriptedModule):
+            return arguments[0].read(str(arguments[1]))
+        if name in _CASTS:
+            return _CASTS[name](*arguments)
+        if name.startswith("ops.prim."):
+            return _primitive(name.removeprefix("ops.prim."), arguments)
+        if name.startswith("torch."):
+            return call_operator(name.removeprefix("torch."), arguments, keywords)
+        held = self._values.get(name)
+        if name.startswith("__torch__.") or isinstance(held, _Function):
+            return self._program.call(held or name, arguments, keywords)
+        if isinstance(node.func, ast.Attribute) and not name.startswith("ops."):
+            owner = self._value(node.func.value)
+            if isinstance(owner, ScriptedModule):
+                method = node.func.attr
+                # Called as a module, so that whoever watches its output sees it; forward__0 is an overload.
+                if method.partition("__")[0] == "forward" and not keywords:
+                    return owner(*arguments, method=method)
+                return owner.run(method, arguments, keywords)
+        raise PolicyError(
+            f"its code calls '{(name or ast.unparse(node.func))[:80]}', which pdtui does not do"
+        )
+
+
+def _primitive(name: str, arguments: list[Any]) -> Any:
+    if name == "NumToTensor":
+        return torch.tensor(arguments[0])
+    if name in ("dtype", "device") and isinstance(arguments[0], torch.Tensor):
+        return getattr(arguments[0], name)
+    if name == "RaiseException":
+        raise PolicyError(f"its code says: {str(arguments[0])[:200]}")
+    raise PolicyError(f"its code uses 'prim::{name[:80]}', which pdtui does not run")
+
+
+def _dotted(node: ast.expr) -> str:
+    parts: list[str] = []
+    while isinstance(node, ast.Attribute):
+        parts.append(node.attr)
+        node = node.value
+    return ".".join([node.id, *reversed(parts)]) if isinstance(node, ast.Name) else ""

@@ -1,0 +1,135 @@
+"""From a weights file to a policy that can be driven."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import torch
+
+from pdtui.core.errors import PolicyError
+from pdtui.policies.importers import import_network
+from pdtui.policies.runtime.action_decoders import decoder_for
+from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.torchscript import is_torchscript
+from pdtui.policies.weights.file_search import find_beside
+from pdtui.policies.weights.import_options import NO_NORMALISER, NO_OPTIONS, ImportOptions, WorldSpaces
+from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
+from pdtui.policies.weights.torchscript_policy import load_torchscript_policy
+from pdtui.policies.weights.weights_file import (
+    find_weights_file,
+    hash_file,
+    is_own_format,
+    load_network,
+    save_network,
+)
+
+
+def load_policy(
+    name: str | Path,
+    robot: str | None = None,
+    *,
+    choices: ImportOptions = NO_OPTIONS,
+    spaces: WorldSpaces | None = None,
+    folders: Sequence[Path] = (),
+) -> Policy:
+    """Load a weights file, or a shipped policy by its name.
+
+    A file that pdtui did not write is imported (`pdtui.policies.importers`); its policy belongs to no robot
+    and fits every world with its shapes. PyTorch is set to one thread: at this size more threads only cost,
+    and sums keep their order.
+
+    Args:
+        name: file or shipped name.
+        robot: what it is to drive.
+        choices: what the file may leave open.
+        spaces: of the world that it is to act in, to be compared with the policy's shapes.
+        folders: where to look for files beside the working directory.
+
+    Raises:
+        PolicyError: no such file, unreadable, made for another robot, of other shapes than the world's, or
+            in need of a choice.
+    """
+    path = find_weights_file(str(name), folders)
+    if is_torchscript(path):
+        return load_torchscript_policy(path, spaces, choices)
+    network, digest = load_any_network(path, choices, spaces, folders)
+    spec = network.spec
+    if robot is not None and spec.robot not in ("", robot):
+        raise PolicyError(f"{path}: expected a policy for robot '{robot}', found one for '{spec.robot}'")
+    if spaces is not None:
+        discrete = spec.head == "categorical"
+        spaces.check(str(path), spec.observations, spec.action_size, spec.actions if discrete else 0)
+    torch.set_num_threads(1)
+    return Policy(network, spec.observations, decode=decoder_for(network), name=path.stem, sha256=digest)
+
+
+def load_any_network(
+    path: Path, choices: ImportOptions, spaces: WorldSpaces | None, folders: Sequence[Path] = ()
+) -> tuple[PolicyNetwork, str]:
+    """The network of a file that pdtui or somebody else wrote, and its hash.
+
+    The hash is the file's SHA-256; choices enter it, too, because with others it is another policy.
+
+    Raises:
+        PolicyError: as `load_policy`.
+    """
+    digest = hash_file(path)
+    if is_own_format(path):
+        network = load_network(path)
+        _check_agreement(path, network.spec, choices)
+        return network, digest
+    statistics = _find_statistics(path, choices, folders)
+    network = import_network(path, choices, spaces, normaliser=statistics)
+    if choices != NO_OPTIONS:
+        parts = digest, choices.activation, choices.squash, hash_file(statistics) if statistics else ""
+        digest = sha256("\n".join(parts).encode()).hexdigest()
+    return network, digest
+
+
+def _check_agreement(path: Path, spec: NetworkSpec, choices: ImportOptions) -> None:
+    """A file of pdtui's own states everything: a choice may repeat it, not change it."""
+    squash = "tanh" if spec.head in ("squashed_gaussian", "tanh") else "clip" if spec.action_low else "none"
+    for what, stated, chosen in (
+        ("activation", spec.activation, choices.activation),
+        ("squash", squash, choices.squash),
+        ("normaliser", NO_NORMALISER, choices.normaliser),
+    ):
+        if chosen and chosen != stated:
+            raise PolicyError(f"{path}: its {what} is '{stated}' and cannot be chosen, found '{chosen}'")
+
+
+def _find_statistics(path: Path, choices: ImportOptions, folders: Sequence[Path]) -> Path | None:
+    """The file that the choices name: from the working directory, a folder, or beside the weights."""
+    name = choices.normaliser
+    if not name or name == NO_NORMALISER:
+        return None
+    found = find_beside(name, (*folders, path.parent)) or find_beside(str(path.parent / Path(name).name), ())
+    if found is None:
+        raise PolicyError(f"{name}: no such file; expected the statistics of the observation for {path}")
+    return found
+
+
+def convert_policy(
+    path: Path, output: Path, choices: ImportOptions, spaces: WorldSpaces | None
+) -> NetworkSpec:
+    """Write somebody else's policy as safetensors that state everything, for the world of these spaces.
+
+    Returns:
+        What was written, without the weights.
+
+    Raises:
+        PolicyError: as `load_policy`; or the output exists already or cannot be written.
+    """
+    if output.exists():
+        raise PolicyError(f"{output}: exists already; a policy is converted into a new file")
+    network, _ = load_any_network(path, choices, spaces)
+    if spaces is not None:
+        network.spec = replace(network.spec, robot=spaces.owner)
+    try:
+        save_network(output, network)
+    except OSError as error:
+        raise PolicyError(f"{output}: cannot be written: {error.strerror}") from error
+    return network.spec

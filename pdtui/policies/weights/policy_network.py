@@ -1,0 +1,198 @@
+"""The network that pdtui trains and loads: a multilayer perceptron with a head that says how it acts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, Literal, get_args
+
+import torch
+from torch import nn
+
+from pdtui.core.errors import PolicyError
+
+ACTIVATIONS: dict[str, type[nn.Module]] = {
+    "tanh": nn.Tanh,
+    "relu": nn.ReLU,
+    "elu": nn.ELU,
+    "gelu": nn.GELU,
+    "silu": nn.SiLU,
+    "leaky_relu": nn.LeakyReLU,
+    "selu": nn.SELU,
+    "sigmoid": nn.Sigmoid,
+    "softplus": nn.Softplus,
+}
+MAX_WIDTH, MAX_LAYERS = 1 << 20, 100
+Head = Literal["squashed_gaussian", "tanh", "gaussian", "mean", "categorical"]
+LogStd = Literal["output", "parameter"]
+
+
+@dataclass(frozen=True)
+class NetworkSpec:
+    """Everything but the weights.
+
+    Attributes:
+        robot: the robot that the policy drives; empty for any whose shapes fit.
+        observations: length of the observation.
+        layers: widths of the hidden layers.
+        activation: one of `ACTIVATIONS`.
+        actions: length of the action; with ``categorical``, number of discrete actions.
+        head: ``squashed_gaussian`` is tanh of a Gaussian sample, rescaled to the bounds; ``gaussian`` is a
+            Gaussian sample, clipped to the bounds; ``tanh`` and ``mean`` are the same two without a
+            distribution; ``categorical`` chooses by logits, the action being the number of the choice.
+        action_low, action_high: bounds of each action; both empty where there are none.
+        command: command line that trained it, or where it came from.
+        score: what the training measured of it.
+        log_std: where a Gaussian's log standard deviation comes from: further outputs of the head, or
+            parameters that do not depend on the observation.
+        log_std_low, log_std_high: its range.
+        log_std_rule: how it is brought there: clipped, or by tanh.
+        mean_limit: the mean is clipped to ± this before tanh; 0 for no limit.
+        observation_clip: the normalised observation is clipped to ± this; 0 for no limit.
+    """
+
+    robot: str
+    observations: int
+    layers: tuple[int, ...]
+    activation: str
+    actions: int
+    head: Head
+    action_low: tuple[float, ...]
+    action_high: tuple[float, ...]
+    command: str = ""
+    score: dict[str, Any] = field(default_factory=dict)
+    log_std: LogStd = "output"
+    log_std_low: float = -5.0
+    log_std_high: float = 2.0
+    log_std_rule: Literal["clip", "tanh"] = "clip"
+    mean_limit: float = 0.0
+    observation_clip: float = 0.0
+
+    def __post_init__(self) -> None:
+        for what, value, known in (
+            ("activation function", self.activation, tuple(ACTIVATIONS)),
+            ("head", self.head, get_args(Head)),
+            ("source of the log standard deviation", self.log_std, get_args(LogStd)),
+            ("rule for the log standard deviation", self.log_std_rule, ("clip", "tanh")),
+        ):
+            if value not in known:
+                raise PolicyError(f"unknown {what} '{value}'; there are {', '.join(known)}")
+        squashed = self.head in ("squashed_gaussian", "tanh")
+        allowed = {0} if self.head == "categorical" else {self.actions} if squashed else {0, self.actions}
+        if len(self.action_low) not in allowed or len(self.action_high) != len(self.action_low):
+            raise PolicyError(
+                f"expected {max(allowed)} action bounds, "
+                f"got {len(self.action_low)} and {len(self.action_high)}"
+            )
+
+    def check_values(self) -> None:
+        """See that every field is what it is said to be; a file may say anything.
+
+        Raises:
+            PolicyError: one is not.
+        """
+        sizes = (self.observations, self.actions, *self.layers)
+        if not all(type(size) is int and 0 < size <= MAX_WIDTH for size in sizes):
+            raise PolicyError(f"expected sizes of 1 to {MAX_WIDTH}, found {str(sizes)[:80]}")
+        if not 0 < len(self.layers) <= MAX_LAYERS:
+            raise PolicyError(f"expected 1 to {MAX_LAYERS} hidden layers, found {len(self.layers)}")
+        limits = (self.log_std_low, self.log_std_high, self.mean_limit, self.observation_clip)
+        for value in (*limits, *self.action_low, *self.action_high):
+            if type(value) not in (int, float) or not -1e30 < value < 1e30:
+                raise PolicyError(f"expected bounds and limits that are numbers, found {str(value)[:40]}")
+        if not isinstance(self.robot, str) or not isinstance(self.command, str):
+            raise PolicyError("expected robot and command as text")
+        if not isinstance(self.score, dict):
+            raise PolicyError("expected a score by name")
+
+    @property
+    def gaussian(self) -> bool:
+        """Whether the action is drawn from a Gaussian."""
+        return self.head in ("squashed_gaussian", "gaussian")
+
+    @property
+    def action_size(self) -> int:
+        """Length of the action that the policy gives."""
+        return 1 if self.head == "categorical" else self.actions
+
+
+class Normaliser(nn.Module):
+    """``(observation − mean) / std``, clipped to ± `clip` unless that is 0."""
+
+    mean: torch.Tensor
+    std: torch.Tensor
+
+    def __init__(self, observations: int, clip: float = 0.0) -> None:
+        super().__init__()
+        self.clip = clip
+        self.register_buffer("mean", torch.zeros(observations))
+        self.register_buffer("std", torch.ones(observations))
+
+    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        x = (observation - self.mean) / self.std
+        return x.clamp(-self.clip, self.clip) if self.clip else x
+
+
+class PolicyNetwork(nn.Module):
+    """observation → normaliser → (linear → activation) × L → head.
+
+    The normaliser is skipped unless the weights bring one. `log_std`, shape (actions,), is there where the
+    specification says that it is a parameter.
+    """
+
+    log_std: torch.Tensor
+
+    def __init__(self, spec: NetworkSpec) -> None:
+        super().__init__()
+        self.spec = spec
+        self.normaliser = Normaliser(spec.observations, spec.observation_clip)
+        widths = [spec.observations, *spec.layers]
+        self.hidden = nn.ModuleList(nn.Linear(a, b) for a, b in pairwise(widths))
+        self.activations = nn.ModuleList(ACTIVATIONS[spec.activation]() for _ in spec.layers)
+        wide = spec.gaussian and spec.log_std == "output"
+        self.head = nn.Linear(widths[-1], spec.actions * (2 if wide else 1))
+        if spec.gaussian and spec.log_std == "parameter":
+            self.register_buffer("log_std", torch.zeros(spec.actions))
+        self.normalises = False
+
+    def load_tensors(self, tensors: dict[str, torch.Tensor]) -> None:
+        """Take weights by name.
+
+        Raises:
+            PolicyError: a tensor is missing, superfluous, of another shape or not finite.
+        """
+        check_tensors(self.state_dict(), tensors)
+        for name, tensor in tensors.items():
+            if not bool(torch.isfinite(tensor).all()):
+                raise PolicyError(f"tensor '{name}': expected finite numbers, found NaN or infinity")
+        self.load_state_dict(tensors)
+        mean, std = self.normaliser.mean, self.normaliser.std
+        moved = bool((mean != 0).any() or (std != 1).any())
+        self.normalises = moved or self.normaliser.clip > 0
+
+    def stages(self) -> list[nn.Module]:
+        """The submodules in the order in which `forward` calls them."""
+        pairs = zip(self.hidden, self.activations, strict=True)
+        first: list[nn.Module] = [self.normaliser] if self.normalises else []
+        return [*first, *(stage for pair in pairs for stage in pair), self.head]
+
+    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        """Head output for observations of shape (..., observations)."""
+        x = observation
+        for stage in self.stages():
+            x = stage(x)
+        return x
+
+
+def check_tensors(expected: Mapping[str, torch.Tensor], found: Mapping[str, torch.Tensor]) -> None:
+    """See that tensors have the names and shapes of others, whose numbers are not looked at.
+
+    Raises:
+        PolicyError: a tensor is missing, superfluous, or of another shape.
+    """
+    shapes, others = ({name: tuple(one.shape) for name, one in all.items()} for all in (expected, found))
+    for name in sorted(shapes.keys() | others.keys()):
+        if shapes.get(name) != others.get(name):
+            wanted, there = (all.get(name, "none") for all in (shapes, others))
+            raise PolicyError(f"tensor '{name}': expected shape {wanted}, found {there}")

@@ -1,0 +1,54 @@
+"""A policy from a TorchScript file and the world that it is to act in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from pdtui.core.errors import PolicyError
+from pdtui.policies.runtime.action_decoders import categorical
+from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.torchscript import read_torchscript
+from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, WorldSpaces
+from pdtui.policies.weights.weights_file import hash_file
+
+
+def load_torchscript_policy(
+    path: Path, spaces: WorldSpaces | None, choices: ImportOptions = NO_OPTIONS
+) -> Policy:
+    """The network of a TorchScript file, whose output is the action, or the logits of discrete actions.
+
+    It is tried without a batch axis and then with one. A network with a hidden state says nowhere what the
+    state begins with: `pdtui.load_policy` takes that from Python.
+
+    Raises:
+        PolicyError: it cannot be read, does not take the world's observations or give its actions, or
+            choices are given, which a file that states its whole computation does not leave open.
+    """
+    if spaces is None:
+        raise PolicyError(f"{path}: TorchScript says no shapes; expected the robot that it is for")
+    if choices != NO_OPTIONS:
+        raise PolicyError(f"{path}: TorchScript states its whole computation; expected no choices")
+    module, digest = read_torchscript(path), hash_file(path)
+    torch.set_num_threads(1)
+    shape = spaces.shape or (spaces.observations,)
+    problems: list[str] = []
+    for batched in (False, True):
+        try:
+            policy = Policy(module, shape, batched=batched, name=path.stem, sha256=digest)
+        except PolicyError as error:
+            problems.append(str(error))
+            continue
+        found = policy.act(np.zeros(shape)).action.size
+        if found != (spaces.choices or spaces.actions):
+            problems.append(
+                f"{path}: expected {spaces.choices or spaces.actions} outputs for '{spaces.owner}', "
+                f"the network gives {found}"
+            )
+        elif spaces.choices:
+            return Policy(module, shape, batched=batched, decode=categorical, name=path.stem, sha256=digest)
+        else:
+            return policy
+    raise PolicyError(problems[-1])

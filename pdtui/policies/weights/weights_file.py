@@ -1,0 +1,118 @@
+"""Weights on disk: safetensors, with metadata that makes them whole. Nothing is ever unpickled."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from hashlib import file_digest
+from os import fstat
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+
+from pdtui.core.bounded_read import open_regular
+from pdtui.core.errors import PolicyError
+from pdtui.policies.weights.file_search import find_beside
+from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork, check_tensors
+
+WEIGHTS = Path(__file__).parent / "shipped"
+MAX_BYTES = 1 << 30
+"""Of a file of weights."""
+_KEY = "pdtui"
+
+
+def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
+    """Path of a weights file: as given, from one of the folders, or a shipped one by its name.
+
+    Raises:
+        PolicyError: there is none; the message lists the shipped ones.
+    """
+    own = find_beside(name, folders)
+    if own is not None:
+        return own
+    if (shipped := WEIGHTS / f"{name}.safetensors").is_file():
+        return shipped
+    known = ", ".join(sorted(path.stem for path in WEIGHTS.glob("*.safetensors"))) or "none"
+    raise PolicyError(f"no policy '{name}': neither a file nor a shipped policy; shipped are: {known}")
+
+
+def is_own_format(path: Path) -> bool:
+    """Whether `save_network` wrote the file: safetensors with metadata of ours."""
+    try:
+        with open_regular(path):
+            pass  # no pipe is waited for
+        with safe_open(str(path), framework="pt") as handle:
+            return _KEY in (handle.metadata() or {})
+    except (OSError, SafetensorError):
+        return False
+
+
+def hash_file(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal.
+
+    Raises:
+        PolicyError: the file cannot be read.
+    """
+    try:
+        with open_regular(path) as file:
+            return file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise PolicyError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def save_network(path: Path, network: PolicyNetwork) -> None:
+    """Write weights and metadata, float32, replacing the file in one step."""
+    tensors = {name: tensor.detach().float().contiguous() for name, tensor in network.state_dict().items()}
+    payload = save(tensors, metadata={_KEY: json.dumps(asdict(network.spec), sort_keys=True)})
+    partial = path.with_name(path.name + ".part")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial.write_bytes(payload)
+    partial.replace(path)
+
+
+def load_network(path: Path) -> PolicyNetwork:
+    """Read weights that `save_network` wrote.
+
+    Raises:
+        PolicyError: not a safetensors file, no metadata of ours, or tensors that do not fit it.
+    """
+    metadata, tensors = _read(path)
+    if _KEY not in metadata:
+        found = ", ".join(sorted(tensors)[:6])
+        raise PolicyError(f"{path}: expected metadata '{_KEY}' in the file; it holds tensors {found}")
+    try:
+        fields: dict[str, Any] = json.loads(metadata[_KEY])
+        for name in ("layers", "action_low", "action_high"):
+            fields[name] = tuple(fields[name])
+        spec = NetworkSpec(**fields)
+        # Before anything of the sizes that it names is made.
+        spec.check_values()
+        with torch.device("meta"):
+            expected = PolicyNetwork(spec).state_dict()
+        check_tensors(expected, tensors)
+        network = PolicyNetwork(spec)
+        network.load_tensors(tensors)
+    except PolicyError as error:
+        raise PolicyError(f"{path}: {error}") from error
+    except (TypeError, KeyError, ValueError, RuntimeError, RecursionError) as error:
+        raise PolicyError(f"{path}: metadata '{_KEY}' is not complete: {error}") from error
+    return network.eval()
+
+
+def _read(path: Path) -> tuple[dict[str, str], dict[str, torch.Tensor]]:
+    try:
+        with open_regular(path) as file:
+            size = fstat(file.fileno()).st_size
+        if size > MAX_BYTES:
+            raise PolicyError(
+                f"{path}: expected weights of at most {MAX_BYTES >> 20} MiB, found {size >> 20} MiB"
+            )
+        with safe_open(str(path), framework="pt") as handle:
+            metadata: dict[str, str] = handle.metadata() or {}
+            return metadata, {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118
+    except (OSError, SafetensorError, RuntimeError, TypeError, ValueError) as error:
+        raise PolicyError(f"{path}: expected a safetensors file: {error}") from error

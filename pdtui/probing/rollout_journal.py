@@ -1,0 +1,108 @@
+"""Roll-outs that were done, on disk: an interrupted dissection goes on where it was, without loss."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Sequence
+from hashlib import blake2b
+from pathlib import Path
+
+import numpy as np
+
+from pdtui.core.closable import Closable
+from pdtui.core.errors import PdtuiError, RobotError
+from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome
+from pdtui.spectra.monitor import StartState
+
+_SCHEMA = "CREATE TABLE IF NOT EXISTS rollouts (key BLOB PRIMARY KEY, outcome BLOB NOT NULL) WITHOUT ROWID"
+
+
+class RolloutJournal(Closable):
+    """Outcomes by what determines them: policy, robot, start, plan and length.
+
+    A roll-out is a function of those, so one that is known need not be run again: a dissection that is run
+    again with the same arguments takes the same decisions and soon stands where it was killed.
+
+    Args:
+        path: SQLite database; made if it does not exist.
+        identity: what all roll-outs share, such as robot and hash of the policy.
+
+    Raises:
+        RobotError: the file is no journal, or cannot be written.
+    """
+
+    def __init__(self, path: Path, identity: str) -> None:
+        self.path = path
+        self._identity = identity.encode()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._database = sqlite3.connect(path)
+            self._database.execute(_SCHEMA)
+            self._database.execute("PRAGMA synchronous=OFF")
+        except (sqlite3.Error, OSError) as error:
+            raise RobotError(
+                f"{path}: expected a journal of roll-outs, or a place for one: {error}"
+            ) from error
+
+    def __len__(self) -> int:
+        return int(self._database.execute("SELECT count(*) FROM rollouts").fetchone()[0])
+
+    def close(self) -> None:
+        """Leave the file as it is."""
+        self._database.close()
+
+    def remove(self) -> None:
+        """Close and delete the file: the work is finished."""
+        self.close()
+        self.path.unlink(missing_ok=True)
+
+    def keys(
+        self, jobs: Sequence[RolloutJob], starts: Sequence[StartState], steps: int, measure_from: int
+    ) -> list[bytes]:
+        """One key a job."""
+        prints = [state_fingerprint(start) for start in starts]
+        length = f"{steps} {measure_from}".encode()
+        return [
+            blake2b(
+                b"\0".join((self._identity, prints[index], repr(plan).encode(), length)), digest_size=16
+            ).digest()
+            for plan, index in jobs
+        ]
+
+    def read(self, keys: Sequence[bytes]) -> list[RolloutOutcome | None]:
+        """What is known, in the order of the keys."""
+        found: list[RolloutOutcome | None] = []
+        for key in keys:
+            row = self._database.execute("SELECT outcome FROM rollouts WHERE key = ?", (key,)).fetchone()
+            found.append(None if row is None else _decode(row[0]))
+        return found
+
+    def write(self, keys: Sequence[bytes], outcomes: Sequence[RolloutOutcome]) -> None:
+        """Remember outcomes; they are on disk when this returns.
+
+        Raises:
+            PdtuiError: the disk is full or the file is gone.
+        """
+        rows = [(key, _encode(outcome)) for key, outcome in zip(keys, outcomes, strict=True)]
+        try:
+            with self._database:
+                self._database.executemany("INSERT OR REPLACE INTO rollouts VALUES (?, ?)", rows)
+        except sqlite3.Error as error:
+            raise PdtuiError(f"{self.path}: cannot be written: {error}") from error
+
+
+def state_fingerprint(start: StartState) -> bytes:
+    """Hash of the state that a roll-out begins with."""
+    digest = blake2b(start.snapshot.state.tobytes(), digest_size=16)
+    for array in (*start.snapshot.extras, *start.policy_state):
+        digest.update(array.tobytes())
+    return digest.digest()
+
+
+def _encode(outcome: RolloutOutcome) -> bytes:
+    return np.array([outcome.error, outcome.lived, outcome.fell, *outcome.means], "<f8").tobytes()
+
+
+def _decode(row: bytes) -> RolloutOutcome:
+    error, lived, fell, *means = np.frombuffer(row, "<f8").tolist()
+    return RolloutOutcome(np.array(means), error, int(lived), bool(fell))

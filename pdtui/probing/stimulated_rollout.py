@@ -1,0 +1,125 @@
+"""One stimulated roll-out from a snapshot: what a worker process does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from pdtui.core.angles import wrap_angle
+from pdtui.core.attributes import Floats
+from pdtui.core.errors import SimulationDiverged
+from pdtui.core.units import NO_STIMULATION, Stimulation
+from pdtui.policies.runtime.policy import Policy
+from pdtui.robots.robot import Robot
+from pdtui.spectra.monitor import StartState
+from pdtui.stimulation.pid_magnitude import PidMagnitude
+from pdtui.stimulation.stimulation_map import PidGains
+
+
+@dataclass(frozen=True)
+class ControllerPlan:
+    """A stimulation whose strength a controller sets at each control step.
+
+    Attributes:
+        units: what to overwrite, and with how much for each unit of the controller's output.
+        pid: the controller and the attribute that it holds.
+        target: where, in the attribute's unit.
+        relative: whether the target counts from the attribute's value at the start.
+        base: outputs at which the controller's output is 0, in the order of `units`; empty for zeros.
+    """
+
+    units: Stimulation
+    pid: PidGains
+    target: float
+    relative: bool
+    base: tuple[float, ...] = ()
+
+
+RolloutPlan = Stimulation | ControllerPlan
+RolloutJob = tuple[RolloutPlan, int]
+"""A plan, and the number of the start that it begins from."""
+
+
+class RolloutOutcome(NamedTuple):
+    """What one roll-out shows.
+
+    Attributes:
+        means: mean of each attribute over the measured steps that the robot lived through, shape (J,); for
+            an angle the mean change since the start, unwrapped. NaN where it fell before them.
+        error: mean distance from the target over the measured steps, NaN for a fixed stimulation.
+        lived: control steps until the robot fell, or all of them.
+        fell: whether it fell, or the simulation diverged.
+    """
+
+    means: Floats
+    error: float
+    lived: int
+    fell: bool
+
+
+def roll_out(
+    robot: Robot, policy: Policy, start: StartState, plan: RolloutPlan, steps: int, measure_from: int
+) -> RolloutOutcome:
+    """Stimulate from a snapshot on, and measure the later part.
+
+    Args:
+        robot: the world; its state and the policy's are replaced by the start's, bit-exactly.
+        policy: acts with its mean action.
+        start: where to begin.
+        plan: what to overwrite.
+        steps: control steps.
+        measure_from: first step that counts.
+    """
+    robot.restore(start.snapshot)
+    policy.restore(start.policy_state)
+    observation, before = robot.observe(), robot.read_attributes()
+    angles = np.array([attribute.wraps for attribute in robot.attributes])
+    turned = np.zeros(len(angles))
+    total, counted, errors, lived, fell = np.zeros(len(angles)), 0, 0.0, 0, False
+    controller = _Controller(plan, robot, before) if isinstance(plan, ControllerPlan) else None
+    values = before
+    for step in range(steps):
+        stimulation = plan if isinstance(plan, Stimulation) else NO_STIMULATION
+        if controller is not None:
+            stimulation = controller.stimulate(values)
+        try:
+            observation, _, fell, _, _ = robot.step(policy.act(observation, stimulation).action)
+        except SimulationDiverged:
+            fell = True
+            break
+        values, previous = robot.read_attributes(), values
+        lived += 1
+        change = values - previous
+        turned[angles] += (change[angles] + np.pi) % (2 * np.pi) - np.pi
+        if step >= measure_from:
+            total += np.where(angles, turned, values)
+            counted += 1
+            errors += controller.distance(values) if controller is not None else 0.0
+        if fell:
+            break
+    means = total / counted if counted else np.full(len(angles), np.nan)
+    error = errors / counted if counted and controller is not None else float("nan")
+    return RolloutOutcome(means, error, lived, bool(fell))
+
+
+class _Controller:
+    def __init__(self, plan: ControllerPlan, robot: Robot, values: Floats) -> None:
+        self._column = robot.attribute_index(plan.pid.attribute)
+        self._wraps = robot.attributes[self._column].wraps
+        self._units = plan.units
+        self._base = plan.base or (0.0,) * len(plan.units.units)
+        self._pid = PidMagnitude(plan.pid, self._wraps, robot.control_dt)
+        value = float(values[self._column])
+        self._pid.start(value)
+        self._pid.set_target(value + plan.target if plan.relative else plan.target)
+
+    def stimulate(self, values: Floats) -> Stimulation:
+        output = self._pid.update(float(values[self._column]))
+        pairs = zip(self._base, self._units.values, strict=True)
+        return Stimulation(self._units.units, tuple(base + weight * output for base, weight in pairs))
+
+    def distance(self, values: Floats) -> float:
+        error = self._pid.target - float(values[self._column])
+        return abs(wrap_angle(error) if self._wraps else error)

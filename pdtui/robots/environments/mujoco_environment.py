@@ -1,0 +1,107 @@
+"""Any Gymnasium environment on MuJoCo: attributes, links, poses and snapshots come from its model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.robots.environments.environment_robot import EnvironmentRobot
+from pdtui.robots.simulators.mujoco_attributes import model_attributes
+from pdtui.robots.simulators.mujoco_robot import (
+    check_finite,
+    digest_state,
+    links_of,
+    poses_of,
+    set_state,
+    state_of,
+)
+
+REWARD = Attribute("reward", "")
+
+
+def is_mujoco(env: gymnasium.Env[Any, Any]) -> bool:
+    """Whether an environment shows its MuJoCo model and data, as Gymnasium's `MujocoEnv` does."""
+    world: Any = env.unwrapped
+    return isinstance(getattr(world, "model", None), mujoco.MjModel) and isinstance(
+        getattr(world, "data", None), mujoco.MjData
+    )
+
+
+class MujocoEnvironmentRobot(EnvironmentRobot):
+    """An environment whose ``unwrapped`` has ``model`` and ``data`` of MuJoCo.
+
+    The last attribute is the environment's reward. A snapshot holds what the next physics step reads, the
+    quantities that MuJoCo derived in the last one (observations and rewards read them as they are, a physics
+    step old), and the Python side. Contacts are computed anew by a restore.
+    """
+
+    def __init__(self, name: str, title: str = "", environment: str = "") -> None:
+        super().__init__(name, title, environment)
+        model = self.world.model
+        self._measured = model_attributes(model)
+        self.attributes = (*(one.attribute for one in self._measured), REWARD)
+        self.links = links_of(model)
+        fresh = mujoco.MjData(model)
+        self._derived = tuple(name for name in dir(fresh) if _is_derived(getattr(fresh, name)))
+        self._posed = fresh
+
+    @property
+    def control_dt(self) -> float:
+        world: Any = self.world
+        dt = getattr(world, "dt", None)
+        if isinstance(dt, float):
+            return dt
+        return float(world.model.opt.timestep) * int(getattr(world, "frame_skip", 1))
+
+    def read_attributes(self) -> Floats:
+        data = self.world.data
+        return np.array([*(one.read(data) for one in self._measured), self.reward], np.float64)
+
+    def read_poses(self) -> Floats:
+        # On other data: environments take velocities from poses a physics step old, which must stay so.
+        world, posed = self.world, self._posed
+        posed.qpos[:], posed.mocap_pos[:] = world.data.qpos, world.data.mocap_pos
+        posed.mocap_quat[:] = world.data.mocap_quat
+        mujoco.mj_kinematics(world.model, posed)
+        return poses_of(posed)
+
+    def digest(self) -> int:
+        if self._repeats:
+            return super().digest()
+        return digest_state(state_of(self.world.model, self.world.data))
+
+    def _restored_apart(self) -> tuple[type, ...]:
+        return (mujoco.MjModel, mujoco.MjData, _renderer_type())
+
+    def _simulator_state(self) -> tuple[Floats, tuple[Floats, ...]]:
+        data = self.world.data
+        derived = np.concatenate([getattr(data, name).ravel() for name in self._derived])
+        return state_of(self.world.model, data), (derived,)
+
+    def _set_simulator_state(self, state: Floats, extras: tuple[Floats, ...]) -> None:
+        data = self.world.data
+        set_state(self.world.model, data, state, self.name)
+        done = 0
+        for name in self._derived:
+            values = getattr(data, name)
+            values[...] = extras[0][done : done + values.size].reshape(values.shape)
+            done += values.size
+
+    def _check_finite(self) -> None:
+        check_finite(self.world.data, self.name)
+        super()._check_finite()
+
+
+def _is_derived(values: object) -> bool:
+    """Whether a field of fresh data has a fixed count of numbers; those of contacts have none."""
+    return isinstance(values, np.ndarray) and values.dtype == np.float64 and values.size > 0
+
+
+def _renderer_type() -> type:
+    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
+
+    return MujocoRenderer

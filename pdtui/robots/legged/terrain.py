@@ -1,0 +1,75 @@
+"""Uneven ground and trees, drawn from a random generator; no simulator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.core.attributes import Floats
+
+CELL = 0.25
+"""Distance between two heights, m."""
+AHEAD = 60.0
+"""How far rough ground and forest reach along x, m."""
+_BEHIND, _BESIDE = 4.0, 10.0
+_CLEARING = 0.75
+_TRUNKS = (0.15, 0.35)
+_GAP = 0.9
+_FIRST_TREE = 2.5
+_TRIES = 30
+
+
+@dataclass(frozen=True)
+class RoughGround:
+    """Heights on a grid around the start, at (0, 0); the grid's edges are level with the plane around it.
+
+    Attributes:
+        heights: m, shape (X, Y), `CELL` apart.
+        corner: x and y of the first height, m.
+    """
+
+    heights: Floats
+    corner: tuple[float, float]
+
+    def height(self, x: float, y: float) -> float:
+        """Of the ground at a place, between the heights around it; 0 outside the grid, m."""
+        column, row = (x - self.corner[0]) / CELL, (y - self.corner[1]) / CELL
+        i, j = int(np.floor(column)), int(np.floor(row))
+        if not (0 <= i < self.heights.shape[0] - 1 and 0 <= j < self.heights.shape[1] - 1):
+            return 0.0
+        u, v = column - i, row - j
+        (a, b), (c, d) = self.heights[i : i + 2, j : j + 2].tolist()
+        return float((1 - u) * ((1 - v) * a + v * b) + u * ((1 - v) * c + v * d))
+
+
+def rough_ground(rng: np.random.Generator, roughness: float) -> RoughGround:
+    """Heights uniform between 0 and `roughness` m, on 64 × 20 m; level where the robot starts."""
+    x = np.arange(-_BEHIND, AHEAD + CELL / 2, CELL)
+    y = np.arange(-_BESIDE, _BESIDE + CELL / 2, CELL)
+    heights = rng.uniform(0.0, roughness, (len(x), len(y)))
+    heights[np.hypot(x[:, None], y[None, :]) < _CLEARING] = 0.0
+    heights[[0, -1], :] = heights[:, [0, -1]] = 0.0
+    return RoughGround(heights, (-_BEHIND, -_BESIDE))
+
+
+def scatter_trees(rng: np.random.Generator, density: float) -> Floats:
+    """Trees on the rough ground from 2.5 m ahead of the start on, with at least 0.9 m between any two.
+
+    Args:
+        rng: draws them.
+        density: trees a square metre, as far as there is room.
+
+    Returns:
+        x, y and radius of each, m, shape (N, 3), sorted by x.
+    """
+    low, high = np.array([_FIRST_TREE, -_BESIDE + 1.0]), np.array([AHEAD - 1.0, _BESIDE - 1.0])
+    wanted = round(density * float(np.prod(high - low)))
+    trees = np.empty((0, 3))
+    for _ in range(_TRIES * wanted):
+        if len(trees) == wanted:
+            break
+        place, radius = rng.uniform(low, high), rng.uniform(*_TRUNKS)
+        if (np.hypot(*(trees[:, :2] - place).T) - trees[:, 2] - radius >= _GAP).all():
+            trees = np.vstack([trees, [*place, radius]])
+    return trees[np.argsort(trees[:, 0])]

@@ -1,0 +1,79 @@
+"""One run of a task: walk, stimulate for a while, watch, judge."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.core.attributes import Floats, unwrap_angles
+from pdtui.core.errors import SimulationDiverged
+from pdtui.core.units import NO_STIMULATION, Stimulation
+from pdtui.policies.runtime.policy import Policy
+from pdtui.robots.robot import Robot
+from pdtui.robots.tasks.task import RunTrace, Task, TaskVerdict
+
+
+@dataclass(frozen=True)
+class TimedStimulation:
+    """A stimulation that lasts.
+
+    Attributes:
+        stimulation: what to overwrite.
+        steps: for how many control steps; None for all.
+    """
+
+    stimulation: Stimulation = NO_STIMULATION
+    steps: int | None = None
+
+
+def walk_steps(task: Task, seed: int) -> int:
+    """Control steps that a run of this seed walks before the behavior."""
+    low, high = task.walk
+    return int(np.random.default_rng(seed).integers(low, high + 1))
+
+
+def judge_stimulations(
+    robot: Robot, policy: Policy, task: Task, bursts: Sequence[TimedStimulation], seed: int
+) -> list[TaskVerdict]:
+    """Judge each burst from the same walk.
+
+    The walk is unstimulated; where it falls before its end, no burst has done its task.
+    """
+    options = {"start": task.start} if task.start else None
+    observation, _ = robot.reset(seed=seed, options=options)
+    policy.reset()
+    walked = [robot.read_attributes()]
+    for _ in range(walk_steps(task, seed)):
+        observation, _, fell, _, _ = robot.step(policy.act(observation).action)
+        walked.append(robot.read_attributes())
+        if fell:
+            return [TaskVerdict(False, 0.0, {}) for _ in bursts]
+    start, state = robot.snapshot(), policy.snapshot()
+    verdicts = []
+    for burst in bursts:
+        robot.restore(start)
+        policy.restore(state)
+        verdicts.append(task.judge(_watch(robot, policy, task, burst, walked)))
+    return verdicts
+
+
+def _watch(
+    robot: Robot, policy: Policy, task: Task, burst: TimedStimulation, walked: list[Floats]
+) -> RunTrace:
+    observation, fell = robot.observe(), False
+    values: list[Floats] = []
+    for step in range(task.steps):
+        on = burst.steps is None or step < burst.steps
+        acted = policy.act(observation, burst.stimulation if on else NO_STIMULATION)
+        try:
+            observation, _, fell, _, _ = robot.step(acted.action)
+        except SimulationDiverged:
+            fell = True
+            break
+        values.append(robot.read_attributes())
+        if fell:
+            break
+    rows = np.array(values).reshape(-1, len(robot.attributes))
+    return RunTrace(robot.attributes, np.array(walked), unwrap_angles(rows, robot.attributes), bool(fell))

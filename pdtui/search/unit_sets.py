@@ -1,0 +1,73 @@
+"""Sets of units that are probed once and shared by all searches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pdtui.core.units import Stimulation
+from pdtui.probing.effect_probe import EffectProber
+from pdtui.search.behavior_goals import BehaviorGoal, goal_scores
+from pdtui.search.search_settings import BehaviorSearchSettings
+from pdtui.search.stimulation_candidates import CandidateSampler
+from pdtui.spectra.monitor import StartState, StepProgress
+
+
+class UnitSetPool:
+    """Sets of units, probed once for all goals: where searches begin when no single unit leads the way.
+
+    Args:
+        prober: measures.
+        plans: what to probe.
+        starts: a few of the search starts.
+        steps: control steps of each roll-out.
+        progress: called with (roll-outs done, roll-outs).
+    """
+
+    def __init__(
+        self,
+        prober: EffectProber,
+        plans: Sequence[Stimulation],
+        starts: Sequence[StartState],
+        steps: int,
+        progress: StepProgress | None = None,
+    ) -> None:
+        self.plans = tuple(plans)
+        self.effects = prober.probe(
+            self.plans, starts, steps=steps, measure_from=steps // 3, progress=progress
+        )
+
+    def best(self, goal: BehaviorGoal, column: int, count: int, most: int) -> list[Stimulation]:
+        """Those of at most so many units that went the goal's way furthest."""
+        if not self.plans:
+            return []
+        scored = goal_scores(goal, column, self.effects, [len(plan.units) for plan in self.plans])
+        order = [int(index) for index in np.argsort(-scored, kind="stable")]
+        return [self.plans[index] for index in order if len(self.plans[index].units) <= most][:count]
+
+    def opposites(self, column: int, count: int) -> list[tuple[Stimulation, Stimulation]]:
+        """Pairs of plans on the same units that raise and lower an attribute, the strongest pairs first.
+
+        A pair is as strong as its weaker side; plans that fell are left out.
+        """
+        effect = np.nan_to_num(self.effects.effects[..., column]).mean(axis=1)
+        effect[self.effects.falls.any(axis=1)] = 0.0
+        same: dict[tuple[int, ...], list[int]] = {}
+        for index, plan in enumerate(self.plans):
+            same.setdefault(plan.units, []).append(index)
+        pairs = []
+        for indices in same.values():
+            high, low = max(indices, key=lambda i: effect[i]), min(indices, key=lambda i: effect[i])
+            strength = min(float(effect[high]), -float(effect[low]))
+            if strength > 0:
+                pairs.append((strength, self.plans[high], self.plans[low]))
+        pairs.sort(key=lambda pair: (-pair[0], pair[1].units))
+        return [(high, low) for _, high, low in pairs[:count]]
+
+
+def draw_unit_sets(units: int, sizes: BehaviorSearchSettings, seed: int) -> list[Stimulation]:
+    """Pairs and triples of units, drawn at random."""
+    source = CandidateSampler(np.ones(units), sizes.bounds, seed)
+    most = min(3, units)
+    return [source.draw(int(source.rng.integers(min(2, most), most + 1))) for _ in range(sizes.pool)]

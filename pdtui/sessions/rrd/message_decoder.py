@@ -1,0 +1,94 @@
+"""The messages of an .rrd, decoded here and not by Rerun's library, which damaged ones make abort."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pyarrow as pa
+
+from pdtui.sessions.rrd import protobuf
+from pdtui.sessions.rrd.arrow_checks import read_batch
+
+MAX_MESSAGE = 256 << 20
+"""Bytes of one message, packed or not. A batch of 1000 steps of 4096 units has 16 MB."""
+
+_LZ4_RATIO = 255  # no LZ4 block grows more than by this
+_PLAIN, _LZ4 = (0, 1), 2
+_ARROW_IPC = 1
+_PATH, _KIND, _INDEX = b"rerun:entity_path", b"rerun:kind", b"index"
+
+
+@dataclass(frozen=True)
+class StoreInfo:
+    """What a message belongs to.
+
+    Attributes:
+        drive: whether it is a recording; a layout is kept apart from what it lays out.
+        recording_id, application_id: of it.
+    """
+
+    drive: bool
+    recording_id: str
+    application_id: str
+
+
+@dataclass(frozen=True)
+class RowChunk:
+    """Some rows of one entity.
+
+    Attributes:
+        entity: its path.
+        timelines: names of the batch's columns that say when; none for what holds all the time.
+        batch: the rows.
+    """
+
+    entity: str
+    timelines: tuple[str, ...]
+    batch: pa.RecordBatch
+
+
+def read_store(payload: memoryview) -> StoreInfo:
+    """The store that a message announces.
+
+    Raises:
+        ValueError: the message is damaged.
+    """
+    return _store(
+        protobuf.bytes_field(protobuf.read_fields(protobuf.bytes_field(protobuf.read_fields(payload), 2)), 2)
+    )
+
+
+def read_chunk(payload: memoryview) -> tuple[StoreInfo, RowChunk]:
+    """Decode a message that holds rows.
+
+    Raises:
+        ValueError, pyarrow.ArrowException: the message is damaged, or would unpack to more than is bearable.
+    """
+    message = protobuf.read_fields(payload)
+    store = _store(protobuf.bytes_field(message, 1))
+    if protobuf.number_field(message, 4) != _ARROW_IPC:
+        raise ValueError("expected rows in Arrow's format")
+    batch = read_batch(_unpacked(message))
+    metadata = batch.schema.metadata or {}
+    if _PATH not in metadata:
+        raise ValueError("rows of no entity")
+    timelines = tuple(field.name for field in batch.schema if (field.metadata or {}).get(_KIND) == _INDEX)
+    return store, RowChunk(metadata[_PATH].decode(), timelines, batch)
+
+
+def _store(message: memoryview) -> StoreInfo:
+    found = protobuf.read_fields(message)
+    application = protobuf.text_field(protobuf.read_fields(protobuf.bytes_field(found, 3)), 1)
+    return StoreInfo(protobuf.number_field(found, 1) == 1, protobuf.text_field(found, 2), application)
+
+
+def _unpacked(message: dict[int, protobuf.Value]) -> pa.Buffer:
+    packed, compression = protobuf.bytes_field(message, 5), protobuf.number_field(message, 2)
+    if compression in _PLAIN:
+        return pa.py_buffer(bytes(packed))
+    if compression != _LZ4:
+        raise ValueError(f"unknown compression {compression}")
+    size = protobuf.number_field(message, 3)
+    if size > min(MAX_MESSAGE, _LZ4_RATIO * len(packed)):
+        raise ValueError(f"{len(packed)} bytes cannot unpack to {size}, or must not")
+    return pa.decompress(packed, size, codec="lz4_raw")

@@ -1,0 +1,82 @@
+"""Protobuf's wire format, as far as the envelope of a recording's messages needs it."""
+
+from __future__ import annotations
+
+_VARINT, _EIGHT, _BYTES, _FOUR = 0, 1, 2, 5
+_VARINT_BYTES = 10
+Value = int | memoryview
+
+
+def read_fields(message: memoryview) -> dict[int, Value]:
+    """The fields of a message by their numbers; of one that is repeated, the last.
+
+    Numbers are given as they are, everything else as the bytes that it has.
+
+    Raises:
+        ValueError: the bytes are no such message.
+    """
+    found: dict[int, Value] = {}
+    place = 0
+    while place < len(message):
+        tag, place = _varint(message, place)
+        kind = tag & 7
+        if kind == _VARINT:
+            found[tag >> 3], place = _varint(message, place)
+            continue
+        if kind == _BYTES:
+            length, place = _varint(message, place)
+        elif kind in (_EIGHT, _FOUR):
+            length = 8 if kind == _EIGHT else 4
+        else:
+            raise ValueError(f"unknown wire type {kind}")
+        if place + length > len(message):
+            raise ValueError(f"a field of {length} bytes, {len(message) - place} are left")
+        found[tag >> 3] = message[place : place + length]
+        place += length
+    return found
+
+
+def number_field(found: dict[int, Value], field: int) -> int:
+    """A field that is a number; 0 where it is missing, as the format wants it.
+
+    Raises:
+        ValueError: it is none.
+    """
+    value = found.get(field, 0)
+    if not isinstance(value, int):
+        raise ValueError(f"field {field} is no number")
+    return value
+
+
+def bytes_field(found: dict[int, Value], field: int) -> memoryview:
+    """A field that is bytes, a text or a message; empty where it is missing.
+
+    Raises:
+        ValueError: it is none.
+    """
+    value = found.get(field, memoryview(b""))
+    if isinstance(value, int):
+        raise ValueError(f"field {field} is a number")
+    return value
+
+
+def text_field(found: dict[int, Value], field: int) -> str:
+    """A field that is a text.
+
+    Raises:
+        ValueError: it is none.
+    """
+    return str(bytes_field(found, field), "utf-8")
+
+
+def _varint(message: memoryview, place: int) -> tuple[int, int]:
+    value = 0
+    for shift in range(_VARINT_BYTES):
+        if place >= len(message):
+            raise ValueError("a number is cut")
+        byte = message[place]
+        place += 1
+        value |= (byte & 0x7F) << (7 * shift)
+        if byte < 0x80:
+            return value, place
+    raise ValueError("a number is too long")

@@ -1,0 +1,132 @@
+"""Streams of a session as Parquet or CSV tables, one row a step, a behavior, a unit or an event."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+
+from pdtui.core.errors import SessionError
+from pdtui.core.units import format_unit
+from pdtui.sessions.schema import ACTIVE_FIELDS
+from pdtui.sessions.session_reader import Session, read_activations, read_session
+
+Columns = dict[str, Any]
+_WRITERS: dict[str, Callable[[pa.Table, str], None]] = {
+    ".parquet": pyarrow.parquet.write_table,
+    ".csv": pyarrow.csv.write_csv,
+}
+
+
+def export_stream(path: Path, stream: str, output: Path, *, overwrite: bool = False) -> int:
+    """Write one stream of a session as a table; its columns are ``step``, ``time`` (s) and the stream's own.
+
+    Args:
+        path: the session.
+        stream: one of `STREAMS`.
+        output: a .parquet or .csv file.
+        overwrite: replace it if it exists.
+
+    Returns:
+        The number of rows.
+
+    Raises:
+        SessionError: the session cannot be read, there is no such stream, or the output cannot be written.
+    """
+    if stream not in STREAMS:
+        raise SessionError(f"no stream '{stream[:40]}'; there are {', '.join(STREAMS)}")
+    if output.suffix not in _WRITERS:
+        raise SessionError(f"{output}: expected a name that ends with {' or '.join(_WRITERS)}")
+    if output.exists() and not overwrite:
+        raise SessionError(f"{output}: exists already; --overwrite replaces it")
+    session = read_session(path)
+    columns = STREAMS[stream][1](session)
+    steps = np.asarray(columns.pop("step", np.arange(session.steps)), np.int64)
+    table = pa.table({"step": steps, "time": steps * session.info.dt, **columns})
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        _WRITERS[output.suffix](table, str(output))
+    except (OSError, pa.ArrowException) as error:
+        raise SessionError(f"{output}: cannot be written: {error}") from error
+    return int(table.num_rows)
+
+
+def _attributes(session: Session) -> Columns:
+    names = [f"{attribute.name} ({attribute.unit})" for attribute in session.info.attributes]
+    return _named(session.attributes, names)
+
+
+def _actions(session: Session) -> Columns:
+    return _named(session.actions, [f"action {index}" for index in range(session.actions.shape[1])])
+
+
+def _gains(session: Session) -> Columns:
+    return {
+        "reward": session.rewards,
+        "cost": session.costs,
+        "episode": session.episodes,
+        "ended": [session.endings.get(step, "") for step in range(session.steps)],
+    }
+
+
+def _activations(session: Session) -> Columns:
+    activations = read_activations(session.path)
+    units = [format_unit(unit, session.info.layers) for unit in range(activations.shape[1])]
+    return _named(activations, units)
+
+
+def _behaviors(session: Session) -> Columns:
+    rows = [(step, view) for step, views in enumerate(session.active) for view in views]
+    columns: Columns = {"step": [step for step, _ in rows], "behavior": [view.name for _, view in rows]}
+    for field in ACTIVE_FIELDS:
+        columns[field] = pa.array([getattr(view, field) for _, view in rows], pa.float64())
+    return columns
+
+
+def _stimulation(session: Session) -> Columns:
+    rows = [
+        (step, format_unit(unit, session.info.layers), value, natural)
+        for step, (stimulation, would) in enumerate(zip(session.stimulations, session.natural, strict=True))
+        for unit, value, natural in zip(stimulation.units, stimulation.values, would, strict=True)
+    ]
+    steps, units, values, natural = zip(*rows, strict=True) if rows else ((), (), (), ())
+    return {
+        "step": steps,
+        "unit": pa.array(units, pa.utf8()),
+        "overwritten": pa.array(values, pa.float64()),
+        "natural": pa.array(natural, pa.float64()),
+    }
+
+
+def _events(session: Session) -> Columns:
+    columns: Columns = {"step": [event.step for event in session.events]}
+    for field, kind in (
+        ("kind", pa.utf8()),
+        ("name", pa.utf8()),
+        ("value", pa.float64()),
+        ("key", pa.utf8()),
+    ):
+        columns[field] = pa.array([getattr(event, field) for event in session.events], kind)
+    return columns
+
+
+def _named(block: np.ndarray[Any, Any], names: list[str]) -> Columns:
+    return {name: block[:, column] for column, name in enumerate(names)}
+
+
+STREAMS: dict[str, tuple[str, Callable[[Session], Columns]]] = {
+    "attributes": ("kinematic attributes after each step", _attributes),
+    "actions": ("what the policy commanded", _actions),
+    "gains": ("reward, cost, episode and why it ended", _gains),
+    "digests": ("of the simulator's state after each step", lambda session: {"digest": session.digests}),
+    "activations": ("output of every hidden unit, as the next layer saw it", _activations),
+    "behaviors": ("active behaviors with their controllers; a row each", _behaviors),
+    "stimulation": ("overwritten units, natural against overwritten; a row each", _stimulation),
+    "events": ("everything that changed the run; a row each", _events),
+}
+"""What each stream holds, and how it is read."""

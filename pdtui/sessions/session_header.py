@@ -1,0 +1,126 @@
+"""What is known of a session without reading what every step held: enough to list it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from pdtui.core.errors import SessionError
+from pdtui.core.events import Event, EventKind
+from pdtui.sessions.drive_info import DriveInfo
+from pdtui.sessions.drive_properties import info_from_properties
+from pdtui.sessions.rrd.entity_rows import EntityRows
+from pdtui.sessions.rrd.rrd_file import RrdFile
+from pdtui.sessions.schema import DIGEST_EPISODE, DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
+
+
+@dataclass(frozen=True)
+class SessionHeader:
+    """A recorded drive without its numbers.
+
+    Attributes:
+        path: the file.
+        info: what determines the run, besides its events.
+        versions: of machine and libraries that ran it.
+        created: date and time, ISO 8601.
+        events: in the order in which they were applied.
+        steps: number of control steps.
+        endings: why an episode ended by itself, by the step with which it did.
+        outcome: how the drive ended; empty if the file has no end.
+    """
+
+    path: Path
+    info: DriveInfo
+    versions: dict[str, str] = field(repr=False)
+    created: str
+    events: tuple[Event, ...] = field(repr=False)
+    steps: int
+    endings: dict[int, str] = field(repr=False)
+    outcome: str = ""
+
+    @property
+    def seconds(self) -> float:
+        """Simulated time, s."""
+        return self.steps * self.info.dt
+
+    @property
+    def keys(self) -> int:
+        """Keys pressed."""
+        return sum(bool(event.key) for event in self.events)
+
+
+def read_session_header(path: Path | str) -> SessionHeader:
+    """Read a session's heading; the rest is skipped as it streams by.
+
+    Raises:
+        SessionError: no such file, not a session, torn, or incomplete; the message names the file.
+    """
+    path = Path(path)
+    file = RrdFile(path, only=(DIGEST_EPISODE,))
+    try:
+        return header_of(file, path)
+    except SessionError as error:
+        raise SessionError(f"{path}: {error}") from error
+
+
+def header_of(file: RrdFile, path: Path) -> SessionHeader:
+    """The heading of an open session.
+
+    Raises:
+        SessionError: a part is missing or not what it should be; the message does not name the file.
+    """
+    info, created = info_from_properties(file.properties(INFO))
+    return SessionHeader(
+        path=path,
+        info=info,
+        versions={name: str(values[0]) for name, values in file.properties(VERSIONS).items() if values},
+        created=created,
+        events=_events(file.rows(EVENTS)),
+        steps=count_steps(file.rows(DRIVE)),
+        endings=_endings(file.rows(ENDINGS)),
+        outcome=_outcome(file),
+    )
+
+
+def count_steps(drive: EntityRows) -> int:
+    """How many there are, none missing.
+
+    Raises:
+        SessionError: a step is missing.
+    """
+    steps = drive.steps
+    wrong = np.flatnonzero(steps != np.arange(len(steps)))
+    if wrong.size:
+        raise SessionError(f"expected control step {wrong[0]}, found step {steps[wrong[0]]}")
+    return len(steps)
+
+
+def _events(found: EntityRows) -> tuple[Event, ...]:
+    if not len(found.steps):
+        return ()
+    order = np.argsort(found.numbers("number", np.int64), kind="stable")
+    if not np.array_equal(found.numbers("number", np.int64)[order], np.arange(len(order))):
+        raise SessionError("an event is missing")
+    kinds, names, keys = found.texts("kind"), found.texts("name"), found.texts("key")
+    values = found.numbers("value", np.float64)
+    events = []
+    for row in order:
+        kind = kinds[row]
+        if kind not in get_args(EventKind):
+            raise SessionError(f"unknown event '{kind[:40]}'; there are {', '.join(get_args(EventKind))}")
+        events.append(Event(int(found.steps[row]), kind, names[row], float(values[row]), keys[row]))
+    return tuple(events)
+
+
+def _endings(found: EntityRows) -> dict[int, str]:
+    if not len(found.steps):
+        return {}
+    return dict(zip(found.steps.tolist(), found.texts("TextLog:text"), strict=True))
+
+
+def _outcome(file: RrdFile) -> str:
+    values = file.properties(OUTCOME).get("outcome", [])
+    return values[0] if len(values) == 1 and isinstance(values[0], str) else ""

@@ -1,0 +1,150 @@
+"""Read a session back: everything in it is checked, because a session may come from anywhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.attributes import Floats
+from pdtui.core.errors import SessionError
+from pdtui.core.step_record import ActiveBehavior
+from pdtui.core.units import Stimulation
+from pdtui.sessions.drive_properties import info_from_properties
+from pdtui.sessions.rrd.entity_rows import EntityRows
+from pdtui.sessions.rrd.rrd_file import RrdFile
+from pdtui.sessions.schema import (
+    ACTIVE_FIELDS,
+    DIGEST_EPISODE,
+    DRIVE,
+    INFO,
+    OVERWRITE_FIELDS,
+    REWARD_COST_ACTION,
+)
+from pdtui.sessions.session_header import SessionHeader, count_steps, header_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class Session(SessionHeader):
+    """A recorded drive of S control steps, J attributes and A actions.
+
+    Attributes:
+        digests: of the simulator's state after each step, shape (S,), int64.
+        attributes: after each step, shape (S, J).
+        actions: shape (S, A), float32.
+        rewards, costs: shape (S,).
+        episodes: number of the episode, shape (S,), int64.
+        active: the behaviors of each step with their controllers, the one latched last at the end.
+        stimulations: units and the outputs that overwrote them, for each step.
+        natural: what those units would have put out, for each step.
+    """
+
+    digests: NDArray[np.int64] = field(repr=False)
+    attributes: Floats = field(repr=False)
+    actions: NDArray[np.float32] = field(repr=False)
+    rewards: Floats = field(repr=False)
+    costs: Floats = field(repr=False)
+    episodes: NDArray[np.int64] = field(repr=False)
+    active: tuple[tuple[ActiveBehavior, ...], ...] = field(repr=False)
+    stimulations: tuple[Stimulation, ...] = field(repr=False)
+    natural: tuple[tuple[float, ...], ...] = field(repr=False)
+
+    @property
+    def behaviors(self) -> tuple[tuple[str, ...], ...]:
+        """Names of the behaviors that were active in each step."""
+        return tuple(tuple(behavior.name for behavior in step) for step in self.active)
+
+
+def read_session(path: Path | str) -> Session:
+    """Read all of a session but its activations, with or without a footer.
+
+    Raises:
+        SessionError: no such file, not a session, torn, or incomplete; the message names the file and says
+            what is wrong.
+    """
+    path = Path(path)
+    file = RrdFile(path, skip=("activations",))
+    try:
+        heading = header_of(file, path)
+        drive, info = file.rows(DRIVE), heading.info
+        gains = drive.block(REWARD_COST_ACTION, np.float64)
+        if heading.steps and gains.shape[1] < 2:
+            raise SessionError(f"stream '{DRIVE}/{REWARD_COST_ACTION}': expected reward and cost first")
+        gains = gains if heading.steps else np.empty((0, 2))
+        counters = drive.block(DIGEST_EPISODE, np.int64, 2)
+        stimulations, natural = _stimulations(drive, sum(info.layers))
+        return Session(
+            **vars(heading),
+            digests=counters[:, 0],
+            attributes=drive.block("attributes", np.float64, len(info.attributes)),
+            actions=gains[:, 2:].astype(np.float32),
+            rewards=gains[:, 0],
+            costs=gains[:, 1],
+            episodes=counters[:, 1],
+            active=_active(drive),
+            stimulations=stimulations,
+            natural=natural,
+        )
+    except SessionError as error:
+        raise SessionError(f"{path}: {error}") from error
+
+
+def read_activations(path: Path | str) -> NDArray[np.float32]:
+    """Output of every hidden unit in every step, as the next layer saw it, shape (S, U).
+
+    Where they were recorded as float16, they are rounded to 11 bits.
+
+    Raises:
+        SessionError: as `read_session`, and where they were not recorded.
+    """
+    path = Path(path)
+    file = RrdFile(path, only=("activations",))
+    try:
+        info, _ = info_from_properties(file.properties(INFO))
+        drive = file.rows(DRIVE)
+        count_steps(drive)
+        if info.activations == "off":
+            raise SessionError(
+                "its activations were not recorded (--record-activations off); a replay has them"
+            )
+        kind = np.float16 if info.activations == "half" else np.float32
+        return drive.block("activations", kind, sum(info.layers)).astype(np.float32, copy=False)
+    except SessionError as error:
+        raise SessionError(f"{path}: {error}") from error
+
+
+def _active(drive: EntityRows) -> tuple[tuple[ActiveBehavior, ...], ...]:
+    width = len(ACTIVE_FIELDS)
+    steps = []
+    states = drive.lists("active", float, optional=True)
+    for names, flat in zip(drive.lists("behaviors", str, optional=True), states, strict=True):
+        if len(flat) != len(names) * width:
+            raise SessionError(f"stream 'active': expected {width} numbers a behavior")
+        steps.append(
+            tuple(_behavior(name, flat[i * width : (i + 1) * width]) for i, name in enumerate(names))
+        )
+    return tuple(steps)
+
+
+def _behavior(name: str, values: Sequence[float]) -> ActiveBehavior:
+    remaining, factor, *controller = (None if math.isnan(value) else value for value in values)
+    steps = None if remaining is None or math.isinf(remaining) else int(remaining)
+    return ActiveBehavior(name, steps, math.nan if factor is None else factor, *controller)
+
+
+def _stimulations(
+    drive: EntityRows, units: int
+) -> tuple[tuple[Stimulation, ...], tuple[tuple[float, ...], ...]]:
+    width = len(OVERWRITE_FIELDS)
+    stimulations, natural = [], []
+    for flat in drive.lists("stimulation", float, optional=True):
+        chosen, values, would = flat[::width], flat[1::width], flat[2::width]
+        if len(flat) % width or not all(unit.is_integer() and 0 <= unit < units for unit in chosen):
+            raise SessionError(f"stream 'stimulation': expected units 0..{units - 1} with two values each")
+        stimulations.append(Stimulation(tuple(int(unit) for unit in chosen), tuple(values)))
+        natural.append(tuple(would))
+    return tuple(stimulations), tuple(natural)

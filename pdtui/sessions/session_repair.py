@@ -1,0 +1,134 @@
+"""Rescue what can be read of a session whose end is missing or cut."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import rerun.chunk
+
+from pdtui.core.errors import SessionError
+from pdtui.sessions.drive_info import DriveInfo
+from pdtui.sessions.drive_properties import info_from_properties
+from pdtui.sessions.rrd.rrd_file import ChunkStream, RrdFile
+from pdtui.sessions.schema import DIGEST_EPISODE, DRIVE, INFO, OUTCOME, STEP
+from pdtui.sessions.session_header import SessionHeader, read_session_header
+from pdtui.sessions.writer.recording_stream import errors_named, open_recording, send_property
+
+_CHUNKS_A_FLUSH = 64
+
+
+@dataclass(frozen=True)
+class SessionCondition:
+    """What is left of a session.
+
+    Attributes:
+        info: what determines the run.
+        steps: control steps from the first to the last before a gap, or before the first broken chunk.
+        outcome: how the drive ended; empty if the file does not say.
+        recording_id: that the viewer knows it by.
+        whole: nothing is missing: every chunk can be read, no step is missing, outcome and footer are there.
+    """
+
+    info: DriveInfo
+    steps: int
+    outcome: str
+    recording_id: str
+    whole: bool
+
+
+def examine_session(path: Path) -> SessionCondition:
+    """Read as far as it goes and see what is there.
+
+    Raises:
+        SessionError: no session, or cut before everything that determines the run was written.
+    """
+    file = RrdFile(path, only=(DIGEST_EPISODE,), torn=True)
+    try:
+        info, _ = info_from_properties(file.properties(INFO))
+        steps = file.rows(DRIVE).steps
+    except SessionError as error:
+        raise SessionError(f"{path}: nothing can be rescued: {error}") from error
+    gaps = np.flatnonzero(steps != np.arange(len(steps)))
+    kept = int(gaps[0]) if gaps.size else len(steps)
+    said = file.properties(OUTCOME).get("outcome", [])
+    outcome = said[0] if len(said) == 1 and isinstance(said[0], str) else ""
+    whole = file.finished and not gaps.size and bool(outcome)
+    return SessionCondition(info, kept, outcome, file.recording_id, whole)
+
+
+def repair_session(path: Path, output: Path) -> SessionHeader:
+    """Write what can be read of a session as a whole one; never more than a few chunks are in memory.
+
+    Everything after the last step without a gap is left out. The outcome becomes ``repaired: cut at step N``,
+    unless the file still says how the drive ended. The output appears when it is whole, and not before.
+
+    Args:
+        path: the session.
+        output: the repaired one; it may be `path`, which is then replaced.
+
+    Raises:
+        SessionError: nothing can be rescued, or the output cannot be written.
+    """
+    condition = examine_session(path)
+    permissions = path.stat().st_mode & 0o777
+    target = output.resolve()  # what a link points to is replaced, not the link
+    with errors_named(output):
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".rrd")
+        os.close(handle)
+    beside = Path(name)
+    try:
+        _rewrite(path, beside, condition)
+        repaired = read_session_header(beside)
+        if repaired.steps != condition.steps:
+            raise SessionError(f"{path}: {condition.steps} steps were there, {repaired.steps} were rescued")
+        with errors_named(output):
+            beside.chmod(permissions)
+            beside.replace(target)
+    finally:
+        beside.unlink(missing_ok=True)
+    return read_session_header(output)
+
+
+def _rewrite(path: Path, output: Path, condition: SessionCondition) -> None:
+    recording = open_recording(output, condition.info, condition.recording_id)
+    try:
+        with errors_named(output):
+            for number, chunk in enumerate(_kept(path, condition.steps)):
+                recording.send_chunks(chunk)
+                if number % _CHUNKS_A_FLUSH == 0:
+                    recording.flush()
+            if not condition.outcome:
+                send_property(recording, OUTCOME, {"outcome": f"repaired: cut at step {condition.steps}"})
+            recording.flush()
+    finally:
+        recording.disconnect()
+
+
+def _kept(path: Path, steps: int) -> Iterator[rerun.chunk.Chunk]:
+    """Chunks without the rows of later steps: a batch's events and views may be there without its drive."""
+    stream = iter(ChunkStream(path))
+    while True:
+        try:
+            chunk = next(stream, None)
+        except SessionError:  # the rest is what is left out
+            return
+        if chunk is None:
+            return
+        batch = chunk.batch
+        if STEP in chunk.timelines:
+            batch = batch.filter(pc.less(batch.column(STEP), steps))
+        if batch.num_rows:
+            try:
+                ready = rerun.chunk.Chunk.from_record_batch(batch)
+            except (ValueError, RuntimeError, pa.ArrowException) as error:
+                raise SessionError(
+                    f"{path}: rows of '{chunk.entity[:80]}' cannot be rescued: {error}"
+                ) from error
+            yield from ready

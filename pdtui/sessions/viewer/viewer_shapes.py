@@ -1,0 +1,83 @@
+"""The robot's links as solid shapes in the viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+
+from pdtui.core.attributes import Floats
+from pdtui.core.bodies import Link
+from pdtui.robots.geometry import capsule_ends, place_links
+from pdtui.sessions.writer.component_columns import ComponentColumn, vector_lists
+
+_COLOR = (214, 137, 76)
+_TORSO = (90, 122, 158)
+
+
+class RobotShapes:
+    """Draws capsules, spheres and boxes; what does not change is logged once.
+
+    Args:
+        links: the robot's shapes.
+    """
+
+    def __init__(self, links: Sequence[Link]) -> None:
+        # A sphere is a capsule of length zero, so that it needs no component of its own.
+        self._round = [link for link in links if link.shape != "box"]
+        self._boxes = [link for link in links if link.shape == "box"]
+
+    def static(self) -> list[rr.Capsules3D | rr.Boxes3D]:
+        """Sizes and colors."""
+        parts: list[rr.Capsules3D | rr.Boxes3D] = []
+        if self._round:
+            lengths = [2 * link.size[1] if link.shape == "capsule" else 0.0 for link in self._round]
+            parts.append(
+                rr.Capsules3D.from_fields(
+                    lengths=lengths,
+                    radii=[link.size[0] for link in self._round],
+                    colors=_colors(self._round),
+                    fill_mode="solid",
+                )
+            )
+        if self._boxes:
+            parts.append(
+                rr.Boxes3D.from_fields(
+                    half_sizes=[link.size for link in self._boxes],
+                    colors=_colors(self._boxes),
+                    fill_mode="solid",
+                )
+            )
+        return parts
+
+    def columns(self, poses: Floats) -> list[ComponentColumn]:
+        """Where they are.
+
+        Args:
+            poses: body poses of n steps, shape (n, B, 7).
+        """
+        columns = []
+        if self._round:
+            placed = place_links(self._round, poses)
+            # The viewer's capsule starts at its translation and extends along z; ours is centred.
+            starts = capsule_ends(self._round, placed)[..., 0, :]
+            columns += [
+                vector_lists(rr.Capsules3D.descriptor_translations(), starts.astype(np.float32)),
+                vector_lists(rr.Capsules3D.descriptor_quaternions(), _xyzw(placed)),
+            ]
+        if self._boxes:
+            placed = place_links(self._boxes, poses)
+            columns += [
+                vector_lists(rr.Boxes3D.descriptor_centers(), placed[..., :3].astype(np.float32)),
+                vector_lists(rr.Boxes3D.descriptor_quaternions(), _xyzw(placed)),
+            ]
+        return columns
+
+
+def _xyzw(placed: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+    return placed[..., [4, 5, 6, 3]].astype(np.float32)
+
+
+def _colors(links: Sequence[Link]) -> list[tuple[int, int, int]]:
+    return [_TORSO if link.body == 0 else _COLOR for link in links]

@@ -1,0 +1,112 @@
+"""Control steps and events as columns: all that a reader needs, in few entities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+from numpy.typing import NDArray
+
+from pdtui.core.events import Event
+from pdtui.core.step_record import ActiveBehavior, StepRecord
+from pdtui.sessions.schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION, ActivationsKept
+from pdtui.sessions.writer.component_columns import (
+    ComponentColumn,
+    nested_lists,
+    number_lists,
+    ragged_lists,
+    stack_arrays,
+    texts,
+)
+
+
+def drive_columns(records: Sequence[StepRecord], kept: ActivationsKept = "all") -> list[ComponentColumn]:
+    """One row a control step: everything of a `StepRecord` but its events and poses.
+
+    What no step of the batch has (behaviors, stimulation) gets no column; activations do as `kept` says.
+    """
+    of: Any = StepRecord._make(zip(*records, strict=True))
+    actions = stack_arrays(of.action)
+    gains = np.empty((len(records), 2 + actions.shape[1]))
+    gains[:, 0], gains[:, 1], gains[:, 2:] = of.reward, of.cost, actions
+    counters = np.empty((len(records), 2), np.int64)
+    counters[:, 0], counters[:, 1] = of.digest, of.episode
+    columns = [
+        nested_lists("attributes", stack_arrays(of.attributes)),
+        nested_lists(REWARD_COST_ACTION, gains),
+        number_lists(DIGEST_EPISODE, counters),
+    ]
+    if kept != "off":
+        activations = stack_arrays(of.activations)
+        columns.append(nested_lists("activations", to_half(activations) if kept == "half" else activations))
+    if any(stimulation.units for stimulation in of.stimulation):
+        columns.append(ragged_lists("stimulation", [_overwrites(record) for record in records], pa.float64()))
+    if any(of.behaviors):
+        names = [[behavior.name for behavior in behaviors] for behaviors in of.behaviors]
+        states = [
+            [value for behavior in behaviors for value in _state(behavior)] for behaviors in of.behaviors
+        ]
+        columns += [ragged_lists("behaviors", names, pa.utf8()), ragged_lists("active", states, pa.float64())]
+    return columns
+
+
+def to_half(activations: NDArray[np.float32]) -> NDArray[np.float16]:
+    """As float16; what is beyond its range (±65504) becomes infinite, without a warning."""
+    with np.errstate(over="ignore"):
+        return activations.astype(np.float16)
+
+
+def event_columns(events: Sequence[Event], first: int) -> list[ComponentColumn]:
+    """One row an event.
+
+    Args:
+        events: in the order in which they were applied.
+        first: number of the first of them in the session.
+    """
+    numbers = np.arange(first, first + len(events), dtype=np.int64)
+    return [
+        texts(rr.TextLog.descriptor_text(), [describe_event(event) for event in events]),
+        texts(rr.TextLog.descriptor_level(), ["INFO"] * len(events)),
+        number_lists("number", numbers),
+        texts("kind", [event.kind for event in events]),
+        texts("name", [event.name for event in events]),
+        number_lists("value", np.array([event.value for event in events], np.float64)),
+        texts("key", [event.key for event in events]),
+    ]
+
+
+def ending_columns(records: Sequence[StepRecord]) -> list[ComponentColumn]:
+    """One row an episode that ended by itself."""
+    levels = ["ERROR" if record.diverged else "WARN" for record in records]
+    return [
+        texts(rr.TextLog.descriptor_text(), [record.ended for record in records]),
+        texts(rr.TextLog.descriptor_level(), levels),
+    ]
+
+
+def describe_event(event: Event) -> str:
+    """The event in words, as the viewer's log shows it."""
+    said = {
+        "behavior": f"behavior '{event.name}'",
+        "default": "nothing is overwritten any more",
+        "target": f"target of '{event.name}' is {event.value:.4g}",
+        "factor": f"magnitudes of '{event.name}' times {event.value:.4g}",
+        "reset": "next episode",
+        "rewind": f"rewinds to step {event.value:.0f}",
+    }[event.kind]
+    return f"[{event.key}] {said}" if event.key else said
+
+
+def _overwrites(record: StepRecord) -> list[float]:
+    stimulation = record.stimulation
+    triples = zip(stimulation.units, stimulation.values, record.natural, strict=True)
+    return [value for triple in triples for value in triple]
+
+
+def _state(behavior: ActiveBehavior) -> list[float]:
+    values = [getattr(behavior, field) for field in ACTIVE_FIELDS]
+    return [math.nan if value is None else float(value) for value in values]

@@ -1,0 +1,183 @@
+"""Step 3, match: which unit's spectrogram is nearest to an attribute's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.errors import PolicyError
+from pdtui.spectra.monitor import MonitoredEpisode
+from pdtui.spectra.scaled_series import BLOCK, attribute_series, map_unit_blocks, unit_series, usable_episodes
+from pdtui.spectra.spectrogram import MatchingPreset, short_time_transform, spectrogram
+
+# Expanding the square of a difference cancels digits of near matches. Below this part of the summed squares
+# the difference itself is taken: what is left then has a relative error under 1e-9.
+_NEAR = 1e-6
+
+
+@dataclass(frozen=True)
+class Discrepancies:
+    """Discrepancies of every pair of attribute and unit.
+
+    Attributes:
+        discrepancy: mean over the episodes used, shape (J, U); NaN where a flaw leaves the attribute or the
+            unit out.
+        level_share: part of the squared distance that lies in the bins that a constant fills, in [0, 1], mean
+            over episodes, shape (J, U). Near 1, the match is one of mean levels (and of anything slower
+            than those bins), not of movement.
+        used: seeds of the episodes that count.
+        skipped: (seed, steps) of the episodes that are shorter than one window.
+        flaws: what is wrong with an attribute, by its name: not finite (left out), or constant (kept, but
+            its spectrum says only at what level it stands; left out where the preset leaves nothing of it).
+        unit_flaws: the same of units, by flat index: one that never fires is constant.
+    """
+
+    discrepancy: Floats
+    level_share: Floats
+    used: tuple[int, ...]
+    skipped: tuple[tuple[int, int], ...]
+    flaws: dict[str, str]
+    unit_flaws: dict[int, str] = field(default_factory=dict)
+
+    def ranked(self, column: int) -> NDArray[np.intp]:
+        """Units by discrepancy with one attribute, the nearest first; empty for an attribute left out."""
+        row = self.discrepancy[column]
+        return np.argsort(row, kind="stable")[: int(np.isfinite(row).sum())]
+
+
+def match_units(
+    episodes: Sequence[MonitoredEpisode],
+    attributes: Sequence[Attribute],
+    preset: MatchingPreset,
+    *,
+    block: int = BLOCK,
+) -> Discrepancies:
+    """``Dis(z, s) = ‖SG_z − SG_s‖₂`` over all frequencies and windows, averaged over episodes (section 3.2).
+
+    Time grows linearly in units, attributes and episodes, memory by one block of units for each core.
+
+    Args:
+        episodes: unstimulated roll-outs.
+        attributes: of the robot; their scales apply.
+        preset: of the spectrum.
+        block: units at a time; no result depends on it beyond rounding.
+
+    Raises:
+        PolicyError: no episode is as long as one window.
+    """
+    used = usable_episodes(episodes, preset)
+    skipped = tuple((episode.seed, episode.steps) for episode in episodes if episode.steps < preset.length)
+    if not used:
+        lengths = ", ".join(str(steps) for _, steps in skipped) or "none"
+        raise PolicyError(
+            f"expected an episode of at least {preset.length} steps (one window of preset '{preset}'), "
+            f"got {lengths}"
+        )
+    targets = [_Spectra(series, preset) for series in attribute_series(used, attributes, preset)]
+
+    def compare(units: slice) -> tuple[Floats, Floats, dict[int, str]]:
+        distance = share = np.zeros((len(attributes), units.stop - units.start))
+        for target, series in zip(targets, unit_series(used, units, preset), strict=True):
+            one_distance, one_share = _compare(target, _Spectra(series, preset))
+            distance, share = distance + one_distance, share + one_share
+        return distance / len(used), share / len(used), _find_unit_flaws(used, units, preset)
+
+    units = used[0].activations.shape[1]
+    result = np.empty((len(attributes), units))
+    level_share = np.empty_like(result)
+    unit_flaws: dict[int, str] = {}
+    for part, (distance, share, flaws) in map_unit_blocks(compare, units, block):
+        result[:, part], level_share[:, part] = distance, share
+        unit_flaws |= flaws
+    attribute_flaws = _find_flaws(used, attributes, preset)
+    for row, attribute in enumerate(attributes):
+        if attribute_flaws.get(attribute.name, "").endswith("left out"):
+            result[row] = level_share[row] = np.nan
+    for unit, flaw in unit_flaws.items():
+        if flaw.endswith("left out"):
+            result[:, unit] = level_share[:, unit] = np.nan
+    return Discrepancies(
+        result, level_share, tuple(episode.seed for episode in used), skipped, attribute_flaws, unit_flaws
+    )
+
+
+class _Spectra:
+    """Spectrograms of many series of one episode, flat, and their squared norms."""
+
+    @np.errstate(invalid="ignore", over="ignore")
+    def __init__(self, series: NDArray[Any], preset: MatchingPreset) -> None:
+        whole = spectrogram(short_time_transform(series, preset), preset)
+        # A copy of the few level bins is cheaper than a second pass over all.
+        self.level = whole[:, :, : preset.level_bins].reshape(len(whole), -1)
+        counted = whole[:, :, preset.first_bin :]
+        self.all = counted.reshape(len(whole), -1)
+        self.levels_count = preset.first_bin == 0
+        self.squares = np.einsum("nk,nk->n", self.all, self.all)
+        self.level_squares = np.einsum("nk,nk->n", self.level, self.level)
+
+
+@np.errstate(invalid="ignore", over="ignore")  # what is not finite is named in the flaws
+def _compare(targets: _Spectra, units: _Spectra) -> tuple[Floats, Floats]:
+    """Distances and level shares of one episode, shape (J, B) each; no share where levels do not count."""
+    sums = targets.squares[:, None] + units.squares
+    total = sums - 2.0 * (targets.all @ units.all.T)
+    level = targets.level_squares[:, None] + units.level_squares - 2.0 * (targets.level @ units.level.T)
+    for row, column in zip(*np.nonzero(total < _NEAR * sums), strict=True):
+        total[row, column] = np.square(units.all[column] - targets.all[row]).sum()
+        level[row, column] = np.square(units.level[column] - targets.level[row]).sum()
+    if not targets.levels_count:
+        return np.sqrt(total), np.full_like(total, np.nan)
+    share = np.divide(level, total, out=np.zeros_like(total), where=total > 0)
+    return np.sqrt(total), np.clip(share, 0.0, 1.0)
+
+
+def _find_flaws(
+    episodes: Sequence[MonitoredEpisode], attributes: Sequence[Attribute], preset: MatchingPreset
+) -> dict[str, str]:
+    flaws: dict[str, str] = {}
+    for column, attribute in enumerate(attributes):
+        series = [episode.attributes[:, column] for episode in episodes]
+        broken = [
+            episode.seed
+            for episode, values in zip(episodes, series, strict=True)
+            if not np.isfinite(values).all()
+        ]
+        if broken:
+            flaws[attribute.name] = f"not finite in the episodes of seeds {broken}; left out"
+        elif all(np.ptp(values) == 0 for values in series):
+            flaws[attribute.name] = (
+                "constant in every episode; only its level can match"
+                if _levels_count(preset)
+                else "constant in every episode, and levels do not count; left out"
+            )
+    return flaws
+
+
+def _find_unit_flaws(
+    episodes: Sequence[MonitoredEpisode], units: slice, preset: MatchingPreset
+) -> dict[int, str]:
+    high = np.array([episode.activations[:, units].max(axis=0) for episode in episodes])
+    low = np.array([episode.activations[:, units].min(axis=0) for episode in episodes])
+    finite = np.isfinite(high).all(axis=0) & np.isfinite(low).all(axis=0)
+    still = (high == low).all(axis=0)
+    flaws: dict[int, str] = {}
+    for number in np.flatnonzero(still | ~finite):
+        unit = units.start + int(number)
+        if not finite[number]:
+            flaws[unit] = "not finite; left out"
+        elif (high[:, number] == 0).all():
+            flaws[unit] = "never fires" + ("" if _levels_count(preset) else "; left out")
+        elif _levels_count(preset):
+            flaws[unit] = "constant in every episode; only its level can match"
+        else:
+            flaws[unit] = "constant in every episode, and levels do not count; left out"
+    return flaws
+
+
+def _levels_count(preset: MatchingPreset) -> bool:
+    return preset.level == "kept" and preset.scaling != "standardised"

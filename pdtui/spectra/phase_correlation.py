@@ -1,0 +1,113 @@
+"""Step 4, sign: correlation ρ of unit and attribute from their phases at the predominant frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.spectra.monitor import MonitoredEpisode
+from pdtui.spectra.scaled_series import BLOCK, attribute_series, map_unit_blocks, unit_series, usable_episodes
+from pdtui.spectra.spectrogram import Complexes, MatchingPreset, short_time_transform, spectrogram
+
+DISAGREE = 0.1
+"""Difference of the plain and the circular ρ from which both are reported."""
+_SILENT = 1e-12
+
+
+@dataclass(frozen=True)
+class PhaseCorrelations:
+    """Correlations of every pair of attribute and unit.
+
+    Attributes:
+        bins: predominant bin of each attribute, shape (J,).
+        plain: ρ from the plain mean of the wrapped phase differences, as in the paper, shape (J, U). A phase
+            near ±π flips between the two ends, and the plain mean of such phases means nothing.
+        circular: ρ from the circular mean (the angle of the mean phasor), shape (J, U).
+
+    Both are NaN for a unit or attribute that is silent at the predominant frequency: it has no phase.
+    """
+
+    bins: NDArray[np.intp]
+    plain: Floats
+    circular: Floats
+
+    def rho(self, preset: MatchingPreset) -> Floats:
+        """The one that the preset goes by, shape (J, U)."""
+        return self.plain if preset.phase_mean == "plain" else self.circular
+
+    @property
+    def disagree(self) -> NDArray[np.bool_]:
+        """Pairs whose two correlations differ by more than `DISAGREE`, shape (J, U)."""
+        return np.abs(self.plain - self.circular) > DISAGREE
+
+
+def phase_correlation(phase: Floats) -> Floats:
+    """``ρ = 1 − |2p| / π`` (section 3.2): 1 in phase, −1 in antiphase, 0 in quadrature; p in rad."""
+    return 1.0 - np.abs(2.0 * phase) / np.pi
+
+
+def correlate_phases(
+    episodes: Sequence[MonitoredEpisode],
+    attributes: Sequence[Attribute],
+    preset: MatchingPreset,
+    *,
+    block: int = BLOCK,
+) -> PhaseCorrelations:
+    """Sign and strength with which units go along with attributes.
+
+    The predominant frequency ``ω* = argmax_ω Σ_d SG(d, ω | s)`` sums over the windows of all episodes. The
+    phase difference at ω* is wrapped to (−π, π] and averaged over all windows of all episodes.
+
+    Args:
+        episodes: unstimulated roll-outs, at least one of a window's length (`match` says so where none is).
+        attributes: of the robot; their scales apply.
+        preset: of the spectrum.
+        block: units at a time.
+    """
+    used = usable_episodes(episodes, preset)
+    with np.errstate(invalid="ignore", over="ignore"):  # matching names what is not finite
+        targets = [
+            short_time_transform(series, preset) for series in attribute_series(used, attributes, preset)
+        ]
+        energy = np.sum([spectrogram(target, preset).sum(axis=1) for target in targets], axis=0)
+    allowed = np.nan_to_num(energy[:, preset.phase_from_bin :], nan=-1.0)
+    bins = np.argmax(allowed, axis=1) + preset.phase_from_bin
+    waves = np.concatenate([target[np.arange(len(bins)), :, bins] for target in targets], axis=1)
+
+    def compare(units: slice) -> tuple[Floats, Floats]:
+        spectra = [
+            short_time_transform(series, preset)[:, :, bins] for series in unit_series(used, units, preset)
+        ]
+        return _correlate(np.concatenate(spectra, axis=1), waves)
+
+    units = used[0].activations.shape[1]
+    plain, circular = np.empty((len(attributes), units)), np.empty((len(attributes), units))
+    for part, (plain_part, circular_part) in map_unit_blocks(compare, units, block):
+        plain[:, part], circular[:, part] = plain_part, circular_part
+    return PhaseCorrelations(bins, plain, circular)
+
+
+@np.errstate(invalid="ignore", over="ignore")
+def _correlate(units: Complexes, waves: Complexes) -> tuple[Floats, Floats]:
+    """Both ρ of B units, shape (B, D, J), and the attributes, shape (J, D); shape (J, B) each."""
+    plain = np.full((len(waves), len(units)), np.nan)
+    circular = plain.copy()
+    for row, wave in enumerate(waves):
+        product = units[:, :, row] * np.conj(wave)
+        size = np.abs(product)
+        heard = (size > _SILENT) & np.isfinite(size)
+        difference = np.angle(product)
+        # np.angle gives −π for a negative real with imaginary part −0; the wrap's interval is (−π, π].
+        difference[difference == -np.pi] = np.pi
+        # The unit phasor of the difference, without taking an angle's sine and cosine back.
+        phasor = np.divide(product, size, out=np.zeros_like(product), where=heard).sum(axis=1)
+        count = heard.sum(axis=1)
+        known = count > 0
+        mean = np.where(heard, difference, 0.0).sum(axis=1)[known] / count[known]
+        plain[row, known] = phase_correlation(mean)
+        circular[row, known] = phase_correlation(np.angle(phasor[known]))
+    return plain, circular

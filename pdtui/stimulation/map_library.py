@@ -1,0 +1,76 @@
+"""Where maps are found: the user's own folder first, then those that are shipped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import tomlkit
+
+from pdtui.core.errors import MapError
+from pdtui.stimulation.map_reader import load_map, parse_map
+from pdtui.stimulation.stimulation_map import SCHEMA, StimulationMap
+
+
+def shipped_folder(kind: str) -> Path:
+    """The folder ``maps`` or ``sessions`` that came with pdtui: in the checkout, or as installed."""
+    package = Path(__file__).parents[1]
+    installed = package / "shipped" / kind
+    return installed if installed.is_dir() else package.parent / kind
+
+
+def folders(kind: str) -> tuple[Path, ...]:
+    """Folders to look in, the user's own first."""
+    own, shipped = Path.cwd() / kind, shipped_folder(kind)
+    return (own,) if own.resolve() == shipped.resolve() else (own, shipped)
+
+
+def find_map(name: str) -> Path:
+    """Path of a map: as given, or by its name in the folders.
+
+    Raises:
+        MapError: there is none; the message lists those that there are.
+    """
+    if name.endswith(".toml"):
+        if Path(name).is_file():
+            return Path(name)
+        raise MapError(f"{name}: no such map")
+    for folder in folders("maps"):
+        if (folder / f"{name}.toml").is_file():
+            return folder / f"{name}.toml"
+    known = ", ".join(sorted({path.stem for path in _all_paths()})) or "none"
+    raise MapError(f"no map '{name}'; there are {known}")
+
+
+def bare_map(robot: str, policy: str) -> StimulationMap:
+    """A map without behaviors, for a robot that has none yet: the policy is on its own."""
+    text = tomlkit.dumps({"schema": SCHEMA, "robot": robot, "policy": {"name": policy, "sha256": ""}})
+    return parse_map(text, f"the map of {robot} without behaviors")
+
+
+@dataclass(frozen=True)
+class ListedMap:
+    """A map that can be picked, or the reason why it cannot."""
+
+    path: Path
+    stimulation_map: StimulationMap | None
+    problem: str = ""
+
+
+def list_maps() -> list[ListedMap]:
+    """All maps in the folders; one in the user's folder hides a shipped one of the same name."""
+    listed: dict[str, ListedMap] = {}
+    for path in _all_paths():
+        if path.stem in listed:
+            continue
+        try:
+            listed[path.stem] = ListedMap(path, load_map(path))
+        except MapError as error:
+            listed[path.stem] = ListedMap(path, None, str(error))
+    return list(listed.values())
+
+
+def _all_paths() -> Iterator[Path]:
+    for folder in folders("maps"):
+        yield from sorted(folder.glob("*.toml"))

@@ -1,0 +1,71 @@
+"""The map as it is driven: with the policy that was asked for, found where it lies, and every choice made."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, cast
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from pdtui.core.errors import MapError
+from pdtui.policies.weights.file_search import find_inside
+from pdtui.policies.weights.import_options import NO_NORMALISER, NO_OPTIONS, ImportOptions
+from pdtui.stimulation.stimulation_map import StimulationMap
+
+
+def resolve_policy(
+    stimulation_map: StimulationMap, policy: str = "", choices: ImportOptions = NO_OPTIONS
+) -> StimulationMap:
+    """Put policy and choices of this drive into the map, and into its text, which the session keeps.
+
+    Files that the map names by their path from its own folder are named by their path from the working
+    directory, so that the session finds them without the map. Comments stay.
+
+    Args:
+        stimulation_map: as its file has it.
+        policy: weights to use instead of the map's; empty for those.
+        choices: of this drive; where they are silent, the map's hold.
+
+    Raises:
+        PolicyError: the map names a file outside of its own folder and the working directory.
+        MapError: its text cannot be changed.
+    """
+    found = locate_policy(stimulation_map, policy, choices)
+    if (found.policy, found.choices) == (stimulation_map.policy, stimulation_map.choices):
+        return stimulation_map
+    try:
+        document = tomlkit.parse(stimulation_map.text)
+    except TOMLKitError as error:
+        raise MapError(f"{stimulation_map.source}: not a TOML file: {error}") from error
+    table = cast(dict[str, Any], document.setdefault("policy", tomlkit.table()))
+    table["name"] = found.policy
+    table.update({field: value for field, value in asdict(found.choices).items() if value})
+    return replace(found, text=tomlkit.dumps(document))
+
+
+def locate_policy(
+    stimulation_map: StimulationMap, policy: str = "", choices: ImportOptions = NO_OPTIONS
+) -> StimulationMap:
+    """As `resolve_policy`, but the map's text stays as it is.
+
+    Raises:
+        PolicyError: the map names a file outside of its own folder and the working directory.
+    """
+    source = stimulation_map.source
+    folder = Path(source).parent
+    name = policy or _from_here(stimulation_map.policy, folder, source)
+    merged = choices.over(stimulation_map.choices)
+    if merged.normaliser != NO_NORMALISER and not choices.normaliser:
+        merged = replace(merged, normaliser=_from_here(merged.normaliser, folder, source))
+    return replace(stimulation_map, policy=name, choices=merged)
+
+
+def _from_here(name: str, folder: Path, source: str) -> str:
+    """The name of a file as the working directory reaches it; as it is where it is found so, or nowhere."""
+    found = find_inside(name, (folder,), source) if name else None
+    if found is None or found == Path(name):
+        return name
+    here = Path.cwd()
+    return str(found.resolve().relative_to(here) if found.resolve().is_relative_to(here) else found.resolve())

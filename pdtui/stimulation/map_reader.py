@@ -1,0 +1,209 @@
+"""Maps on disk: TOML made to be edited by hand, checked field by field with line and name."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import cast, get_args
+
+from pdtui.core.bounded_read import read_at_most
+from pdtui.core.errors import MapError
+from pdtui.core.units import ADDRESS
+from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions
+from pdtui.stimulation.map_fields import NUMBER, MapTable
+from pdtui.stimulation.stimulation_map import (
+    RESERVED_KEYS,
+    SCHEMA,
+    AimDirection,
+    Behavior,
+    BehaviorAim,
+    BehaviorMode,
+    MeasuredEffect,
+    MotorPrimitive,
+    PidGains,
+    StimulationMap,
+)
+
+MAX_BYTES = 1_000_000
+"""Of a map's text. 100 behaviors of 60 units have 200,000."""
+_MAX_DOTS = 64
+_BETWEEN = re.compile(r"[=,{}\[\]\n#]")
+
+
+def load_map(path: Path) -> StimulationMap:
+    """Read and check a map.
+
+    Raises:
+        MapError: the file is missing, is no TOML, or a field is wrong; the message names line and field.
+    """
+    try:
+        text = read_at_most(path, MAX_BYTES).decode("utf-8")
+    except OSError as error:
+        raise MapError(f"{path}: cannot be read as a map: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise MapError(f"{path}: cannot be read as a map: {error}") from error
+    return parse_map(text, str(path))
+
+
+def parse_map(text: str, source: str) -> StimulationMap:
+    """Check the text of a map; `source` names it in messages.
+
+    Raises:
+        MapError: as `load_map`.
+    """
+    if len(text) > MAX_BYTES:
+        raise MapError(f"{source}: expected a map of at most {MAX_BYTES} characters")
+    if _has_long_key(text):
+        raise MapError(f"{source}: not a TOML file of ours: a key of more than {_MAX_DOTS} parts")
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # a whole number of too many digits is no TOMLDecodeError
+        raise MapError(f"{source}: not a TOML file: {error}") from error
+    top = MapTable(source, text, "top level", data, "", 0)
+    if (schema := top.take("schema", int)) != SCHEMA:
+        raise top.error("schema", f"expected {SCHEMA}, found {schema}")
+    robot = top.text("robot")
+    policy = MapTable(source, text, "policy", top.take("policy", dict), "[policy]", 0)
+    name, sha256 = policy.text("name"), policy.text("sha256")
+    choices = ImportOptions(
+        policy.choice("activation", ACTIVATION_NAMES, ""),
+        policy.choice("squash", SQUASH_NAMES, ""),
+        policy.text("normaliser", ""),
+    )
+    policy.done()
+    keys = MapTable(source, text, "keys", top.take("keys", dict, {"default": "space"}), "[keys]", 0)
+    default_key = keys.text("default")
+    keys.done()
+    tables = {
+        kind: [
+            MapTable(source, text, f"{kind[:-1]} {number + 1}", entry, f"[[{kind}]]", number)
+            for number, entry in enumerate(top.take(kind, list, []))
+        ]
+        for kind in ("primitives", "behaviors")
+    }
+    top.done()
+    primitives = {p.name: p for p in (_primitive(table) for table in tables["primitives"])}
+    behaviors: dict[str, Behavior] = {}
+    for table in tables["behaviors"]:
+        behavior = _behavior(table, primitives)
+        if behavior.name in behaviors:
+            raise table.error("name", f"'{behavior.name}' is taken by another behavior")
+        behaviors[behavior.name] = behavior
+    _check_keys(source, default_key, behaviors)
+    for behavior in behaviors.values():
+        for other in behavior.together:
+            if other not in behaviors:
+                raise MapError(
+                    f"{source}: behavior '{behavior.name}': together names '{other}', which does not exist"
+                )
+    return StimulationMap(robot, name, sha256, default_key, primitives, behaviors, text, source, choices)
+
+
+def _has_long_key(text: str) -> bool:
+    """Whether dots join more parts than any key has: the time that they take grows with their square."""
+    joined = 0
+    for part in text.split("."):
+        joined = 0 if not part or _BETWEEN.search(part) else joined + 1
+        if joined > _MAX_DOTS:
+            return True
+    return False
+
+
+def _primitive(table: MapTable) -> MotorPrimitive:
+    unit = table.text("unit")
+    if not ADDRESS.fullmatch(unit):
+        raise table.error("unit", f"expected layer:index, such as 0:12, found '{unit}'")
+    discrepancy, value = table.take("discrepancy", NUMBER, None), table.take("value", NUMBER, None)
+    primitive = MotorPrimitive(
+        name=table.text("name"),
+        attribute=table.text("attribute"),
+        unit=unit,
+        rho=float(table.take("rho", NUMBER)),
+        discrepancy=None if discrepancy is None else float(discrepancy),
+        value=None if value is None else float(value),
+        measured=_measured(table),
+    )
+    if not -1.0 <= primitive.rho <= 1.0:
+        raise table.error("rho", f"expected a number in −1..1, found {primitive.rho}")
+    table.done()
+    return primitive
+
+
+def _measured(parent: MapTable) -> MeasuredEffect | None:
+    table = parent.table("measured", None)
+    if table is None:
+        return None
+    effect, low, high = (float(table.take(name, NUMBER)) for name in ("effect", "low", "high"))
+    measured = MeasuredEffect(effect, low, high, table.take("falls", int, None), table.take("of", int, None))
+    table.done()
+    return measured
+
+
+def _behavior(table: MapTable, primitives: dict[str, MotorPrimitive]) -> Behavior:
+    name = table.text("name")
+    magnitudes = table.numbers("magnitudes", {})
+    for key in magnitudes:
+        if key not in primitives and not ADDRESS.fullmatch(key):
+            known = ", ".join(primitives) or "none"
+            raise table.error("magnitudes", f"'{key}': neither layer:index nor a primitive ({known})")
+    commands = table.numbers("commands", {})
+    if not magnitudes and not commands:
+        raise table.error("magnitudes", "expected at least one unit")
+    period = table.take("period", NUMBER, None)
+    if period is not None and period <= 0:
+        raise table.error("period", f"expected more than 0 s, found {period}")
+    together = table.take("together", list, [])
+    if not all(isinstance(other, str) for other in together):
+        raise table.error("together", "expected names of behaviors")
+    mode = cast(BehaviorMode, table.choice("mode", ("fixed", "pid"), "fixed"))
+    aim_table, aim = table.table("aim", None), None
+    if aim_table is not None:
+        direction = cast(AimDirection, aim_table.choice("direction", get_args(AimDirection)))
+        aim = BehaviorAim(aim_table.text("attribute"), direction)
+        aim_table.done()
+    pid_table, pid = table.table("pid", None), None
+    if (pid_table is not None) != (mode == "pid"):
+        raise table.error("pid", 'expected with mode = "pid", and only there')
+    base = table.numbers("base", {})
+    if base and mode != "pid":
+        raise table.error("base", 'expected only with mode = "pid"')
+    for key in base:
+        if not ADDRESS.fullmatch(key):
+            raise table.error("base", f"'{key}': expected layer:index, such as 0:12")
+    if pid_table is not None:
+        gains = {name: float(pid_table.take(name, NUMBER)) for name in ("kp", "ki", "kd", "limit", "step")}
+        pid = PidGains(attribute=pid_table.text("attribute"), **gains)
+        if pid.limit <= 0:
+            raise pid_table.error("limit", f"expected more than 0, found {pid.limit}")
+        pid_table.done()
+    behavior = Behavior(
+        name=name,
+        key=table.text("key"),
+        says=table.text("says", ""),
+        magnitudes=magnitudes,
+        base=base,
+        period=None if period is None else float(period),
+        together=tuple(together),
+        mode=mode,
+        aim=aim,
+        measured=_measured(table),
+        pid=pid,
+        task=table.text("task", ""),
+        commands=commands,
+    )
+    table.done()
+    return behavior
+
+
+def _check_keys(source: str, default_key: str, behaviors: dict[str, Behavior]) -> None:
+    owners = {default_key: "the default key"}
+    for behavior in behaviors.values():
+        key, own = behavior.key, f"behavior '{behavior.name}'"
+        if key in RESERVED_KEYS:
+            raise MapError(f"{source}: {own}: key '{key}' is taken: it {RESERVED_KEYS[key]}")
+        if key in owners:
+            raise MapError(f"{source}: key '{key}' is bound to both {owners[key]} and {own}")
+        if not key:
+            raise MapError(f"{source}: {own}: the key is empty")
+        owners[key] = own

@@ -1,0 +1,58 @@
+"""How strong a stimulation is: the magnitude c of `v = c ρ`, fixed or from a PID controller."""
+
+from __future__ import annotations
+
+from simple_pid import PID
+
+from pdtui.core.angles import wrap_angle
+from pdtui.stimulation.stimulation_map import PidGains
+
+
+class PidMagnitude:
+    """c from a PID controller on the error between a target and an attribute.
+
+    An angle is followed continuously: the controller sees a heading that does not jump at ±π and a setpoint
+    on the same turn, so that its derivative term does not jump either.
+
+    Args:
+        gains: controller of the map.
+        wraps: whether the attribute is an angle.
+        dt: s per control step.
+    """
+
+    def __init__(self, gains: PidGains, wraps: bool, dt: float) -> None:
+        self.gains, self._wraps, self._dt = gains, wraps, dt
+        self._pid = PID(
+            gains.kp, gains.ki, gains.kd, sample_time=None, output_limits=(-gains.limit, gains.limit)
+        )
+        self._continuous: float | None = None
+        self.target = 0.0
+        self.value = 0.0
+        self.error = 0.0
+        self.magnitude = 0.0
+
+    def start(self, value: float, target: float | None = None) -> None:
+        """Begin to hold a target; by default the present value."""
+        self._pid.reset()
+        self._continuous = value
+        self.value = value
+        self.target = value if target is None else target
+
+    def set_target(self, target: float) -> None:
+        """Move the target; an angle is wrapped."""
+        self.target = wrap_angle(target) if self._wraps else target
+
+    def update(self, value: float) -> float:
+        """One control step: the magnitude c for the present value of the attribute."""
+        self.value = value
+        continuous = value if self._continuous is None else self._continuous
+        if self._wraps:
+            continuous += wrap_angle(value - continuous)
+            self.error = wrap_angle(self.target - value)
+        else:
+            continuous = value
+            self.error = self.target - value
+        self._continuous = continuous
+        self._pid.setpoint = continuous + self.error
+        self.magnitude = float(self._pid(continuous, dt=self._dt) or 0.0)
+        return self.magnitude

@@ -1,0 +1,127 @@
+"""A canvas of braille dots: every terminal cell holds 2 × 4 dots and one ink."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.segment import Segment
+from rich.style import Style
+from textual.strip import Strip
+
+Floats = NDArray[np.float64]
+
+DOTS_X, DOTS_Y = 2, 4
+# Unicode numbers the dots of a braille cell column by column, the lowest row (7 and 8) last.
+_BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], np.uint32)
+_EMPTY, _SPACE = 0x2800, 0x20
+
+
+class BrailleCanvas:
+    """Dots, inks and a few characters on a grid of cells.
+
+    x runs right and y runs down, both in dots, from the canvas's upper left corner; a dot covers a unit
+    square whose centre has coordinates ending in .5. What lies outside is cut off. A cell shows one ink:
+    the last that was put there.
+
+    Args:
+        columns, rows: size in terminal cells.
+    """
+
+    def __init__(self, columns: int, rows: int) -> None:
+        self.columns, self.rows = columns, rows
+        self.width, self.height = columns * DOTS_X, rows * DOTS_Y
+        self.dots = np.zeros((self.height, self.width), np.bool_)
+        self.inks = np.zeros((rows, columns), np.int16)
+        self._characters: list[tuple[int, int, str, int]] = []
+
+    def points(self, x: NDArray[Any], y: NDArray[Any], ink: int | NDArray[np.int16]) -> None:
+        """Set the dots that points (n,) fall on."""
+        column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+        inside = (column >= 0) & (column < self.width) & (row >= 0) & (row < self.height)
+        column, row = column[inside], row[inside]
+        self.dots[row, column] = True
+        self.inks[row // DOTS_Y, column // DOTS_X] = ink if isinstance(ink, int) else ink[inside]
+
+    def segments(self, starts: Floats, ends: Floats, ink: int | NDArray[np.int16]) -> None:
+        """Draw lines between points, shapes (n, 2); one ink for all, or one for each, shape (n,)."""
+        kept = _near(starts, ends, self.width, self.height)
+        starts, ends = starts[kept], ends[kept]
+        steps = np.ceil(np.abs(ends - starts).max(axis=-1, initial=0.0)).astype(np.int64) + 1
+        which = np.repeat(np.arange(len(starts)), steps)
+        first = np.cumsum(steps) - steps
+        place = (np.arange(len(which)) - first[which]) / np.maximum(steps[which] - 1, 1)
+        drawn = starts[which] + (ends - starts)[which] * place[:, None]
+        self.points(drawn[:, 0], drawn[:, 1], ink if isinstance(ink, int) else ink[kept][which])
+
+    def capsule(self, start: Floats, end: Floats, radius: float, ink: int, *, halo: float = 0.0) -> None:
+        """Fill all dots within `radius` of a line; around it, clear a rim of `halo` dots.
+
+        A line whose ends coincide is a disc. The rim keeps a near limb apart from a far one behind it.
+        """
+        reach = max(radius, 0.5) + halo
+        low = np.floor(np.minimum(start, end) - reach).astype(int)
+        high = np.ceil(np.maximum(start, end) + reach).astype(int)
+        x0, y0 = max(low[0], 0), max(low[1], 0)
+        x1, y1 = min(high[0], self.width), min(high[1], self.height)
+        if x0 >= x1 or y0 >= y1:
+            return
+        dx = np.arange(x0, x1) + 0.5 - start[0]
+        dy = (np.arange(y0, y1) + 0.5 - start[1])[:, None]
+        ax, ay = end - start
+        length = ax * ax + ay * ay
+        along = np.clip((dx * ax + dy * ay) / length, 0.0, 1.0) if length > 0 else 0.0
+        distance = np.hypot(dx - along * ax, dy - along * ay)
+        patch = self.dots[y0:y1, x0:x1]
+        if halo:
+            patch &= distance > reach
+        filled = distance <= max(radius, 0.5)
+        patch |= filled
+        row, column = np.nonzero(filled)
+        self.inks[(row + y0) // DOTS_Y, (column + x0) // DOTS_X] = ink
+
+    def text(self, column: int, row: int, text: str, ink: int) -> None:
+        """Put characters, one cell wide each, over whatever dots are there."""
+        if 0 <= row < self.rows:
+            start = max(0, -column)
+            cut = text[start : max(start, self.columns - column)]
+            if cut:
+                self._characters.append((column + start, row, cut, ink))
+
+    def codes(self) -> NDArray[np.uint32]:
+        """The character of every cell as a code point, shape (rows, columns)."""
+        cells = self.dots.reshape(self.rows, DOTS_Y, self.columns, DOTS_X)
+        codes: NDArray[np.uint32] = np.einsum("ryct,yt->rc", cells, _BITS, dtype=np.uint32)
+        codes += np.uint32(_EMPTY)
+        codes[codes == _EMPTY] = _SPACE
+        return codes
+
+    def strips(self, styles: Sequence[Style]) -> list[Strip]:
+        """The canvas as lines; an ink is an index into `styles`."""
+        codes, inks = self.codes(), self.inks.copy()
+        for column, row, text, ink in self._characters:
+            codes[row, column : column + len(text)] = [ord(character) for character in text]
+            inks[row, column : column + len(text)] = ink
+        return [Strip(_runs(codes[row], inks[row], styles), self.columns) for row in range(self.rows)]
+
+
+def _near(starts: Floats, ends: Floats, width: int, height: int) -> NDArray[np.bool_]:
+    """Which lines may touch the canvas and have finite, sane ends, so that none needs endless steps."""
+    size = np.array([width, height], np.float64)
+    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
+    touching = (high >= 0).all(-1) & (low <= size).all(-1)
+    near: NDArray[np.bool_] = touching & ((high - low) <= 4 * size.max()).all(-1)
+    return near
+
+
+def _runs(codes: NDArray[np.uint32], inks: NDArray[np.int16], styles: Sequence[Style]) -> list[Segment]:
+    """Segments of one ink; blanks take the ink on their left, which makes fewer of them."""
+    places = np.arange(len(codes))
+    inked = np.maximum.accumulate(np.where(codes != _SPACE, places, 0))
+    shown = inks[inked]
+    text = codes.astype("<u4").tobytes().decode("utf-32-le")
+    cuts = [0, *(np.flatnonzero(shown[1:] != shown[:-1]) + 1).tolist(), len(codes)]
+    return [Segment(text[a:b], styles[shown[a]]) for a, b in pairwise(cuts)]

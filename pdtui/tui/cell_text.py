@@ -1,0 +1,94 @@
+"""Text on the screen: fitted into cells, numbers and keys made short."""
+
+from __future__ import annotations
+
+from rich.cells import cell_len, set_cell_size
+from rich.segment import Segment
+from rich.style import Style
+from textual.strip import Strip
+
+from pdtui.core.plain_text import printable
+
+_KEYS = {
+    "up": "↑",
+    "down": "↓",
+    "left": "←",
+    "right": "→",
+    "plus": "+",
+    "minus": "-",
+    "comma": ",",
+    "full_stop": ".",
+    "question_mark": "?",
+    "backspace": "⌫",
+    "space": "space",
+    "enter": "↵",
+}
+
+
+def fit_cells(text: str, width: int) -> str:
+    """Exactly `width` cells: padded on the right, or cut with an ellipsis."""
+    if width <= 0:
+        return ""
+    if cell_len(text) <= width:
+        return text + " " * (width - cell_len(text))
+    return set_cell_size(set_cell_size(text, width - 1).rstrip() + "…", width)
+
+
+def wrap_text(text: str, width: int, lines: int) -> list[str]:
+    """Break a sentence at its spaces into at most `lines` lines; the last is cut with an ellipsis."""
+    rows = [""]
+    for word in text.split():
+        longer = f"{rows[-1]} {word}" if rows[-1] else word
+        if cell_len(longer) <= width or not rows[-1] or len(rows) == lines:
+            rows[-1] = longer
+        else:
+            rows.append(word)
+    return [fit_cells(row, width).rstrip() for row in rows]
+
+
+def format_number(value: float) -> str:
+    """A number in at most 7 characters with a true minus sign."""
+    size = abs(value)
+    digits = 2 if size < 100 else 1 if size < 1000 else 0
+    shown = f"{value:.{digits}f}" if size < 99999.5 else f"{value:.0e}".replace("e+0", "e")
+    if float(shown) == 0.0:
+        shown = shown.lstrip("-")
+    return shown.replace("-", "−")
+
+
+def format_signed(value: float) -> str:
+    """`format_number` with its sign always shown."""
+    shown = format_number(value)
+    return shown if shown.startswith("−") else f"+{shown}"
+
+
+def key_name(key: str) -> str:
+    """How a key is written on the screen."""
+    return printable(_KEYS.get(key, key))
+
+
+class ScreenRow:
+    """One line of the screen, put together from the left."""
+
+    def __init__(self, width: int) -> None:
+        self.width, self.left = width, width
+        self._segments: list[Segment] = []
+
+    def add(self, text: str, style: Style, width: int | None = None, *, right: bool = False) -> ScreenRow:
+        """Append text, fitted to `width` cells if given; what does not fit on the line is cut."""
+        if width is not None:
+            text = " " * (width - cell_len(text)) + text if right else text
+            text = fit_cells(text, width)
+        if cell_len(text) > self.left:
+            text = fit_cells(text, self.left)
+        if text:
+            self._segments.append(Segment(text, style))
+            self.left -= cell_len(text)
+        return self
+
+    def strip(self) -> Strip:
+        """The line, blank to its end."""
+        if self.left:
+            self._segments.append(Segment(" " * self.left))
+            self.left = 0
+        return Strip(self._segments, self.width)

@@ -1,0 +1,206 @@
+"""The application that shows a running drive and passes its keys on."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Mapping
+from time import monotonic
+from typing import cast
+
+from textual import events
+from textual.app import App, ComposeResult
+from textual.containers import Container
+from textual.reactive import reactive
+
+from pdtui.core.errors import PdtuiError
+from pdtui.drive.drive_protocol import DriveConnection, PaceRequest
+from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.stimulation.stimulation_map import StimulationMap
+from pdtui.tui.cell_text import key_name
+from pdtui.tui.help_screen import HelpScreen
+from pdtui.tui.panel import Panel
+from pdtui.tui.screen_keys import BINDINGS, SHORT, drive_keys
+from pdtui.tui.size_notice import SizeNotice, is_too_small
+from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
+from pdtui.tui.theme import THEME
+from pdtui.tui.widgets.attribute_table import AttributeTable
+from pdtui.tui.widgets.behavior_list import BehaviorList
+from pdtui.tui.widgets.heat_strip import HeatStrip
+from pdtui.tui.widgets.path_view import PathView
+from pdtui.tui.widgets.robot_view import RobotView
+from pdtui.tui.widgets.status_lines import KeyLine, NoticeLine, StatusLine
+from pdtui.tui.widgets.unit_table import UnitTable
+
+NOTICE_SECONDS = 4.0
+_ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
+
+
+class DriveApp(App[str]):
+    """Polls a drive and draws the newest snapshot; keys go down the link.
+
+    Whoever made the link closes it afterwards. `run` returns None when the user quits; where the drive's
+    process fails, it returns the failure's message and `return_code` is 1.
+
+    Args:
+        link: the drive.
+        stimulation_map: the behaviors that it was started with.
+        fps: how often the link is polled, per second.
+        watching: the drive follows a recording: keys that would change the run are refused.
+    """
+
+    CSS = DRIVE
+    TITLE = "pdtui"
+    BINDINGS = BINDINGS  # type: ignore[assignment]  # Textual's own type is an invariant list of a union
+    ENABLE_COMMAND_PALETTE = False
+    HORIZONTAL_BREAKPOINTS = WIDTHS
+    VERTICAL_BREAKPOINTS = HEIGHTS
+
+    facts: reactive[DriveFacts | None] = reactive(None, init=False, repaint=False, always_update=True)
+    snapshot: reactive[DriveSnapshot | None] = reactive(None, init=False, repaint=False, always_update=True)
+    notice: reactive[str] = reactive("", init=False, repaint=False)
+
+    def __init__(
+        self, link: DriveConnection, stimulation_map: StimulationMap, *, fps: int = 12, watching: bool = False
+    ) -> None:
+        super().__init__()
+        self.link, self.map, self.fps, self.watching = link, stimulation_map, fps, watching
+        self._drive_keys = drive_keys(stimulation_map)
+        self._notice_until = 0.0
+        self._help: HelpScreen | None = None
+        self.register_theme(THEME)
+        self.theme = THEME.name
+
+    def compose(self) -> ComposeResult:
+        def bound(panel: Panel) -> Panel:
+            return panel.data_bind(DriveApp.facts, DriveApp.snapshot)
+
+        yield bound(StatusLine(self.map, id="status"))
+        with Container(id="body"):
+            with Container(id="left"):
+                yield bound(RobotView(self.map, id="robot"))
+                with Container(id="below"):
+                    yield bound(PathView(self.map, id="path"))
+                    yield bound(UnitTable(self.map, id="units"))
+            with Container(id="right"):
+                yield bound(BehaviorList(self.map, id="behaviors"))
+                yield bound(AttributeTable(self.map, id="attributes"))
+        yield bound(HeatStrip(self.map, id="heat"))
+        yield bound(NoticeLine(self.map, id="notice")).data_bind(DriveApp.notice)
+        yield KeyLine(self.map, id="keys")
+        yield SizeNotice(id="too-small")
+
+    def on_mount(self) -> None:
+        """Begin to poll."""
+        self.query_one(StatusLine).watching = self.watching
+        self._show_keys()
+        self.set_interval(1.0 / self.fps, self._poll)
+        # Left to their default, these would leave the terminal raw and the recording to its own devices.
+        loop = asyncio.get_running_loop()
+        for number in _ENDING_SIGNALS:
+            loop.add_signal_handler(number, self._end, number)
+
+    def watch_facts(self, facts: DriveFacts | None) -> None:
+        """A world without a body needs no room for one."""
+        self.screen_stack[0].set_class(facts is not None and not facts.links, "-bodiless")
+
+    def on_unmount(self) -> None:
+        """Give the signals back."""
+        loop = asyncio.get_running_loop()
+        for number in _ENDING_SIGNALS:
+            loop.remove_signal_handler(number)
+
+    def _end(self, number: signal.Signals) -> None:
+        self.exit(f"ended by {number.name}", return_code=1)
+
+    def on_resize(self, event: events.Resize) -> None:
+        """Show the drive, or say that the terminal is too small for it."""
+        self.screen_stack[0].set_class(is_too_small(event.size), "-too-small")
+
+    def set_keymap(self, keymap: Mapping[str, str]) -> None:
+        """Give bindings other keys, by their ids; see `pdtui.tui.screen_keys`."""
+        super().set_keymap(dict(keymap))
+        if self.is_running:
+            self._show_keys()
+            if self._help is not None and self._help is not self.screen:
+                self.uninstall_screen("help")
+                self._help = None
+
+    @property
+    def keys_now(self) -> dict[str, tuple[str, str]]:
+        """Key and sentence of each binding by its id, as remapped; without those that the map's keys hide."""
+        found: dict[str, tuple[str, str]] = {}
+        for key, active in self.screen_stack[0].active_bindings.items():
+            binding = active.binding
+            if active.node is self and binding.id and (binding.priority or key not in self._drive_keys):
+                found.setdefault(binding.id, (key, binding.description))
+        return {name: found[name] for binding in BINDINGS if (name := binding.id) in found}
+
+    def _show_keys(self) -> None:
+        now = self.keys_now
+        shown = tuple((key_name(now[name][0]), says) for name, says in SHORT.items() if name in now)
+        self.query_one(KeyLine).keys = shown
+        leave = now.get("quit", now["quit_always"])[0]
+        self.query_one(NoticeLine).hints = f"{key_name(leave)} quits"
+
+    def _poll(self) -> None:
+        if self._notice_until and monotonic() > self._notice_until:
+            self._notice_until, self.notice = 0.0, ""
+        try:
+            message = self.link.poll()
+        except PdtuiError as error:
+            self.exit(str(error), return_code=1)
+            return
+        if isinstance(message, DriveFacts):
+            self.facts = message
+        elif message is not None:
+            if message.notice:
+                self.say(message.notice)
+            self.snapshot = message
+
+    def say(self, notice: str) -> None:
+        """Show a line for a few seconds."""
+        self.notice = notice
+        self._notice_until = monotonic() + NOTICE_SECONDS
+
+    def on_key(self, event: events.Key) -> None:
+        """Keys of the map come before all bindings; a key that nobody has is named."""
+        if event.key in self._drive_keys:
+            event.prevent_default()
+            self.action_run_key(event.key)
+        elif not self.screen.is_modal and event.key not in self.screen.active_bindings:
+            self.say(f"no behavior has the key {key_name(event.key)}; ? lists all keys")
+
+    def action_run_key(self, key: str) -> None:
+        """Send a key that changes the run, unless a recording is being watched."""
+        if self.watching:
+            self.say(f"{key_name(key)}: this drive follows a recording, so keys cannot change it")
+        elif self.snapshot is not None and self.snapshot.finished:
+            self.say("the drive is over")
+        elif self.facts is None:
+            self.say("the policy is still loading")
+        else:
+            self.link.press(key)
+
+    def action_pace(self, request: str) -> None:
+        """Ask the drive for another pace."""
+        self.link.pace(cast(PaceRequest, request))
+
+    def action_toggle_view(self) -> None:
+        """Look from the side, or from above."""
+        robot = self.query_one(RobotView)
+        robot.view = "above" if robot.view == "side" else "side"
+
+    def action_help(self) -> None:
+        """List all keys."""
+        if isinstance(self.screen, HelpScreen):
+            return
+        # One for all times: Textual keeps what up to 1024 widgets that are gone had drawn.
+        if self._help is None:
+            self._help = HelpScreen(self.map, list(self.keys_now.values()))
+            self.install_screen(self._help, "help")
+        self.push_screen("help")
+
+    def action_leave(self) -> None:
+        """Quit; whoever made the link then ends the drive."""
+        self.exit()

@@ -1,0 +1,79 @@
+"""The overlay that lists every key with a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from rich.style import Style
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import VerticalScroll
+from textual.screen import ModalScreen
+from textual.widgets import Static
+
+from pdtui.core.plain_text import printable
+from pdtui.stimulation.stimulation_map import StimulationMap
+from pdtui.tui.cell_text import key_name
+from pdtui.tui.theme import ThemeStyles, theme_styles
+
+_LATCHING = (
+    "A key latches its behavior: it lasts until its period ends, or until the key of another behavior or the "
+    "clearing key is pressed. Terminals do not tell when a key is released."
+)
+KeyLines = Sequence[tuple[str, str]]
+
+
+class HelpScreen(ModalScreen[None]):
+    """All keys: those of the map, then the application's. The drive goes on beneath, and its keys still work.
+
+    Args:
+        stimulation_map: the behaviors and their keys.
+        keys: the application's keys as they are now, with sentences.
+    """
+
+    BINDINGS: ClassVar = [
+        Binding("question_mark,q,enter,escape", "dismiss", "closes the help", id="close_help"),
+        Binding("up", "scroll(-1)", show=False, id="help_up"),
+        Binding("down", "scroll(1)", show=False, id="help_down"),
+    ]
+
+    def __init__(self, stimulation_map: StimulationMap, keys: KeyLines) -> None:
+        super().__init__()
+        self._map, self._keys = stimulation_map, keys
+
+    def compose(self) -> ComposeResult:
+        with VerticalScroll(id="help", can_focus=False) as box:
+            box.border_title = "keys"
+            box.border_subtitle = "? q ↵ close   ↑ ↓ scroll"
+            yield Static(self._text(theme_styles(self.app.theme_variables)))
+
+    def action_scroll(self, direction: int) -> None:
+        """Move the list by a few lines."""
+        self.query_one("#help").scroll_relative(y=3 * direction, animate=False)
+
+    def _text(self, palette: ThemeStyles) -> Text:
+        text = Text(no_wrap=False)
+
+        def line(key: str, says: str, cap: Style, style: Style) -> None:
+            text.append(f" {key_name(key)} ", cap)
+            text.append(" " * max(1, 9 - len(key_name(key))))
+            text.append(f"{printable(says)}\n", style)
+
+        text.append("behaviors\n", palette.accent)
+        for row, behavior in enumerate(self._map.behaviors.values()):
+            cap = palette.caps[row % len(palette.caps)]
+            line(
+                behavior.key, f"{behavior.name}: {behavior.says}{_detail(behavior.period)}", cap, palette.text
+            )
+        line(self._map.default_key, "clears all stimulation", palette.key, palette.text)
+        text.append(f"\n{_LATCHING}\n", palette.muted)
+        text.append("\neverything else\n", palette.accent)
+        for key, says in self._keys:
+            line(key, says, palette.key, palette.text)
+        return text
+
+
+def _detail(period: float | None) -> str:
+    return "" if period is None else f" ({period:g} s)"

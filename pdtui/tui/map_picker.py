@@ -1,0 +1,155 @@
+"""The application that lists robots with their maps, and lets the user choose what to drive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from rich.style import Style
+from rich.text import Text
+from textual.app import App, ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.widgets import Input, OptionList, Static
+from textual.widgets.option_list import Option
+
+from pdtui.core.plain_text import printable
+from pdtui.tui.cell_text import fit_cells
+from pdtui.tui.style_sheets import PICKER
+from pdtui.tui.theme import THEME, ThemeStyles, theme_styles
+
+if TYPE_CHECKING:
+    from pdtui.stimulation.map_library import ListedMap
+
+
+@dataclass(frozen=True)
+class PickerRow:
+    """One map that can be driven, or that cannot and why.
+
+    Attributes:
+        robot: name of the robot.
+        title: of the robot, for people.
+        map_path: file of the map.
+        policy: that the map was made for.
+        behaviors: how many the map has.
+        problem: what is wrong with the map, empty if nothing is.
+    """
+
+    robot: str
+    title: str
+    map_path: str
+    policy: str = ""
+    behaviors: int = 0
+    problem: str = ""
+
+    def __str__(self) -> str:
+        """The map's file, which is how a command line names a row."""
+        return self.map_path
+
+
+def picker_rows(maps: Sequence[ListedMap]) -> list[PickerRow]:
+    """Rows for maps as they were found; of a broken map only its file's name is known."""
+    rows = []
+    for listed in maps:
+        found = listed.stimulation_map
+        if found is None:
+            rows.append(PickerRow("", listed.path.stem, str(listed.path), problem=listed.problem))
+        else:
+            rows.append(
+                PickerRow(found.robot, found.robot, str(listed.path), found.policy, len(found.behaviors))
+            )
+    return rows
+
+
+class PickerApp(App[PickerRow]):
+    """Arrow keys choose, typing filters, enter drives; the result is the chosen row, or None.
+
+    Args:
+        rows: the maps, in the order in which they are listed.
+    """
+
+    CSS = PICKER
+    TITLE = "pdtui"
+    ENABLE_COMMAND_PALETTE = False
+    BINDINGS: ClassVar = [
+        Binding("up", "move(-1)", "the map above", id="pick_up", priority=True),
+        Binding("down", "move(1)", "the map below", id="pick_down", priority=True),
+        Binding("enter", "choose", "drives the marked map", id="pick", priority=True),
+        Binding("ctrl+c", "quit", "quits without a choice", id="pick_quit", priority=True),
+    ]
+
+    def __init__(self, rows: Sequence[PickerRow]) -> None:
+        super().__init__()
+        self.rows = tuple(rows)
+        self.register_theme(THEME)
+        self.theme = THEME.name
+
+    def compose(self) -> ComposeResult:
+        with Vertical(id="picker") as box:
+            box.border_title = "what shall be driven?"
+            box.border_subtitle = "↑ ↓ choose   ↵ drive   type to filter   ctrl+c quit"
+            yield Input(placeholder="filter: robot, map or policy", id="filter")
+            yield OptionList(id="rows", markup=False)
+            yield Static(id="none", markup=False)
+
+    def on_mount(self) -> None:
+        """List everything."""
+        self._list(self.rows)
+        self.query_one(Input).focus()
+
+    def on_input_changed(self, event: Input.Changed) -> None:
+        """List the rows in which every word of the filter occurs."""
+        words = event.value.lower().split()
+        self._list([row for row in self.rows if all(word in _searched(row) for word in words)])
+
+    def action_move(self, direction: int) -> None:
+        """Mark the next row that can be chosen."""
+        options = self.query_one(OptionList)
+        if direction > 0:
+            options.action_cursor_down()
+        else:
+            options.action_cursor_up()
+
+    def action_choose(self) -> None:
+        """Leave with the marked row."""
+        options = self.query_one(OptionList)
+        if options.highlighted is not None:
+            chosen = options.get_option_at_index(options.highlighted)
+            if not chosen.disabled and chosen.id is not None:
+                self.exit(self.rows[int(chosen.id)])
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """A click chooses, too."""
+        if event.option_id is not None:
+            self.exit(self.rows[int(event.option_id)])
+
+    def _list(self, rows: Sequence[PickerRow]) -> None:
+        options = self.query_one(OptionList)
+        palette = theme_styles(self.theme_variables)
+        options.clear_options()
+        options.add_options(
+            Option(_prompt(row, palette), id=str(self.rows.index(row)), disabled=bool(row.problem))
+            for row in rows
+        )
+        first = next((index for index, row in enumerate(rows) if not row.problem), None)
+        options.highlighted = first
+        none = "no maps here yet: dissect a policy first" if not self.rows else "nothing matches the filter"
+        self.query_one("#none", Static).update("" if rows else none)
+
+
+def _searched(row: PickerRow) -> str:
+    return f"{row.robot} {row.title} {row.map_path} {row.policy}".lower()
+
+
+def _prompt(row: PickerRow, palette: ThemeStyles) -> Text:
+    """Two lines: what it is, then how many behaviors, or what is wrong."""
+    bad = bool(row.problem)
+    text = Text(no_wrap=True, overflow="ellipsis")
+    text.append(fit_cells(printable(row.title), 26), palette.muted if bad else palette.title)
+    text.append(f" {printable(row.map_path)}\n", palette.muted if bad else palette.primary)
+    if bad:
+        return text.append(f"  ✗ {printable(row.problem)}", palette.bad)
+    count = "1 behavior" if row.behaviors == 1 else f"{row.behaviors} behaviors"
+    text.append(fit_cells(f"  {count}", 26), palette.good)
+    return text.append(f" {printable(row.policy)}", palette.muted + Style(italic=True))

@@ -1,0 +1,49 @@
+"""Obstacles on a canvas: discs from above, trunks from the side."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pdtui.tui.braille_canvas import BrailleCanvas
+from pdtui.tui.camera import Camera, Floats
+
+_LEAST = 1.0
+"""Radius of the smallest disc, in dots: larger than a dot of the ground."""
+
+
+def draw_from_above(canvas: BrailleCanvas, camera: Camera, obstacles: Floats, ink: int) -> None:
+    """Discs of the obstacles' radii on the ground, each with a rim that the ground does not reach."""
+    dots, magnification, before = camera.project(_on_ground(obstacles))
+    for dot, scale, radius in zip(dots[before], magnification[before], obstacles[before, 2], strict=True):
+        canvas.capsule(dot, dot, max(_LEAST, float(radius * scale) * camera.zoom), ink, halo=1.0)
+
+
+def draw_from_side(
+    canvas: BrailleCanvas, camera: Camera, obstacles: Floats, ink: int, *, behind: bool
+) -> None:
+    """Trunks up to the picture's edge, far ones first; before the robot as two lines, which hide nothing.
+
+    How high an obstacle is, nobody says.
+
+    Args:
+        canvas, camera: that draw the robot.
+        obstacles: x, y and radius, m, shape (N, 3).
+        ink: of the trunks.
+        behind: draw those behind the robot, or those before it.
+    """
+    chosen = obstacles[(obstacles[:, 1] > camera.target[1]) == behind]
+    chosen = chosen[np.argsort(-chosen[:, 1], kind="stable")]
+    feet, magnification, before = camera.project(_on_ground(chosen))
+    widths = chosen[:, 2] * magnification * camera.zoom
+    for row in np.flatnonzero(before):
+        foot, top = feet[row], np.array([feet[row, 0], min(feet[row, 1], 0.0)])
+        if behind:
+            canvas.capsule(foot, top, float(widths[row]), ink, halo=1.0)
+        else:
+            sides = np.array([[-widths[row], 0.0], [widths[row], 0.0]])
+            canvas.segments(foot + sides, top + sides, ink)
+
+
+def _on_ground(obstacles: Floats) -> Floats:
+    places: Floats = obstacles * np.array([1.0, 1.0, 0.0])
+    return places

@@ -1,0 +1,124 @@
+"""Colours: one theme of our own, and the inks that pictures and tables are drawn with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+from rich.style import Style
+from textual.color import Color
+from textual.theme import Theme
+
+from pdtui.stimulation.behavior_colors import BEHAVIOR_COLORS
+
+THEME = Theme(
+    name="pdtui",
+    primary="#6cb6d9",
+    secondary="#8ea8ff",
+    accent="#f0a45d",
+    success="#84d39a",
+    warning="#f2cc60",
+    error="#f47c7c",
+    foreground="#cdd6e0",
+    background="#0c1016",
+    surface="#10151d",
+    panel="#18202b",
+    dark=True,
+)
+_COLD, _WARM = "#4aa3ff", "#ff9d4d"
+HEAT_LEVELS = 8
+
+
+@dataclass(frozen=True)
+class ThemeStyles:
+    """Styles of a theme.
+
+    Attributes:
+        base: the background, beneath everything.
+        text, muted, faint: three strengths of the foreground.
+        title: names of things.
+        primary, accent, good, warn, bad: the theme's colours.
+        alert: what must be read at once.
+        obstacle: what stands in the robot's way.
+        key: a key cap that is not latched.
+        behaviors: by row in the map, modulo their number.
+        caps: key caps of latched behaviors, in the same order.
+        depth: shades of the robot from far to near.
+        heat: colours from −1 over 0 to +1, 2 × HEAT_LEVELS + 1 of them.
+    """
+
+    base: Style
+    text: Style
+    muted: Style
+    faint: Style
+    title: Style
+    primary: Style
+    accent: Style
+    good: Style
+    warn: Style
+    bad: Style
+    alert: Style
+    obstacle: Style
+    key: Style
+    behaviors: tuple[Style, ...]
+    caps: tuple[Style, ...]
+    depth: tuple[Style, ...]
+    heat: tuple[Color, ...]
+
+    def behavior(self, row: int) -> Style:
+        """Colour of the behavior in this row of the map; faint for no behavior."""
+        return self.faint if row < 0 else self.behaviors[row % len(self.behaviors)]
+
+
+def theme_styles(variables: Mapping[str, str]) -> ThemeStyles:
+    """The palette of a theme, from Textual's theme variables."""
+    names = ("background", "foreground", "primary", "accent", "success", "warning", "error", "panel")
+    return _palette(*(variables[name] for name in names))
+
+
+@lru_cache(maxsize=8)
+def _palette(
+    background: str,
+    foreground: str,
+    primary: str,
+    accent: str,
+    success: str,
+    warning: str,
+    error: str,
+    panel: str,
+) -> ThemeStyles:
+    back, front, main = Color.parse(background), Color.parse(foreground), Color.parse(primary)
+    colors = [Color.parse(color) for color in BEHAVIOR_COLORS]
+    cold, warm = Color.parse(_COLD), Color.parse(_WARM)
+    zero = back.blend(Color.parse(panel), 0.8)
+
+    def style(color: Color, *, bold: bool = False, on: Color | None = None) -> Style:
+        return Style(color=color.rich_color, bold=bold or None, bgcolor=None if on is None else on.rich_color)
+
+    def heat(level: int) -> Color:
+        share = (abs(level) / HEAT_LEVELS) ** 0.8
+        return zero.blend(warm if level > 0 else cold, share)
+
+    return ThemeStyles(
+        base=Style(bgcolor=back.rich_color),
+        text=style(front),
+        muted=style(back.blend(front, 0.58)),
+        faint=style(back.blend(front, 0.30)),
+        title=style(front, bold=True),
+        primary=style(main),
+        accent=style(Color.parse(accent), bold=True),
+        good=style(Color.parse(success)),
+        warn=style(Color.parse(warning)),
+        bad=style(Color.parse(error)),
+        alert=style(back, bold=True, on=Color.parse(error)),
+        obstacle=style(Color.parse(success), bold=True),
+        key=style(front, bold=True, on=back.blend(front, 0.16)),
+        behaviors=tuple(style(color) for color in colors),
+        caps=tuple(style(back, bold=True, on=color) for color in colors),
+        depth=tuple(style(back.blend(main.lighten(light), share)) for light, share in _DEPTHS),
+        heat=tuple(heat(level) for level in range(-HEAT_LEVELS, HEAT_LEVELS + 1)),
+    )
+
+
+_DEPTHS = ((0.0, 0.45), (0.0, 0.62), (0.0, 0.80), (0.03, 1.0), (0.16, 1.0))

@@ -1,0 +1,166 @@
+"""The lines at the edges of the screen: how the drive stands, what happened, and which keys help."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+from rich.cells import cell_len
+from rich.style import Style
+from textual.reactive import reactive
+from textual.strip import Strip
+
+from pdtui.core.plain_text import file_size, printable
+from pdtui.sessions.episode_statistics import NO_STATISTICS
+from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number
+from pdtui.tui.panel import Panel
+
+_NAME = 40
+Part = tuple[str, Style]
+
+
+class StatusLine(Panel):
+    """Robot on the left, state of the drive on the right; what matters less is left out first."""
+
+    watching: reactive[bool] = reactive(False, init=False, repaint=False)
+
+    def paint(self, width: int, height: int) -> list[Strip]:
+        del height
+        palette = self.palette
+        title = self.map.robot if self.facts is None else self.facts.title
+        row = ScreenRow(width).add(" pdtui ", palette.caps[1]).add(f" {printable(title)}", palette.title)
+        shown: list[tuple[int, Part]] = []
+        left = row.left - 1
+        for position, part in sorted(self._parts(), key=lambda item: item[0]):
+            length = cell_len(part[0]) + 2
+            if length <= left:
+                left -= length
+                shown.append((position, part))
+        row.add(" " * max(0, left), palette.text)
+        order = (4, 8, 7, 6, 5, 1, 2, 3, 0)
+        for _, (text, style) in sorted(shown, key=lambda item: order.index(item[0])):
+            row.add("  " + text, style)
+        return [row.strip()]
+
+    def _parts(self) -> list[tuple[int, Part]]:
+        """Parts of the line with their importance, 0 the highest."""
+        palette = self.palette
+        if self.facts is None:
+            return [
+                (0, ("loading the policy…", palette.warn)),
+                (4, (printable(self.map.policy), palette.muted)),
+            ]
+        parts: list[tuple[int, Part]] = [
+            (4, (printable(PurePath(self.facts.policy).name), palette.muted)),
+            (6, (f"seed {self.facts.seed}", palette.muted)),
+        ]
+        snapshot = self.snapshot
+        if snapshot is None:
+            return parts
+        parts += [
+            (0, self._pace()),
+            (1, (f"step {snapshot.step}", palette.text)),
+            (2, (f"{snapshot.time:.1f} s", palette.text)),
+            (5, (f"involvement {snapshot.involvement}", palette.muted)),
+            (7, (f"episode {snapshot.episode}", palette.muted)),
+        ]
+        if self.facts.recording:
+            name = _shorten(printable(PurePath(self.facts.recording).name), _NAME)
+            parts.append((3, (f"● {file_size(snapshot.recorded_bytes)}", palette.bad)))
+            parts.append((8, (name, palette.muted)))
+        return parts
+
+    def _pace(self) -> Part:
+        snapshot, palette = self.snapshot, self.palette
+        assert snapshot is not None
+        if snapshot.finished:
+            return "■ over", palette.bad
+        kind = "watching " if self.watching else ""
+        asked = f"{snapshot.speed:g}×"
+        if snapshot.paused:
+            return f"{kind}⏸ paused at {asked}", palette.warn
+        slow = snapshot.achieved < 0.93 * snapshot.speed
+        return f"{kind}▶ {asked} ({format_number(snapshot.achieved)})", palette.warn if slow else palette.good
+
+
+class NoticeLine(Panel):
+    """What the user should read now; the end of the drive stays."""
+
+    notice: reactive[str] = reactive("", init=False, repaint=False)
+    hints: reactive[str] = reactive("", init=False, repaint=False)
+
+    def watch_notice(self) -> None:
+        """Something is to be read."""
+        self.redraw()
+
+    def paint(self, width: int, height: int) -> list[Strip]:
+        del height
+        palette, row, counters = self.palette, ScreenRow(width), self._counters()
+        finished = self.snapshot.finished if self.snapshot is not None else ""
+        if finished:
+            said, style = f" ■ the drive is over: {printable(finished)}   {self.hints} ", palette.alert
+        elif self.notice:
+            row.add(" ▌ ", palette.warn)
+            said, style = printable(self.notice), palette.title
+        else:
+            row.add(" ▌ ", palette.faint)
+            said, style = self._summary(), palette.muted
+        room = row.left - cell_len(counters) - 2
+        urgent = bool(finished or self.notice)
+        if counters and (not urgent or cell_len(said) <= room):
+            said = said if urgent else fit_cells(said, room)
+            row.add(said, style).add(" " * (room - cell_len(said) + 1), palette.text)
+            row.add(counters, palette.text)
+        else:
+            row.add(said, style)
+        return [row.strip()]
+
+    def _counters(self) -> str:
+        """How the episode stands, for a robot with a way to go or obstacles to run into."""
+        tally = self.snapshot.tally if self.snapshot is not None else NO_STATISTICS
+        shown = [] if tally.distance is None else [f"{format_number(tally.distance)} m"]
+        if tally.collisions is not None:
+            shown.append(f"{tally.collisions:g} collision{'' if tally.collisions == 1.0 else 's'}")
+        if not shown:
+            return ""
+        steps = "1 step" if tally.involvement == 1 else f"{tally.involvement} steps"
+        keyed = f"{steps} with a key ({100.0 * tally.share:.1f} %)"
+        return f"episode {tally.episode}: {' · '.join([*shown, keyed])}"
+
+    def _summary(self) -> str:
+        """What is there to say when nothing happened."""
+        if self.snapshot is None or self.facts is None:
+            return "pdtui is ready when the policy is"
+        facts = self.facts
+        place = printable(facts.recording) or "not recorded"
+        if self._counters():
+            return f"seed {facts.seed} · {place}"
+        share = 100.0 * self.snapshot.involvement / max(1, self.snapshot.step)
+        keyed = f"{self.snapshot.involvement} steps with a key ({share:.1f} %)"
+        return f"seed {facts.seed} · episode {self.snapshot.episode} · {keyed} · {place}"
+
+
+class KeyLine(Panel):
+    """The application's own keys, as far as there is room."""
+
+    keys: reactive[tuple[tuple[str, str], ...]] = reactive((), init=False, repaint=False)
+
+    def watch_keys(self) -> None:
+        """The keys were remapped."""
+        self.redraw()
+
+    def paint(self, width: int, height: int) -> list[Strip]:
+        del height
+        row = ScreenRow(width).add(" ", self.palette.text)
+        for key, says in self.keys:
+            if cell_len(key) + cell_len(says) + 3 > row.left:
+                break
+            row.add(key, self.palette.accent).add(f" {says}  ", self.palette.muted)
+        return [row.strip()]
+
+
+def _shorten(name: str, width: int) -> str:
+    """Cut in the middle: of a file's name, beginning and end say most."""
+    if len(name) <= width:
+        return name
+    end = width // 2
+    return f"{name[: width - end - 1]}…{name[-end:]}"

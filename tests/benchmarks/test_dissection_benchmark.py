@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from pdtui.benchmarks.dissection_benchmark import BenchmarkSizes, record_episodes, same_ranking, widen_episode
+from pdtui.benchmarks.librosa_matching import load_librosa, match_by_loop
+from pdtui.cli import main
+from pdtui.core.attributes import Attribute
+from pdtui.core.errors import PdtuiError
+from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.spectra.matching import match_units
+from pdtui.spectra.matching_presets import PRESETS
+from pdtui.spectra.monitor import MonitoredEpisode
+
+SMALL = [
+    "--episodes",
+    "2",
+    "--steps",
+    "150",
+    "--units",
+    "20",
+    "--attributes",
+    "18",
+    "--rounds",
+    "2",
+    "--memory-units",
+    "300",
+    "--probes",
+    "4",
+]
+
+
+def test_the_command_measures_all_parts(weights: Path) -> None:
+    result = CliRunner().invoke(main, ["bench", "dissect", "ant", "--policy", str(weights), *SMALL, "--json"])
+    assert result.exit_code == 0, result.output
+    data = json.loads(result.output)
+    assert [one["preset"] for one in data["compared"]] == ["paper", "authors"]
+    for one in data["compared"]:
+        assert one["same_ranking"]
+        assert one["largest_difference"] < 1e-12
+        assert one["ratio"] > 0
+    assert {curve["grows"]: len(curve["sizes"]) for curve in data["curves"]} == {
+        "units": 5, "attributes": 5, "episodes": 4,
+    }  # fmt: skip
+    assert data["memory_units"] == 300
+    assert data["memory_peak_gb"] > data["memory_data_gb"] > 0
+    assert data["probing_ratio"] > 0
+    assert "shifted in time" in data["recorded"]
+    table = CliRunner().invoke(main, ["bench", "dissect", "--policy", str(weights), *SMALL])
+    assert "the same" in table.output
+    assert "2 workers / 1" in table.output
+
+
+def test_the_loop_computes_what_matching_does() -> None:
+    rng = np.random.default_rng(0)
+    episodes = [
+        MonitoredEpisode(
+            seed, rng.standard_normal((200, 9)).astype(np.float32), rng.standard_normal((200, 2))
+        )
+        for seed in range(2)
+    ]
+    attributes = (Attribute("vx", "m/s"), Attribute("torque", "N m", scale=0.1))
+    for one in PRESETS.values():
+        found = match_units(episodes, attributes, one)
+        loop = match_by_loop(load_librosa(), episodes, attributes, one)
+        np.testing.assert_allclose(found.discrepancy, loop, rtol=1e-9)
+        assert same_ranking(found, loop) == (True, 0)
+        assert not same_ranking(found, loop[:, ::-1])[0]
+        assert same_ranking(found, np.column_stack([loop[:, :8], loop[:, 0]]))[1] == 2
+
+
+def test_columns_beyond_the_recorded_ones_are_other_series(weights: Path) -> None:
+    with RolloutPool("ant", weights, 1) as crew:
+        episodes, attributes = record_episodes(
+            crew, BenchmarkSizes(episodes=1, steps=80, units=40, attributes=20)
+        )
+        alone = record_episodes(crew, BenchmarkSizes(episodes=1, steps=80, units=32, attributes=16))[0][0]
+    assert len({attribute.name for attribute in attributes}) == 20
+    np.testing.assert_array_equal(episodes[0].activations[:, :32], alone.activations)
+    assert np.abs(episodes[0].activations[:, 32] - alone.activations[:, 0]).max() > 0
+    assert widen_episode(alone, 7, 3).activations.shape == (80, 7)
+
+
+def test_without_librosa_there_is_a_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "librosa", None)
+    with pytest.raises(PdtuiError, match=r"librosa is not installed.*pip install 'pdtui\[bench\]'"):
+        load_librosa()

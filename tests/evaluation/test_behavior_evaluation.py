@@ -1,0 +1,88 @@
+"""The experiments' figures against an independent computation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from pdtui.core.errors import MapError
+from pdtui.core.intervals import confidence_interval
+from pdtui.core.units import Stimulation
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.evaluation.behavior_evaluation import evaluate_map
+from pdtui.evaluation.policy_evaluation import evaluate_policy
+from pdtui.evaluation.target_tracking import evaluate_tracking, holding_behavior
+from pdtui.policies.runtime.policy import Policy
+from pdtui.robots import make_robot
+from pdtui.stimulation.stimulation_map import StimulationMap
+
+
+@pytest.fixture(scope="module")
+def config(small_map: StimulationMap) -> DriveConfig:
+    return DriveConfig("ant", small_map, 0)
+
+
+def _mean_vy(policy: Policy, seed: int, pushed: bool) -> float:
+    """A plain loop: 400 steps, stimulated from step 100 on, the last 200 count."""
+    robot = make_robot("ant")
+    observation, _ = robot.reset(seed=seed)
+    vy = []
+    for step in range(400):
+        stimulation = Stimulation((3, 16 + 7), (-2.0, 2.0)) if pushed and step >= 100 else Stimulation()
+        observation, _, terminated, _, _ = robot.step(policy.act(observation, stimulation).action)
+        assert not terminated
+        vy.append(robot.read_attributes()[robot.attribute_index("vy")])
+    return float(np.mean(vy[-200:]))
+
+
+def test_effects_are_paired_differences_over_the_last_200_steps(config: DriveConfig, policy: Policy) -> None:
+    seeds = [100, 101, 102]
+    result = evaluate_map(config, seeds).behaviors[0]
+    if result.falls or result.default_falls:
+        pytest.fail("the untrained policy was chosen to stay up on these seeds")
+    pushed = np.array([_mean_vy(policy, seed, True) for seed in seeds])
+    default = np.array([_mean_vy(policy, seed, False) for seed in seeds])
+    assert result.effect == pytest.approx((pushed - default).mean())
+    assert result.value == pytest.approx(pushed.mean())
+    assert result.default == pytest.approx(default.mean())
+    assert result.right_sign == int(((pushed > 0) & (pushed > default)).sum())
+    assert result.measure == "vy (m/s), wanted > 0"
+
+
+def test_the_number_of_workers_changes_nothing(config: DriveConfig) -> None:
+    assert evaluate_map(config, [100, 101], workers=1) == evaluate_map(config, [100, 101], workers=2)
+
+
+def test_the_interval_is_students() -> None:
+    values = np.array([0.1, 0.4, 0.2, 0.9, 0.5])
+    expected = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
+    assert confidence_interval(values) == pytest.approx((expected.low, expected.high))
+    assert confidence_interval(values[:1]) == (float("-inf"), float("inf"))
+
+
+def test_tracking_measures_the_wrapped_error(config: DriveConfig) -> None:
+    result = evaluate_tracking(config, "yaw", [100], targets=(0.5,))
+    loop = make_robot("ant")
+    assert result.unit == "rad"
+    assert loop.attributes[loop.attribute_index("yaw")].wraps
+    assert 0.0 <= result.error <= np.pi
+    assert result.targets[0].error == pytest.approx(result.error)
+    assert holding_behavior(config, "yaw").name == "hold heading"
+    with pytest.raises(MapError, match="no behavior of mode pid holds 'speed'; held are: yaw"):
+        holding_behavior(config, "speed")
+
+
+def test_walking_sums_up_whole_episodes(config: DriveConfig, policy: Policy) -> None:
+    result = evaluate_policy(config, [100], steps=50)
+    robot = make_robot("ant")
+    observation, _ = robot.reset(seed=100)
+    start, speeds, total = robot.read_poses()[0, :2], [], 0.0
+    for _ in range(50):
+        observation, reward, *_ = robot.step(policy.act(observation).action)
+        total += float(reward)
+        speeds.append(robot.read_attributes()[robot.attribute_index("speed")])
+    assert result.mean_return == pytest.approx(total)
+    assert result.mean_speed == pytest.approx(np.mean(speeds))
+    assert result.net_speed == pytest.approx(np.linalg.norm(robot.read_poses()[0, :2] - start) / 2.5)
+    assert result.finished == 1

@@ -1,0 +1,97 @@
+"""The operator in a simple world: it gets past trees, reacts late, and does not press too often."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pdtui.core.attributes import Floats
+from pdtui.core.errors import MapError
+from pdtui.paper.key_dynamics import KeyDynamics, RobotPlace, predict_places
+from pdtui.paper.scripted_operator import DEFAULT, PRESSES, REACTION, ScriptedOperator, operator_keys
+from pdtui.robots.legged.terrain import scatter_trees
+from pdtui.stimulation.stimulation_map import StimulationMap
+
+DT = 0.016
+RESPONSES = {
+    DEFAULT: KeyDynamics(0.0, 1.4, 0.1, 2.5, 0.8, 0.0, 0.2, 0.0),
+    "left": KeyDynamics(0.7, 1.0, 0.1, 2.0, 0.8, 0.0, 0.2, 0.0),
+    "right": KeyDynamics(-0.7, 1.0, 0.1, 2.0, 0.8, 0.0, 0.2, 0.0),
+    "stop": KeyDynamics(0.0, 1.0, 0.1, 0.1, 0.8, 0.0, 0.2, 0.0),
+}
+NAMES = list(RESPONSES)
+
+
+def _drive(
+    trees: Floats, steps: int, *, driven: bool = True, moved_from: int | None = None
+) -> tuple[Floats, dict[int, str]]:
+    """Places before each step, shape (S, 3), and presses by step; from one step on, it sees itself aside."""
+    operator = ScriptedOperator(RESPONSES, trees, DT)
+    place, latched = RobotPlace(0.0, 0.0, 0.0, 0.0), 0
+    places, presses = [], {}
+    for step in range(steps):
+        places.append((place.x, place.y, place.heading))
+        aside = 1.0 if moved_from is not None and step >= moved_from else 0.0
+        if driven and (name := operator.look(place.x, place.y + aside, place.heading)):
+            presses[step] = name
+            latched = NAMES.index(name)
+        _, place = predict_places(list(RESPONSES.values()), place, np.array([[latched]]), DT)
+    return np.array(places), presses
+
+
+def _clearance(places: Floats, trees: Floats) -> float:
+    away = np.hypot(places[:, None, 0] - trees[:, 0], places[:, None, 1] - trees[:, 1]) - trees[:, 2]
+    return float(away.min())
+
+
+def test_it_gets_past_a_tree_and_back_on_course() -> None:
+    trees = np.array([[6.0, 0.05, 0.15]])
+    alone, _ = _drive(trees, 300, driven=False)
+    driven, presses = _drive(trees, 500)
+    assert _clearance(alone, trees) < 0.0
+    assert _clearance(driven, trees) > 0.2
+    assert driven[-1, 0] > 12.0
+    assert abs(driven[-1, 2]) < 0.15
+    assert list(presses.values())[-1] == DEFAULT
+
+
+def test_where_nothing_is_in_the_way_it_presses_nothing() -> None:
+    _, presses = _drive(np.array([[6.0, 4.0, 0.15], [9.0, -4.0, 0.15]]), 300)
+    assert presses == {}
+
+
+@pytest.mark.parametrize("seed", [500, 501])
+def test_in_a_forest_it_never_presses_more_than_three_keys_in_a_second(seed: int) -> None:
+    trees = scatter_trees(np.random.default_rng(seed), 0.15)
+    driven, presses = _drive(trees, 500)
+    assert _clearance(driven, trees) > 0.1
+    steps = np.array(list(presses))
+    assert len(steps) > 3
+    spans = steps[PRESSES:] - steps[:-PRESSES]
+    assert (spans * DT >= 1.0).all()
+    assert _drive(trees, 500)[1] == presses
+
+
+def test_what_it_sees_moves_it_no_sooner_than_its_reaction_time() -> None:
+    trees = np.array([[6.0, 0.05, 0.15], [9.0, 0.7, 0.15], [12.0, -0.4, 0.15]])
+    _, presses = _drive(trees, 220)
+    changed = []
+    for moved_from in range(60, 180, 30):
+        _, others = _drive(trees, 220, moved_from=moved_from)
+        first = min((step for step, _ in presses.items() ^ others.items()), default=220)
+        assert (first - moved_from) * DT >= REACTION
+        changed.append(first)
+    assert min(changed) < 220  # it does react
+
+
+def test_it_says_which_behaviors_a_map_lacks(small_map: StimulationMap) -> None:
+    with pytest.raises(MapError, match="missing are left, right, stop, there are push, twitch, hold heading"):
+        operator_keys(small_map)
+    push = small_map.behaviors["push"]
+    names = {"left": "a", "right": "d", "stop": "x", "forward": "u"}
+    known = replace(
+        small_map, behaviors={name: replace(push, name=name, key=key) for name, key in names.items()}
+    )
+    assert operator_keys(known) == {DEFAULT: "space", **names}

@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pdtui.core.errors import PictureError
+from pdtui.dissection.dissection_result import Dissection
+from pdtui.pictures.dissection_figures import draw_dissection_figures
+from pdtui.pictures.picture_outputs import PictureOutputs
+
+
+@pytest.fixture(scope="module")
+def figures(dissection: Dissection, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return draw_dissection_figures(tmp_path_factory.mktemp("figures") / "new", dissection)
+
+
+def pixels(path: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    with Image.open(path) as image:
+        assert image.format == "PNG"
+        return np.array(image.convert("RGB"))
+
+
+def test_sixteen_attributes_take_two_pages_of_each_kind(figures: list[Path]) -> None:
+    names = [f"{stem}-{page}" for stem in ("spectrograms", "discrepancies", "effects") for page in (1, 2)]
+    assert [path.stem for path in figures] == [*names, "side-effects", "hit-rates"]
+    assert sorted(figures[0].parent.iterdir()) == sorted(figures)
+
+
+def test_figures_are_as_wide_as_a_page_and_drawn_on(figures: list[Path]) -> None:
+    for path in figures:
+        picture = pixels(path)
+        assert picture.shape[1] == 1440, path
+        ink = (picture.astype(int).sum(axis=2) < 700).mean(axis=1)
+        assert 0.01 < ink.mean() < 0.9, path
+        # Nothing but a margin is empty: every eighth of the height has something in it.
+        assert all(part.max() > 0 for part in np.array_split(ink, 8)), path
+
+
+def test_the_same_findings_give_the_same_pixels(
+    dissection: Dissection, figures: list[Path], tmp_path: Path
+) -> None:
+    for path in draw_dissection_figures(tmp_path, dissection)[-2:]:
+        (other,) = [figure for figure in figures if figure.name == path.name]
+        np.testing.assert_array_equal(pixels(path), pixels(other))
+
+
+def test_what_exists_is_kept_unless_asked(
+    dissection: Dissection, figures: list[Path], tmp_path: Path
+) -> None:
+    report = tmp_path / "ant.rrd"
+    folder = figures[0].parent
+    with pytest.raises(PictureError, match="discrepancies-1.png: exists already; --overwrite replaces it"):
+        PictureOutputs(report, folder, overwrite=False).check()
+    PictureOutputs(report, folder, overwrite=True).check()
+    report.write_bytes(b"kept")
+    with pytest.raises(PictureError, match="ant.rrd: exists already; --overwrite replaces it"):
+        PictureOutputs(report, None, overwrite=False).check()
+    assert report.read_bytes() == b"kept"
+    assert PictureOutputs(report, None, overwrite=True).draw(dissection) == [report]
+    assert report.read_bytes() != b"kept"
+
+
+def test_a_report_of_another_kind_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(PictureError, match="ant.html: expected a name that ends in .rrd"):
+        PictureOutputs(tmp_path / "ant.html", None, overwrite=False).check()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["dissect", "ant", "-o", "x.toml", "--figures", "figs"], ["figure", "episode", "ant", "-o", "x.png"]],
+)
+def test_without_matplotlib_one_line_says_what_to_install(arguments: list[str], tmp_path: Path) -> None:
+    code = "import sys; sys.modules['matplotlib'] = None; from pdtui.cli import main; main(sys.argv[1:])"
+    ran = subprocess.run(
+        [sys.executable, "-c", code, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 1
+    assert ran.stderr.strip() == (
+        "pdtui: figures need matplotlib, which is not installed: pip install 'pdtui[figures]'"
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_core_does_not_load_matplotlib() -> None:
+    code = "import sys, pdtui.cli, pdtui.pictures.picture_outputs; print('matplotlib' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "False"

@@ -1,0 +1,43 @@
+"""Choices and spaces, as commands, maps and worlds state them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from pdtui.core.errors import PolicyError
+from pdtui.policies.weights.import_options import ACTIVATION_NAMES, ImportOptions, WorldSpaces
+from pdtui.policies.weights.policy_network import ACTIVATIONS
+
+
+def test_every_activation_can_be_chosen() -> None:
+    assert set(ACTIVATION_NAMES) == set(ACTIVATIONS)
+
+
+def test_a_choice_is_one_of_the_known() -> None:
+    with pytest.raises(PolicyError, match="unknown activation 'sine'; there are tanh, relu"):
+        ImportOptions("sine")
+    with pytest.raises(PolicyError, match="unknown squash 'hard'; there are none, tanh, clip"):
+        ImportOptions(squash="hard")
+    assert ImportOptions("elu").over(ImportOptions("tanh", "clip")) == ImportOptions("elu", "clip")
+
+
+def test_spaces_are_read_from_gymnasium_s() -> None:
+    seen = spaces.Box(-np.inf, np.inf, (2, 3))
+    bounded = WorldSpaces.of(
+        "w", seen, spaces.Box(np.array([-1, -2], np.float32), np.array([3, 4], np.float32))
+    )
+    assert bounded == WorldSpaces("w", 6, 2, (-1.0, -2.0), (3.0, 4.0), shape=(2, 3))
+    assert WorldSpaces.of("w", seen, spaces.Box(-np.inf, np.inf, (2,))) == WorldSpaces(
+        "w", 6, 2, shape=(2, 3)
+    )
+    assert WorldSpaces.of("w", seen, spaces.Discrete(4)) == WorldSpaces("w", 6, 1, choices=4, shape=(2, 3))
+    with pytest.raises(PolicyError, match="expected observations of one shape"):
+        WorldSpaces.of("w", spaces.Dict(a=seen), spaces.Discrete(4))
+    with pytest.raises(
+        PolicyError,
+        match=r"p: expected observations of shape \(6,\) and 4 discrete actions, as w has; the policy has "
+        r"observations of shape \(6,\) and actions of shape \(4,\)",
+    ):
+        WorldSpaces.of("w", seen, spaces.Discrete(4)).check("p", 6, 4, 0)

@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pdtui.core.errors import RobotError
+from pdtui.core.units import Stimulation
+from pdtui.dissection.dissect import dissect
+from pdtui.probing.effect_probe import EffectProber
+from pdtui.probing.rollout_journal import RolloutJournal
+from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.probing.stimulated_rollout import RolloutOutcome
+from pdtui.spectra.monitor import collect_start_states
+from tests.small_dissection import SMALL
+
+
+class InterruptedHereError(Exception):
+    pass
+
+
+def test_an_interrupted_dissection_goes_on_without_loss(policy_file: Path, tmp_path: Path) -> None:
+    def interrupt(stage: str, done: int, of: int) -> None:
+        if stage == "refine the best" and done > of // 2:
+            raise InterruptedHereError
+
+    journal = tmp_path / "rollouts"
+    with pytest.raises(InterruptedHereError):
+        dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL, journal=journal, progress=interrupt)
+    with RolloutJournal(journal, "") as left:
+        assert len(left) > 16 * len(SMALL.screen_values) * SMALL.screen_starts
+    resumed = dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL, journal=journal)
+    straight = dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL)
+    assert resumed.behaviors == straight.behaviors
+    assert resumed.holds == straight.holds
+    assert (resumed.rollouts, resumed.control_steps) == (straight.rollouts, straight.control_steps)
+    np.testing.assert_array_equal(resumed.refined.effects, straight.refined.effects)
+    assert not journal.exists()
+
+
+def test_what_is_known_is_not_run_again_and_anything_else_is(policy_file: Path, tmp_path: Path) -> None:
+    with RolloutPool("ant", policy_file, 1) as crew, RolloutJournal(tmp_path / "rollouts", "one") as journal:
+        starts = collect_start_states(crew.robot, crew.policy, 1000, 2, at=5, survive=20)
+        plan, other = Stimulation((3,), (2.0,)), Stimulation((3,), (2.5,))
+        first = EffectProber(crew, journal).probe([plan], starts, steps=10)
+        known = len(journal)
+        again = EffectProber(crew, journal).probe([plan], starts, steps=10)
+        assert len(journal) == known == 4
+        np.testing.assert_array_equal(again.effects, first.effects)
+        EffectProber(crew, journal).probe([other], starts, steps=10)
+        assert len(journal) == known + 2
+        EffectProber(crew, journal).probe([plan], starts, steps=11)
+        assert len(journal) == known + 6
+
+
+def test_outcomes_keep_every_bit(tmp_path: Path) -> None:
+    outcome = RolloutOutcome(np.array([1 / 3, np.nan, -0.0]), float("nan"), 7, True)
+    with RolloutJournal(tmp_path / "rollouts", "one") as journal:
+        journal.write([b"key"], [outcome])
+    with RolloutJournal(tmp_path / "rollouts", "one") as journal:
+        known, unknown = journal.read([b"key", b"other"])
+    assert unknown is None
+    assert known is not None
+    assert known.means.tobytes() == outcome.means.tobytes()
+    assert np.isnan(known.error)
+    assert (known.lived, known.fell) == (7, True)
+
+
+def test_a_file_that_is_no_journal_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "rollouts"
+    path.write_bytes(b"not a database, and longer than a header of SQLite is" * 10)
+    with pytest.raises(RobotError, match="expected a journal of roll-outs"):
+        RolloutJournal(path, "one")

@@ -1,0 +1,142 @@
+"""Tasks: what counts as done, on made-up runs whose verdict is known, and on the shipped policies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.errors import MapError
+from pdtui.core.units import Stimulation
+from pdtui.policies.weights.policy_loading import load_policy
+from pdtui.robots import make_robot
+from pdtui.robots.tasks.task import RunTrace, TaskVerdict
+from pdtui.robots.tasks.task_lookup import find_task, tasks_of
+from pdtui.search.task_run import TimedStimulation, judge_stimulations
+
+WALKER = ("vx", "right foot clearance", "left foot clearance")
+BIPED = ("vx", "height", "pitch")
+
+
+def _trace(
+    names: tuple[str, ...], walked: list[list[float]], values: Floats, *, fell: bool = False
+) -> RunTrace:
+    return RunTrace([Attribute(name, "") for name in names], np.array(walked), values, fell)
+
+
+def _walker(vx: Floats, right: Floats, left: Floats, *, fell: bool = False) -> RunTrace:
+    return _trace(WALKER, [[4.0, 0.0, 0.0]] * 200, np.stack((vx, right, left), axis=1), fell=fell)
+
+
+def _slow(after: float, *, steps: int = 300, fell: bool = False) -> TaskVerdict:
+    vx = np.concatenate((np.full(90, 4.0), np.full(steps - 90, after)))
+    return find_task("slow down", "walker").judge(_walker(vx, np.zeros(steps), np.zeros(steps), fell=fell))
+
+
+def test_slow_is_under_a_quarter_of_the_speed_and_still_up() -> None:
+    assert _slow(0.9).success
+    assert _slow(-0.9).success
+    assert not _slow(1.1).success
+    assert not _slow(-1.1).success
+    assert not _slow(0.0, steps=250, fell=True).success
+    assert _slow(0.5).score > _slow(1.5).score > _slow(0.0, steps=250, fell=True).score
+
+
+def _hop(right: Floats, left: Floats, vx: float = 2.0) -> TaskVerdict:
+    return find_task("hop", "walker").judge(_walker(np.full(200, vx), right, left))
+
+
+def test_a_hop_keeps_one_foot_up_in_one_stretch() -> None:
+    up, down = np.full(200, 0.1), np.full(200, -0.001)
+    bouncing = np.where(np.arange(200) % 20 < 5, -0.001, 0.1)
+    assert _hop(up, bouncing).success
+    assert _hop(bouncing, up).success
+    assert not _hop(up, bouncing, vx=0.0).success
+    # A runner's feet are each up for most of the time, but in turn.
+    running = np.where(np.arange(200) % 40 < 6, -0.001, 0.1)
+    verdict = _hop(running, np.roll(running, 20))
+    assert not verdict.success
+    assert verdict.figures["share of steps with one foot up"] > 0.8
+    assert not _hop(down, down).success
+
+
+def _biped(task: str, height: Floats, pitch: Floats, vx: Floats, *, fell: bool = False) -> TaskVerdict:
+    trace = _trace(BIPED, [[5.0, 2.0, 0.0]] * 80, np.stack((vx, height, pitch), axis=1), fell=fell)
+    return find_task(task, "bipedal_walker").judge(trace)
+
+
+def test_a_jump_rises_half_a_metre_and_walks_on() -> None:
+    flat, fast = np.zeros(200), np.full(200, 5.0)
+    arc = 2.0 + 0.6 * np.sin(np.linspace(0.0, np.pi, 200))
+    assert _biped("jump", arc, flat, fast).success
+    assert not _biped("jump", 2.0 + (arc - 2.0) / 2, flat, fast).success
+    assert not _biped("jump", arc, flat, fast, fell=True).success
+    assert not _biped("jump", arc, flat, np.linspace(5.0, 0.0, 200)).success
+
+
+def test_a_flip_turns_forward() -> None:
+    fast, height = np.full(200, 5.0), np.full(200, 2.0)
+    over = np.linspace(0.0, 2 * np.pi, 200)
+    landed = _biped("front flip", height, over, fast)
+    assert landed.success
+    assert landed.figures["turned (degrees)"] == pytest.approx(360.0)
+    assert landed.figures["lands"] == 1.0
+    fallen = _biped("front flip", height[:90], over[:190:2][:90] * 0.95, fast[:90], fell=True)
+    assert fallen.figures["lands"] == 0.0
+    assert not _biped("front flip", height, -over, fast).success
+
+
+def _a1(task: str, rate: float, speed: Floats, *, fell: bool = False) -> TaskVerdict:
+    names = ("vx", "speed", "yaw", "pitch")
+    steps = len(speed)
+    yaw = rate * 0.016 * np.arange(steps)
+    values = np.stack((speed, np.abs(speed), yaw, np.zeros(steps)), axis=1)
+    return find_task(task, "a1").judge(_trace(names, [[2.0, 2.0, 0.0, 0.0]] * 90, values, fell=fell))
+
+
+def test_the_a1_turns_while_it_walks() -> None:
+    walking = np.full(150, 1.5)
+    assert _a1("left", 0.2, walking).success
+    assert _a1("right", -0.2, walking).success
+    assert _a1("left", 0.2, walking).figures["yaw rate (rad/s)"] == pytest.approx(0.2)
+    assert not _a1("left", 0.1, walking).success
+    assert not _a1("left", -0.2, walking).success
+    assert not _a1("right", 0.2, walking).success
+    assert not _a1("left", 0.2, np.full(150, 0.1)).success
+    assert not _a1("left", 0.2, walking, fell=True).success
+    assert _a1("left", 0.6, walking).score > _a1("left", 0.2, walking).score > 1.0
+
+
+def test_the_a1_stops_on_its_feet_and_goes_faster() -> None:
+    braking = np.concatenate((np.linspace(2.0, 0.1, 60), np.full(90, 0.1)))
+    assert _a1("stop", 0.0, braking).success
+    assert not _a1("stop", 0.0, braking[:100], fell=True).success
+    assert not _a1("stop", 0.0, np.full(150, 0.4)).success
+    assert _a1("forward", 0.0, np.full(150, 2.3)).success
+    assert not _a1("forward", 0.0, np.full(150, 2.1)).success
+    assert not _a1("forward", 0.0, np.full(150, 2.3), fell=True).success
+
+
+def test_standing_up_is_walking_at_the_end() -> None:
+    height, pitch = np.full(300, 2.0), np.zeros(300)
+    assert _biped("stand up", height, pitch, np.linspace(0.0, 5.0, 300)).success
+    assert not _biped("stand up", height, pitch, np.zeros(300)).success
+
+
+def test_an_unknown_task_lists_the_robots_own() -> None:
+    with pytest.raises(MapError, match="walker: no task 'fly'; there are slow down, hop"):
+        find_task("fly", "walker")
+    with pytest.raises(MapError, match="ant: no task 'fly'; it has none"):
+        find_task("fly", "ant")
+    assert tasks_of("ant") == ()
+
+
+@pytest.mark.parametrize("robot", ["walker", "bipedal_walker"])
+def test_bursts_of_one_seed_begin_from_the_same_walk(robot: str) -> None:
+    """Judged together or alone, a burst does the same; an empty one is the untouched policy."""
+    world, policy, task = make_robot(robot), load_policy(robot, robot), tasks_of(robot)[0]
+    burst = TimedStimulation(Stimulation.of({3: 5.0}), 20)
+    together = judge_stimulations(world, policy, task, [TimedStimulation(), burst, TimedStimulation()], 5)
+    assert together[0] == together[2]
+    assert judge_stimulations(world, policy, task, [burst], 5) == [together[1]]
+    assert together[0] != together[1]

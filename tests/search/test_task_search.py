@@ -1,0 +1,54 @@
+"""The search for a task: it finds better than nothing, repeats, and writes a map that drives."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+from click.testing import CliRunner
+
+from pdtui.cli import main
+from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.robots.tasks.task_lookup import find_task
+from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearch
+from pdtui.stimulation.map_reader import load_map
+
+
+def _never() -> bool:
+    return False
+
+
+def test_what_is_found_scores_above_the_untouched_policy_and_is_found_again() -> None:
+    task = find_task("jump", "bipedal_walker")
+    sizes = QUICK_TASK_SEARCH.__class__(**{**vars(QUICK_TASK_SEARCH), "values": (6.0,), "held_out_seeds": 3})
+    results = []
+    for _ in range(2):
+        with RolloutPool("bipedal_walker", "bipedal_walker", workers=1) as crew:
+            results.append(TaskSearch(crew, task, 1000, sizes).run([], _never))
+    first, again = results
+    assert first.burst == again.burst
+    assert first.verdicts == again.verdicts
+    assert np.mean([v.score for v in first.verdicts]) > np.mean([v.score for v in first.untouched])
+
+
+def test_the_command_writes_a_behavior_and_keeps_what_the_map_says(tmp_path: Path) -> None:
+    path = tmp_path / "biped.toml"
+    arguments = ["pursue", "bipedal_walker", "jump", "--quick", "--workers", "2", "-o", str(path), "--json"]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.output)
+    behavior = load_map(path).behaviors["jump"]
+    assert behavior.task == "jump"
+    assert behavior.magnitudes == told["magnitudes"]
+    assert behavior.period == told["period"]
+    path.write_text(path.read_text().replace('key = "j"', 'key = "z"  # mine') + "\n# the end\n")
+    assert CliRunner().invoke(main, arguments).exit_code == 0
+    text = path.read_text()
+    assert "# mine" in text
+    assert "# the end" in text
+    evaluated = CliRunner().invoke(main, ["evaluate", str(path), "--seeds", "100-101", "--json"])
+    assert evaluated.exit_code == 0, evaluated.output
+    (task,) = json.loads(evaluated.output)["tasks"]
+    assert (task["behavior"], task["task"]) == ("jump", "jump")
+    assert task["figures"].keys() == task["figures_by_itself"].keys()

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pdtui.core.errors import MapError
+from pdtui.stimulation.map_reader import load_map, parse_map
+from pdtui.stimulation.map_writer import replace_effects, replace_gains, write_effects
+from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains
+
+EDITED = "# my own remark\n"
+FIGURES = {"push": MeasuredEffect(1.23456, 1.0, 1.5, 2, 20)}
+
+
+def test_figures_come_in_and_comments_stay(map_text: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    text = EDITED + map_text.replace('key = "w"', 'key = "k"  # nearer')
+    path.write_text(text)
+    write_effects(path, FIGURES)
+    assert load_map(path).behaviors["push"].measured == MeasuredEffect(1.235, 1.0, 1.5, 2, 20)
+    added = [line for line in path.read_text().splitlines() if line not in text.splitlines()]
+    assert added == ["measured = {effect = 1.235, low = 1.0, high = 1.5, falls = 2, of = 20}"]
+    assert set(text.splitlines()) <= set(path.read_text().splitlines())
+
+
+def test_measuring_again_replaces_only_the_figure(map_text: str) -> None:
+    once = replace_effects(map_text, FIGURES, "m.toml")
+    twice = replace_effects(once, {"push": MeasuredEffect(0.5, 0.4, 0.6)}, "m.toml")
+    changed = [pair for pair in zip(once.splitlines(), twice.splitlines(), strict=True) if pair[0] != pair[1]]
+    assert [new for _, new in changed] == ["measured = {effect = 0.5, low = 0.4, high = 0.6}"]
+
+
+def test_a_behavior_that_the_map_does_not_have_is_named(map_text: str) -> None:
+    with pytest.raises(MapError, match=r"m\.toml: no behavior 'dance'; there are push, twitch, hold heading"):
+        replace_effects(map_text, {"dance": FIGURES["push"]}, "m.toml")
+
+
+def test_gains_come_in_and_comments_stay(map_text: str) -> None:
+    text = EDITED + map_text.replace('mode = "pid"', 'mode = "pid"  # it holds')
+    changed = replace_gains(text, {"hold heading": PidGains("yaw", 5.0, 0.25, 0.5, 1.5, 9.0)}, "mine")
+    assert parse_map(changed, "mine").behaviors["hold heading"].pid == PidGains(
+        "yaw", 5.0, 0.25, 0.5, 1.5, 0.1
+    )
+    old, new = text.splitlines(), changed.splitlines()
+    assert [line for line in new if "pid = " not in line] == [line for line in old if "pid = " not in line]
+    with pytest.raises(MapError, match="mine: behavior 'push': expected mode pid, found fixed"):
+        replace_gains(text, {"push": PidGains("yaw", 1.0, 0.0, 0.0, 1.0, 0.1)}, "mine")
+    with pytest.raises(MapError, match="mine: no behavior 'hop'"):
+        replace_gains(text, {"hop": PidGains("yaw", 1.0, 0.0, 0.0, 1.0, 0.1)}, "mine")

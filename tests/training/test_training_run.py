@@ -1,0 +1,136 @@
+"""Training: it learns, it is seeded, and a run that was cut off ends as one that was not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from pdtui.core.errors import TrainingError
+from pdtui.policies.weights.weights_file import load_network
+
+pytest.importorskip("jax", reason="the extra 'train' is not installed")
+
+from pdtui.policies.weights.policy_loading import load_policy
+from pdtui.training.ppo import PpoConfig
+from pdtui.training.ppo_run import PpoTrainingRun
+from pdtui.training.replay_buffer import ReplayBuffer
+from pdtui.training.sac import SacConfig, SacLearner, TransitionBatch, actor_forward
+from pdtui.training.sac_run import SacTrainingRun
+from pdtui.training.training_run import TrainingReport, TrainingRun
+
+SMALL_PPO = PpoConfig(
+    total_steps=640,
+    worlds=4,
+    chunk=16,
+    minibatch=32,
+    layers=(8, 8),
+    evaluate_every=320,
+    evaluate_episodes=2,
+    evaluate_steps=20,
+)
+SMALL = SacConfig(
+    total_steps=640,
+    worlds=4,
+    chunk=8,
+    batch=16,
+    layers=(8, 8),
+    random_steps=64,
+    capacity=500,
+    evaluate_every=320,
+    evaluate_episodes=2,
+    evaluate_steps=20,
+)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _compile_once(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Runs of the same settings share what XLA compiled."""
+    import jax
+
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path_factory.mktemp("xla")))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+
+
+def _make(folder: Path, config: SacConfig | PpoConfig) -> TrainingRun:
+    if isinstance(config, PpoConfig):
+        return PpoTrainingRun("ant", 3, folder, config, "pdtui train ant --seed 3")
+    return SacTrainingRun("ant", 3, folder, config, "pdtui train ant --seed 3")
+
+
+def _train(folder: Path, config: SacConfig | PpoConfig = SMALL, stop_at: int | None = None) -> Path:
+    def report(state: TrainingReport) -> None:
+        if stop_at is not None and state.score is not None and state.steps >= stop_at:
+            raise KeyboardInterrupt
+
+    trainer = _make(folder, config)
+    if stop_at is None:
+        return trainer.run(report)
+    with pytest.raises(KeyboardInterrupt):
+        trainer.run(report)
+    return trainer.best_weights
+
+
+@pytest.mark.parametrize(
+    "config", [SMALL, SMALL_PPO, replace(SMALL_PPO, processes=True)], ids=["sac", "ppo", "ppo-processes"]
+)
+def test_a_run_that_was_cut_off_ends_as_one_that_was_not(
+    tmp_path: Path, config: SacConfig | PpoConfig
+) -> None:
+    whole = load_network(_train(tmp_path / "whole", config))
+    _train(tmp_path / "cut", config, stop_at=320)
+    resumed = load_network(_train(tmp_path / "cut", config))
+    assert whole.spec == resumed.spec
+    for name, tensor in whole.state_dict().items():
+        assert torch.equal(tensor, resumed.state_dict()[name])
+
+
+def test_the_weights_drive_and_say_how_they_came_about(tmp_path: Path) -> None:
+    path = _train(tmp_path)
+    spec = load_network(path).spec
+    assert spec.command == "pdtui train ant --seed 3"
+    assert spec.score["episodes"] == 2
+    assert spec.activation == "tanh"
+    policy = load_policy(path, "ant")
+    assert policy.layers == (8, 8)
+    assert np.abs(policy.act(np.zeros(27)).action).max() <= 1.0
+
+
+def test_a_checkpoint_of_other_settings_is_refused(tmp_path: Path) -> None:
+    _train(tmp_path, stop_at=320)
+    with pytest.raises(TrainingError, match="expected shape .* was it made with other settings"):
+        _make(tmp_path, replace(SMALL, layers=(4, 4)))
+    (tmp_path / "checkpoint.safetensors").write_bytes(b"torn")
+    with pytest.raises(TrainingError, match="expected a checkpoint of `pdtui train`"):
+        _make(tmp_path, SMALL)
+
+
+def test_sac_solves_a_bandit() -> None:
+    """Reward −(a − 0.6)²: the mean action must come to 0.6, whatever the observation."""
+    import jax
+
+    config = SacConfig(total_steps=4000, steps_per_update=1, layers=(32, 32), batch=64, learning_rate=3e-3)
+    learner = SacLearner(config, 2, 1)
+    state = learner.init(0)
+    rng = np.random.default_rng(0)
+    replay = ReplayBuffer(2000, 2, 1)
+    action = rng.uniform(-1, 1, (2000, 1)).astype(np.float32)
+    observation = rng.normal(size=(2000, 2)).astype(np.float32)
+    reward = -20 * (action[:, 0] - 0.6) ** 2
+    replay.add(TransitionBatch(observation, action, reward, np.zeros(2000, np.float32), observation))
+    for _ in range(20):
+        state = learner.update(state, replay.sample(rng, 100, 64))
+    mean, _ = actor_forward(state.actor, jax.numpy.asarray(observation[:50]))
+    np.testing.assert_allclose(np.tanh(np.asarray(mean)), 0.6, atol=0.12)
+
+
+def test_the_replay_buffer_keeps_the_newest() -> None:
+    replay = ReplayBuffer(4, 1, 1)
+    for value in range(6):
+        row = np.full((1, 1), value, np.float32)
+        replay.add(TransitionBatch(row, row, row[0], row[0], row))
+    assert sorted(replay.arrays.reward.tolist()) == [2, 3, 4, 5]
+    assert set(replay.sample(np.random.default_rng(0), 2, 50).reward.ravel().tolist()) == {2, 3, 4, 5}

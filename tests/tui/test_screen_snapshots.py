@@ -1,0 +1,69 @@
+"""Whole screens as pictures, from a recorded drive."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from textual.pilot import Pilot
+
+from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.tui.map_picker import PickerApp
+from tests.tui.conftest import MakeApp, ScriptedLink
+from tests.tui.screens import played
+from tests.tui.test_map_picker import ROWS
+
+Compare = Callable[..., bool]
+SMALL, LARGE = (80, 24), (160, 48)
+
+
+def after(link: ScriptedLink, *keys: str) -> Callable[[Pilot[Any]], Awaitable[None]]:
+    async def run(pilot: Pilot[Any]) -> None:
+        await played(pilot, link)
+        await pilot.press(*keys)
+        await pilot.pause(0.05)
+
+    return run
+
+
+@pytest.mark.parametrize("size", [SMALL, LARGE], ids=["small", "large"])
+def test_loading(snap_compare: Compare, make_app: MakeApp, size: tuple[int, int]) -> None:
+    app, _ = make_app([])
+    assert snap_compare(app, terminal_size=size)
+
+
+@pytest.mark.parametrize("size", [SMALL, LARGE], ids=["small", "large"])
+@pytest.mark.parametrize("snapshots", [64, 120], ids=["period", "controller"])
+def test_driving(snap_compare: Compare, make_app: MakeApp, size: tuple[int, int], snapshots: int) -> None:
+    app, link = make_app(snapshots)
+    assert snap_compare(app, terminal_size=size, run_before=after(link))
+
+
+def test_from_above(snap_compare: Compare, make_app: MakeApp) -> None:
+    app, link = make_app(64)
+    assert snap_compare(app, terminal_size=LARGE, run_before=after(link, "v"))
+
+
+def test_over(
+    snap_compare: Compare, make_app: MakeApp, drive: tuple[DriveFacts, list[DriveSnapshot]]
+) -> None:
+    facts, snapshots = drive
+    last = replace(snapshots[40], finished="the simulation diverged", paused=True)
+    app, link = make_app([facts, *snapshots[:40], last])
+    assert snap_compare(app, terminal_size=SMALL, run_before=after(link))
+
+
+def test_help(snap_compare: Compare, make_app: MakeApp) -> None:
+    app, link = make_app(4)
+    assert snap_compare(app, terminal_size=SMALL, run_before=after(link, "question_mark"))
+
+
+def test_too_small(snap_compare: Compare, make_app: MakeApp) -> None:
+    app, link = make_app(4)
+    assert snap_compare(app, terminal_size=(70, 20), run_before=after(link))
+
+
+def test_picker(snap_compare: Compare) -> None:
+    assert snap_compare(PickerApp(ROWS), terminal_size=SMALL)

@@ -1,0 +1,187 @@
+"""What lies behind the pictures: camera, path, sparklines, heat, numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pdtui.core.plain_text import file_size, printable
+from pdtui.core.step_record import ActiveBehavior
+from pdtui.tui.camera import Camera, round_length
+from pdtui.tui.cell_text import fit_cells, format_number, format_signed, wrap_text
+from pdtui.tui.path_trail import MOST_POINTS, PathTrail
+from pdtui.tui.sparkline import AttributeHistory, draw_sparklines
+from pdtui.tui.unit_owners import unit_owners
+from pdtui.tui.widgets.heat_strip import UnitGrid, shares
+from tests.tui.recorded_snapshots import drive_map
+
+
+def test_from_the_side_x_is_right_and_z_is_up() -> None:
+    camera = Camera((1.0, 2.0, 0.5), 0.0, 1.0, 10.0, (50.0, 20.0))
+    dots, magnification, before = camera.project(
+        np.array([[1.0, 2.0, 0.5], [2.0, 2.0, 0.5], [1.0, 2.0, 1.5]])
+    )
+    assert dots.tolist() == [[50.0, 20.0], [60.0, 20.0], [50.0, 10.0]]
+    assert magnification.tolist() == [1.0, 1.0, 1.0]
+    assert before.all()
+
+
+def test_from_above_x_is_right_and_y_is_up() -> None:
+    camera = Camera((0.0, 0.0, 0.0), 90.0, 1.0, 10.0, (50.0, 20.0))
+    dots, _, _ = camera.project(np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
+    assert dots.ravel() == pytest.approx([60.0, 20.0, 50.0, 10.0])
+
+
+def test_what_is_farther_away_is_smaller_and_what_is_behind_is_left_out() -> None:
+    camera = Camera((0.0, 0.0, 0.0), 0.0, 1.0, 10.0, (0.0, 0.0))
+    dots, magnification, before = camera.project(np.array([[1.0, 6.0, 0.0], [1.0, -7.0, 0.0]]))
+    assert magnification[0] == pytest.approx(0.5)
+    assert dots[0, 0] == pytest.approx(5.0)
+    assert before.tolist() == [True, False]
+    assert camera.depth(np.array([0.0, 6.0, 3.0])) == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize(("length", "rounded"), [(1.0, 1.0), (1.9, 1.0), (2.0, 2.0), (49.0, 20.0)])
+def test_round_lengths(length: float, rounded: float) -> None:
+    assert round_length(length) == pytest.approx(rounded)
+
+
+def walk(first: int, last: int) -> np.ndarray:
+    x = np.arange(first, last) * 0.1
+    return np.stack([x, np.zeros_like(x), np.full_like(x, -1.0)], axis=1)
+
+
+def test_a_long_path_keeps_its_shape_in_few_points() -> None:
+    trail = PathTrail()
+    done = 0
+    for size in [1, 2, 3, 5, 7] * 1500:
+        trail.extend(walk(done, done + size), restarted=False)
+        done += size
+    steps = np.diff(trail.points[:, 0])
+    assert MOST_POINTS / 2 - 1 <= len(trail.points) <= MOST_POINTS
+    assert steps == pytest.approx(np.full(len(steps), 0.8))
+    assert trail.points[0, 0] == 0.0
+    assert trail.points[-1, 0] == pytest.approx((done - 1) * 0.1, abs=0.8)
+
+
+def test_a_restart_begins_a_new_path_and_keeps_the_old_one() -> None:
+    trail = PathTrail()
+    trail.extend(walk(0, 5), restarted=False)
+    trail.extend(walk(100, 103), restarted=True)
+    starts, ends, _ = trail.pieces()
+    assert starts[:, 0] == pytest.approx([10.0, 10.1])
+    assert ends[:, 0] == pytest.approx([10.1, 10.2])
+    assert len(trail.pieces(past=True)[0]) == 4
+
+
+def test_a_jump_is_not_drawn() -> None:
+    trail = PathTrail()
+    trail.extend(np.array([[0, 0, 0], [0.5, 0, 0], [9, 0, 1], [9.5, 0, 1]], float), restarted=False)
+    starts, _, rows = trail.pieces()
+    assert starts[:, 0].tolist() == [0.0, 9.0]
+    assert rows.tolist() == [0, 1]
+
+
+def test_means_fill_from_the_right_and_do_not_shift_within_a_cell() -> None:
+    history = AttributeHistory(12, 1)
+    history.extend(np.arange(5.0)[:, None])
+    means = history.means(3, 2)[:, 0]
+    assert means.tolist() == [0.5, 2.5, 4.0]
+    history.extend(np.array([[6.0]]))
+    assert history.means(3, 2)[:, 0].tolist() == [0.5, 2.5, 5.0]
+    assert np.isnan(history.means(5, 2)[:2, 0]).all()
+
+
+def test_history_forgets_the_oldest_but_not_the_range() -> None:
+    history = AttributeHistory(3, 1)
+    history.extend(np.array([[-9.0], [1.0], [2.0], [3.0]]))
+    assert history.means(3, 1)[:, 0].tolist() == [1.0, 2.0, 3.0]
+    assert (history.low[0], history.high[0]) == (-9.0, 3.0)
+
+
+def test_sparklines() -> None:
+    means = np.array([[0.0, 5.0, np.nan], [0.5, 5.0, np.nan], [1.0, 5.0, np.nan]])
+    lines = draw_sparklines(means, np.array([0.0, 5.0, np.inf]), np.array([1.0, 5.0, -np.inf]))
+    assert lines[0] == "▁▅█"
+    assert len(set(lines[1])) == 1
+    assert lines[2] == "   "
+
+
+def test_noise_stays_small_beside_what_was_seen() -> None:
+    means = np.array([[0.0], [0.001]])
+    (line,) = draw_sparklines(means, np.array([0.0]), np.array([10.0]))
+    assert line in ("▄▄", "▄▅", "▅▅")
+    (line,) = draw_sparklines(means, np.array([0.0]), np.array([0.001]))
+    assert line == "▁█"
+
+
+def test_few_units_fill_the_strip() -> None:
+    grid = UnitGrid(units=4, rows=2, columns=6)
+    pixels = grid.spread(np.array([1, 2, 3, 4], np.float32))
+    assert pixels.tolist() == [[1, 1, 1, 3, 3, 3], [2, 2, 2, 4, 4, 4]]
+    assert [grid.column_of(unit) for unit in range(4)] == [0, 0, 3, 3]
+
+
+def test_of_many_units_the_strongest_is_seen() -> None:
+    grid = UnitGrid(units=8, rows=1, columns=2)
+    pixels = grid.spread(np.array([0.1, -0.9, 0.2, 0.3, 0.0, 0.4, -0.1, 0.2], np.float32))
+    assert pixels == pytest.approx(np.array([[-0.9, 0.4]]))
+    assert [grid.column_of(unit) for unit in (0, 3, 4, 7)] == [0, 0, 1, 1]
+
+
+@pytest.mark.parametrize("units", [1, 7, 256, 300, 1000])
+def test_a_unit_is_where_its_mark_is(units: int) -> None:
+    grid = UnitGrid(units, 2, 75)
+    for unit in range(0, units, 3):
+        values = np.zeros(units, np.float32)
+        values[unit] = -1.0
+        column = grid.column_of(unit)
+        assert (grid.spread(values)[:, column] == -1.0).any()
+
+
+def test_lines_are_shared_out_between_layers() -> None:
+    assert shares(2, 2) == [(0, 1), (1, 1)]
+    assert shares(2, 8) == [(0, 4), (4, 4)]
+    assert shares(3, 2) == [(0, 1), (1, 1), (2, 0)]
+
+
+def test_the_behavior_latched_last_owns_a_shared_unit() -> None:
+    views = [ActiveBehavior("spin left", 3), ActiveBehavior("spin right", 3), ActiveBehavior("heading", None)]
+    assert unit_owners(drive_map(), views, (256, 256)) == {12: "spin right", 5: "heading"}
+    assert unit_owners(drive_map(), views, (8,)) == {5: "heading"}
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(1.234, "1.23"), (-0.001, "0.00"), (-1.5, "−1.50"), (123.45, "123.5"), (54321.0, "54321"), (2e7, "2e7")],
+)
+def test_numbers_are_short(value: float, shown: str) -> None:
+    assert format_number(value) == shown
+    assert len(shown) <= 7
+
+
+def test_signed_numbers() -> None:
+    assert [format_signed(1.0), format_signed(-1.0), format_signed(0.0)] == ["+1.00", "−1.00", "+0.00"]
+
+
+@pytest.mark.parametrize(
+    ("count", "shown"), [(0, "0 B"), (1499, "1.5 kB"), (2_500_000, "2.5 MB"), (7_100_000_000, "7.1 GB")]
+)
+def test_sizes(count: int, shown: str) -> None:
+    assert file_size(count) == shown
+
+
+def test_foreign_text_is_made_harmless() -> None:
+    assert printable("a\x1b[2Jb\x9b\u202ec\td") == "a\ufffd[2Jb\ufffd\ufffdc d"
+
+
+def test_text_is_fitted_by_cells() -> None:
+    assert fit_cells("abc", 5) == "abc  "
+    assert fit_cells("abcdef", 4) == "abc…"
+    assert fit_cells("漢字漢字", 5) == "漢字…"
+    assert fit_cells("abc", 0) == ""
+
+
+def test_sentences_wrap_at_spaces() -> None:
+    assert wrap_text("turns on the spot", 9, 3) == ["turns on", "the spot"]
+    assert wrap_text("turns on the spot", 9, 1) == ["turns on…"]
