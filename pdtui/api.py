@@ -50,7 +50,7 @@ def load_policy(
     policy: str | Path | nn.Module,
     robot: str | Robot | None = None,
     *,
-    choices: ImportOptions = NO_OPTIONS,
+    import_options: ImportOptions = NO_OPTIONS,
     observations: int | Sequence[int] | None = None,
     hidden: Sequence[str] | None = None,
     decode: Decoder | None = None,
@@ -79,7 +79,7 @@ def load_policy(
         policy: a weights file, the name of a shipped policy, a `torch.nn.Module`, which is copied, or a
             TorchScript file, which is read as data (see `pdtui.policies.torchscript`).
         robot: that it is for; gives the bounds of actions that somebody else's file may lack.
-        choices: what somebody else's file leaves open; see `pdtui.policies.importers`.
+        import_options: what somebody else's file leaves open; see `pdtui.policies.importers`.
         observations, hidden, decode, batched, initial_state, name: of a live or TorchScript network; see
             `pdtui.policies.runtime.live_network.policy_from_network`.
 
@@ -93,9 +93,9 @@ def load_policy(
     world = make_robot(robot) if isinstance(robot, str) else robot
     if not isinstance(policy, nn.Module):
         if world is None:
-            return policy_loading.load_policy(policy, choices=choices)
+            return policy_loading.load_policy(policy, import_options=import_options)
         return policy_loading.load_policy(
-            policy, world.name, choices=choices, spaces=WorldSpaces.of_world(world)
+            policy, world.name, import_options=import_options, spaces=WorldSpaces.of_world(world)
         )
     return policy_from_network(
         policy,
@@ -115,7 +115,7 @@ def dissect(
     robot: str | Robot,
     policy: str | Path | nn.Module | Policy,
     *,
-    choices: ImportOptions = NO_OPTIONS,
+    import_options: ImportOptions = NO_OPTIONS,
     preset: str = "paper",
     settings: Sequence[str] = (),
     episodes: int = 5,
@@ -144,8 +144,8 @@ def dissect(
     Args:
         robot: its name, or a `Robot`.
         policy: a weights file, a shipped name, a live network, or a `Policy`.
-        choices, preset, settings, episodes, seed, budget_minutes, workers, effort, progress, journal: as for
-            `pdtui.dissection.dissect.dissect`.
+        import_options, preset, settings, episodes, seed, budget_minutes, workers, effort, progress,
+            journal: as for `pdtui.dissection.dissect.dissect`.
 
     Raises:
         PdtuiError: what is wrong with robot or policy.
@@ -153,7 +153,7 @@ def dissect(
     return dissection.dissect(
         robot,
         load_policy(policy, robot) if isinstance(policy, nn.Module) else policy,
-        choices=choices,
+        import_options=import_options,
         preset=preset,
         settings=settings,
         episodes=episodes,
@@ -171,7 +171,7 @@ def drive(
     stimulation_map: str | Path | StimulationMap | None = None,
     *,
     policy: str | Path | nn.Module | Policy | None = None,
-    choices: ImportOptions = NO_OPTIONS,
+    import_options: ImportOptions = NO_OPTIONS,
     keys: Mapping[int, str | Sequence[str]] | str | Path | None = None,
     steps: int = 1000,
     seed: int = 0,
@@ -193,7 +193,7 @@ def drive(
         robot: its name, or a `Robot`.
         stimulation_map: a map, or its name or file; by default the one named as the robot.
         policy: instead of the map's; a live network's has to be the one that the map was made for.
-        choices: what the weights file leaves open, over what the map says.
+        import_options: what the weights file leaves open, over what the map says.
         keys: one key or several, by the control step before which they are pressed; or a keystroke file.
         steps: control steps.
         seed: of the reset and of every random number.
@@ -211,7 +211,7 @@ def drive(
     live = load_policy(policy, robot) if isinstance(policy, nn.Module) else policy
     given = live if isinstance(live, Policy) else None
     named = "" if given is not None or live is None else str(live)
-    stimulation_map = resolve_policy(stimulation_map, named, choices)
+    stimulation_map = resolve_policy(stimulation_map, named, import_options)
     config = DriveConfig(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
     loop = build_loop(config, robot if isinstance(robot, Robot) else None, given)
     presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}

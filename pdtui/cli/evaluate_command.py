@@ -69,7 +69,7 @@ def evaluate(
     others: tuple[str, ...],
     map_name: str | None,
     policy: str,
-    choices: ImportOptions,
+    import_options: ImportOptions,
     force: bool,
     seeds: range,
     experiment: str | None,
@@ -105,9 +105,9 @@ def evaluate(
         raise click.UsageError("--start needs --policy-only; tasks and experiments choose theirs")
     if others and (map_name or policy):
         raise click.UsageError("maps that are compared name their policies: --map and --policy are for one")
-    config = drive_config(robot, map_name, policy, choices, force=force, start=start)
+    config = drive_config(robot, map_name, policy, import_options, force=force, start=start)
     if experiment is not None:
-        rest = [drive_config(other, None, "", choices, force=force) for other in others]
+        rest = [drive_config(other, None, "", import_options, force=force) for other in others]
         asked = ExperimentRequest((config, *rest), seeds, workers, as_json, outputs, overwrite, forest)
         EXPERIMENTS[experiment](asked)
     elif target is not None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from pdtui.cli.shared_options import choice_options, progress_bar_or_none
+from pdtui.cli.shared_options import import_option_flags, progress_bar_or_none
 from pdtui.core.plain_text import printable
 from pdtui.policies.weights.import_options import ImportOptions
 
@@ -19,7 +19,7 @@ def figure() -> None:
 @figure.command("episode")
 @click.argument("robot")
 @click.option("--policy", default="", help="Weights; default: the robot's shipped policy.")
-@choice_options
+@import_option_flags
 @click.option("--attribute", "attributes", multiple=True, metavar="NAME", help="May be given again.")
 @click.option(
     "--unit",
@@ -43,7 +43,7 @@ def figure() -> None:
 def episode(
     robot: str,
     policy: str,
-    choices: ImportOptions,
+    import_options: ImportOptions,
     attributes: tuple[str, ...],
     units: tuple[str, ...],
     preset: str,
@@ -71,7 +71,7 @@ def episode(
             policy or robot,
             attributes=attributes,
             units=units,
-            choices=choices,
+            import_options=import_options,
             preset=preset,
             seed=seed,
             progress=advance,

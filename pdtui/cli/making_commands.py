@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from pdtui.cli.shared_options import (
-    choice_options,
     core_count,
+    import_option_flags,
     json_option,
     progress_bar_or_none,
     show_result,
@@ -26,7 +26,7 @@ from pdtui.policies.weights.import_options import ImportOptions, WorldSpaces
     "front (package.module:Thing-v0), that is imported first.",
 )
 @click.option("--policy", default="", help="Weights to dissect; default: the robot's shipped policy.")
-@choice_options
+@import_option_flags
 @click.option("--preset", type=click.Choice(["paper", "authors"]), default="paper", show_default=True)
 @click.option(
     "--set",
@@ -68,7 +68,7 @@ def dissect(
     robot: str | None,
     env: str | None,
     policy: str,
-    choices: ImportOptions,
+    import_options: ImportOptions,
     preset: str,
     settings: tuple[str, ...],
     episodes: int,
@@ -105,7 +105,7 @@ def dissect(
             name,
             policy or name,
             output,
-            choices=choices,
+            import_options=import_options,
             overwrite=overwrite,
             preset=preset,
             settings=settings,
@@ -127,7 +127,7 @@ def dissect(
 @click.argument("robot")
 @click.argument("task")
 @click.option("--policy", default="", help="Weights; default: the robot's shipped policy.")
-@choice_options
+@import_option_flags
 @click.option("--seed", type=click.IntRange(1000, 2**31 - 1), default=1000, show_default=True)
 @click.option(
     "--minutes",
@@ -149,7 +149,7 @@ def pursue(
     robot: str,
     task: str,
     policy: str,
-    choices: ImportOptions,
+    import_options: ImportOptions,
     seed: int,
     minutes: float,
     quick: bool,
@@ -168,7 +168,7 @@ def pursue(
             task,
             policy or robot,
             output or Path("maps") / f"{file_stem(robot)}-dissected.toml",
-            choices=choices,
+            import_options=import_options,
             seed=seed,
             workers=core_count(workers),
             minutes=minutes,
@@ -182,15 +182,15 @@ def pursue(
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="The safetensors file.")
 @click.option("--robot", help="The robot that it drives; it gives bounds of actions that FILE may lack.")
-@choice_options
-def convert(file: Path, output: Path, robot: str | None, choices: ImportOptions) -> None:
+@import_option_flags
+def convert(file: Path, output: Path, robot: str | None, import_options: ImportOptions) -> None:
     """Write somebody else's policy FILE as safetensors that state everything."""
     from pdtui.policies.weights.policy_loading import convert_policy
     from pdtui.robots import make_robot, trust_module
 
     trust_module(robot or "")
     spaces = None if robot is None else WorldSpaces.of_world(make_robot(robot))
-    spec = convert_policy(file, output, choices, spaces)
+    spec = convert_policy(file, output, import_options, spaces)
     layers = " ".join(str(width) for width in spec.layers)
     click.echo(
         f"wrote {output}: {spec.observations} observations, hidden {layers} {spec.activation}, "

@@ -56,14 +56,16 @@ workers_option = click.option(
 )
 
 
-def choice_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """``--activation``, ``--squash`` and ``--normaliser``, given to the command as `choices`."""
+def import_option_flags(command: Callable[..., Any]) -> Callable[..., Any]:
+    """``--activation``, ``--squash`` and ``--normaliser``, given to the command as `import_options`."""
 
     @wraps(command)
     def choosing(
         *args: Any, activation: str | None, squash: str | None, normaliser: str, **others: Any
     ) -> Any:
-        return command(*args, choices=ImportOptions(activation or "", squash or "", normaliser), **others)
+        return command(
+            *args, import_options=ImportOptions(activation or "", squash or "", normaliser), **others
+        )
 
     for option in (
         click.option(
@@ -85,9 +87,9 @@ def choice_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def policy_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """``--policy`` and the choices that its file may leave open, given as `policy` and `choices`."""
+    """``--policy`` and the choices that its file may leave open, given as `policy` and `import_options`."""
     return click.option("--policy", default="", help="Weights to use instead of the map's.")(
-        choice_options(command)
+        import_option_flags(command)
     )
 
 
@@ -124,7 +126,7 @@ def drive_config(
     robot: str,
     map_name: str | None,
     policy: str,
-    choices: ImportOptions = NO_OPTIONS,
+    import_options: ImportOptions = NO_OPTIONS,
     *,
     seed: int = 0,
     without_map: bool = False,
@@ -147,7 +149,9 @@ def drive_config(
         stimulation_map = _map_of(
             robot, map_name or file_stem(robot), policy if without_map and map_name is None else ""
         )
-    return DriveConfig(check_robot(robot), resolve_policy(stimulation_map, policy, choices), seed, **options)
+    return DriveConfig(
+        check_robot(robot), resolve_policy(stimulation_map, policy, import_options), seed, **options
+    )
 
 
 def _map_of(robot: str, name: str, policy: str) -> StimulationMap:

@@ -54,7 +54,7 @@ def tune(
     behaviors: tuple[str, ...],
     every: bool,
     policy: str,
-    choices: ImportOptions,
+    import_options: ImportOptions,
     force: bool,
     seeds: range,
     points: int,
@@ -77,7 +77,7 @@ def tune(
     from pdtui.stimulation.map_writer import replace_gains, rewrite_map
 
     path = find_map(map_name)
-    order = drive_config(str(path), None, policy, choices, force=force)
+    order = drive_config(str(path), None, policy, import_options, force=force)
     with progress_bar_or_none("tuning", quiet=as_json) as advance:
         results = search(
             order,

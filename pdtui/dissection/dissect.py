@@ -38,7 +38,7 @@ def dissect(
     robot: str | Robot,
     policy: str | Path | Policy,
     *,
-    choices: ImportOptions = NO_OPTIONS,
+    import_options: ImportOptions = NO_OPTIONS,
     preset: str = "paper",
     settings: Sequence[str] = (),
     episodes: int = 5,
@@ -58,7 +58,7 @@ def dissect(
     Args:
         robot: name of the robot, or a robot.
         policy: weights file, name of a shipped policy, or a policy.
-        choices: what the weights file leaves open.
+        import_options: what the weights file leaves open.
         preset: ``paper`` or ``authors``.
         settings: choices of the preset to change, ``NAME=VALUE`` each; see `pdtui.spectra.matching_presets`.
         episodes: monitored (the paper: 5).
@@ -78,7 +78,7 @@ def dissect(
     def stage(name: str) -> StepProgress | None:
         return None if progress is None else lambda done, of: progress(name, done, of)
 
-    with RolloutPool(robot, policy, workers, choices) as crew, ExitStack() as stack:
+    with RolloutPool(robot, policy, workers, import_options) as crew, ExitStack() as stack:
         remembered = None
         if journal is not None:
             remembered = stack.enter_context(RolloutJournal(journal, _identity(crew)))
@@ -148,7 +148,7 @@ def dissect(
             rollouts=crew.rollouts,
             control_steps=crew.steps_run,
             minutes=(time.monotonic() - began) / 60,
-            choices=choices,
+            import_options=import_options,
             shortened=starts.shortened,
         )
 

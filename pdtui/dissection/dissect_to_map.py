@@ -45,7 +45,7 @@ def dissect_to_map(
     policy: str,
     output: Path,
     *,
-    choices: ImportOptions = NO_OPTIONS,
+    import_options: ImportOptions = NO_OPTIONS,
     overwrite: bool,
     preset: str,
     settings: Sequence[str] = (),
@@ -76,7 +76,7 @@ def dissect_to_map(
     dissection = dissect(
         robot,
         policy,
-        choices=choices,
+        import_options=import_options,
         preset=preset,
         settings=settings,
         episodes=episodes,

@@ -46,7 +46,7 @@ class Dissection:
         behaviors: the best stimulation for each goal.
         holds: the best controllers.
         rollouts, control_steps, minutes: what it took.
-        choices: what the weights file leaves open.
+        import_options: what the weights file leaves open.
         shortened: a sentence on roll-outs shorter than asked for, because the policy falls; or empty.
     """
 
@@ -72,7 +72,7 @@ class Dissection:
     rollouts: int
     control_steps: int
     minutes: float
-    choices: ImportOptions = NO_OPTIONS
+    import_options: ImportOptions = NO_OPTIONS
     shortened: str = ""
 
     def __repr__(self) -> str:

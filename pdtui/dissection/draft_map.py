@@ -49,7 +49,7 @@ def draft_map(dissection: Dissection) -> str:
         document.add(tomlkit.comment(line))
     document.add("schema", tomlkit.item(SCHEMA))
     document.add("robot", tomlkit.item(dissection.robot))
-    chosen = {name: value for name, value in asdict(dissection.choices).items() if value}
+    chosen = {name: value for name, value in asdict(dissection.import_options).items() if value}
     policy = {"name": dissection.policy, "sha256": dissection.policy_hash, **chosen}
     document.add("policy", block_table(policy))
     document.add("keys", block_table({"default": "space"}))

@@ -71,7 +71,7 @@ def search_task_into_map(
     policy: str,
     output: Path,
     *,
-    choices: ImportOptions = NO_OPTIONS,
+    import_options: ImportOptions = NO_OPTIONS,
     seed: int,
     workers: int,
     minutes: float,
@@ -88,7 +88,7 @@ def search_task_into_map(
     """
     wanted = find_task(task, robot)
     known = load_map(output) if output.exists() else None
-    with RolloutPool(robot, policy, workers, choices) as crew:
+    with RolloutPool(robot, policy, workers, import_options) as crew:
         if known is not None:
             known.check(robot, crew.policy.layers, crew.policy.sha256)
         begin = [] if known is None else _known(known, task, crew)
@@ -97,7 +97,7 @@ def search_task_into_map(
         result = pursuit.run(begin, lambda: time.monotonic() >= until, progress)
         dt, addressed = crew.robot.control_dt, result.burst.stimulation.by_address(crew.policy.layers)
         if known is None:
-            _new_map(output, robot, crew.policy.name, crew.policy.sha256, choices)
+            _new_map(output, robot, crew.policy.name, crew.policy.sha256, import_options)
     seconds = None if result.burst.steps is None else round(result.burst.steps * dt, 6)
     entry: dict[str, Any] = {"name": wanted.name, "key": wanted.key, "says": wanted.says}
     if seconds is not None:
@@ -119,10 +119,10 @@ def _known(stimulation_map: StimulationMap, task: str, crew: RolloutPool) -> lis
     return found
 
 
-def _new_map(path: Path, robot: str, policy: str, sha256: str, choices: ImportOptions) -> None:
+def _new_map(path: Path, robot: str, policy: str, sha256: str, import_options: ImportOptions) -> None:
     document = tomlkit.document()
     document["schema"], document["robot"] = 1, robot
-    given = {name: value for name, value in vars(choices).items() if value}
+    given = {name: value for name, value in vars(import_options).items() if value}
     document["policy"] = {"name": policy, "sha256": sha256, **given}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

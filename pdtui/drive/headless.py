@@ -52,7 +52,7 @@ def build_loop(config: DriveConfig, robot: Robot | None = None, policy: Policy |
     policy = policy or load_policy(
         config.policy or wanted.policy,
         config.robot,
-        choices=wanted.choices,
+        import_options=wanted.import_options,
         spaces=WorldSpaces.of_world(robot),
         folders=(Path(wanted.source).parent,),
     )

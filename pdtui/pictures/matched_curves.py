@@ -77,7 +77,7 @@ def match_episode(
     *,
     attributes: Sequence[str] = (),
     units: Sequence[str] = (),
-    choices: ImportOptions = NO_OPTIONS,
+    import_options: ImportOptions = NO_OPTIONS,
     preset: str = "paper",
     episodes: int = 5,
     steps: int = 1000,
@@ -91,7 +91,7 @@ def match_episode(
         policy: weights file or name of a shipped policy.
         attributes: names; by default the first six that the robot moves, torques left out.
         units: an address for each attribute; by default the unit of least discrepancy.
-        choices: what the weights file leaves open.
+        import_options: what the weights file leaves open.
         preset: of the spectra.
         episodes, steps, seed: of the roll-outs, as a dissection has them; matching is over all of them.
         progress: called with (episodes done, episodes).
@@ -105,7 +105,7 @@ def match_episode(
             f"expected an attribute for each unit, got {len(units)} units and {len(attributes)} attributes"
         )
     spectrum = find_preset(preset)
-    with RolloutPool(robot, policy, workers=1, choices=choices) as crew:
+    with RolloutPool(robot, policy, workers=1, import_options=import_options) as crew:
         world, network = crew.robot, crew.policy
         flats = [parse_unit(unit, network.layers) for unit in units]
         columns = [world.attribute_index(name) for name in attributes]

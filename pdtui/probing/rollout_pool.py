@@ -30,15 +30,15 @@ WorkItem = TypeVar("WorkItem")
 WorkResult = TypeVar("WorkResult")
 
 
-def _start_worker(robot: str, policy: str, choices: ImportOptions) -> None:
+def _start_worker(robot: str, policy: str, import_options: ImportOptions) -> None:
     global _worker  # noqa: PLW0603  (a process's own robot is its global state)
     obey_parent()
     world = make_robot(robot)
-    _worker = (world, _load(policy, world, choices))
+    _worker = (world, _load(policy, world, import_options))
 
 
-def _load(policy: str | Path, world: Robot, choices: ImportOptions) -> Policy:
-    return load_policy(policy, world.name, choices=choices, spaces=WorldSpaces.of_world(world))
+def _load(policy: str | Path, world: Robot, import_options: ImportOptions) -> Policy:
+    return load_policy(policy, world.name, import_options=import_options, spaces=WorldSpaces.of_world(world))
 
 
 def _apply(function: Callable[[Robot, Policy, WorkItem], WorkResult], item: WorkItem) -> WorkResult:
@@ -74,7 +74,7 @@ class RolloutPool(Closable):
         policy: weights file, name of a shipped policy, or a policy.
         workers: processes, which load robot and policy by their names; what is given as an object stays in
             this one.
-        choices: what the weights file leaves open.
+        import_options: what the weights file leaves open.
 
     Raises:
         RobotError: no such robot.
@@ -86,14 +86,14 @@ class RolloutPool(Closable):
         robot: str | Robot,
         policy: str | Path | Policy,
         workers: int = 2,
-        choices: ImportOptions = NO_OPTIONS,
+        import_options: ImportOptions = NO_OPTIONS,
     ) -> None:
         # Built here too: the caller needs both, and what is wrong with them is raised in this process.
         self.robot = make_robot(robot) if isinstance(robot, str) else robot
-        self.policy = policy if isinstance(policy, Policy) else _load(policy, self.robot, choices)
+        self.policy = policy if isinstance(policy, Policy) else _load(policy, self.robot, import_options)
         check_fit(self.policy, self.robot, self.robot.name)
         named = isinstance(robot, str) and not isinstance(policy, Policy)
-        self._names = (robot if isinstance(robot, str) else robot.name, str(policy), choices)
+        self._names = (robot if isinstance(robot, str) else robot.name, str(policy), import_options)
         self._workers = max(1, workers) if named else 1
         self._pool: ProcessPoolExecutor | None = None
         self.steps_run = 0

@@ -16,7 +16,7 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 
 
 def resolve_policy(
-    stimulation_map: StimulationMap, policy: str = "", choices: ImportOptions = NO_OPTIONS
+    stimulation_map: StimulationMap, policy: str = "", import_options: ImportOptions = NO_OPTIONS
 ) -> StimulationMap:
     """Put policy and choices of this drive into the map, and into its text, which the session keeps.
 
@@ -26,14 +26,14 @@ def resolve_policy(
     Args:
         stimulation_map: as its file has it.
         policy: weights to use instead of the map's; empty for those.
-        choices: of this drive; where they are silent, the map's hold.
+        import_options: of this drive; where they are silent, the map's hold.
 
     Raises:
         PolicyError: the map names a file outside of its own folder and the working directory.
         MapError: its text cannot be changed.
     """
-    found = locate_policy(stimulation_map, policy, choices)
-    if (found.policy, found.choices) == (stimulation_map.policy, stimulation_map.choices):
+    found = locate_policy(stimulation_map, policy, import_options)
+    if (found.policy, found.import_options) == (stimulation_map.policy, stimulation_map.import_options):
         return stimulation_map
     try:
         document = tomlkit.parse(stimulation_map.text)
@@ -41,12 +41,12 @@ def resolve_policy(
         raise MapError(f"{stimulation_map.source}: not a TOML file: {error}") from error
     table = cast(dict[str, Any], document.setdefault("policy", tomlkit.table()))
     table["name"] = found.policy
-    table.update({field: value for field, value in asdict(found.choices).items() if value})
+    table.update({field: value for field, value in asdict(found.import_options).items() if value})
     return replace(found, text=tomlkit.dumps(document))
 
 
 def locate_policy(
-    stimulation_map: StimulationMap, policy: str = "", choices: ImportOptions = NO_OPTIONS
+    stimulation_map: StimulationMap, policy: str = "", import_options: ImportOptions = NO_OPTIONS
 ) -> StimulationMap:
     """As `resolve_policy`, but the map's text stays as it is.
 
@@ -56,10 +56,10 @@ def locate_policy(
     source = stimulation_map.source
     folder = Path(source).parent
     name = policy or _from_here(stimulation_map.policy, folder, source)
-    merged = choices.over(stimulation_map.choices)
-    if merged.normaliser != NO_NORMALISER and not choices.normaliser:
+    merged = import_options.over(stimulation_map.import_options)
+    if merged.normaliser != NO_NORMALISER and not import_options.normaliser:
         merged = replace(merged, normaliser=_from_here(merged.normaliser, folder, source))
-    return replace(stimulation_map, policy=name, choices=merged)
+    return replace(stimulation_map, policy=name, import_options=merged)
 
 
 def _from_here(name: str, folder: Path, source: str) -> str:

@@ -66,7 +66,7 @@ def parse_map(text: str, source: str) -> StimulationMap:
     robot = top.text("robot")
     policy = MapTable(source, text, "policy", top.take("policy", dict), "[policy]", 0)
     name, sha256 = policy.text("name"), policy.text("sha256")
-    choices = ImportOptions(
+    import_options = ImportOptions(
         policy.choice("activation", ACTIVATION_NAMES, ""),
         policy.choice("squash", SQUASH_NAMES, ""),
         policy.text("normaliser", ""),
@@ -97,7 +97,9 @@ def parse_map(text: str, source: str) -> StimulationMap:
                 raise MapError(
                     f"{source}: behavior '{behavior.name}': together names '{other}', which does not exist"
                 )
-    return StimulationMap(robot, name, sha256, default_key, primitives, behaviors, text, source, choices)
+    return StimulationMap(
+        robot, name, sha256, default_key, primitives, behaviors, text, source, import_options
+    )
 
 
 def _has_long_key(text: str) -> bool:

@@ -163,7 +163,7 @@ class StimulationMap:
         behaviors: by name, in the order of the file.
         text: the file's text.
         source: where it came from, for messages.
-        choices: what the weights file leaves open.
+        import_options: what the weights file leaves open.
     """
 
     robot: str
@@ -174,7 +174,7 @@ class StimulationMap:
     behaviors: dict[str, Behavior]
     text: str = field(default="", repr=False)
     source: str = "map"
-    choices: ImportOptions = NO_OPTIONS
+    import_options: ImportOptions = NO_OPTIONS
 
     def units_of(self, behavior: Behavior) -> dict[str, float]:
         """The behavior's outputs v by unit address; ``v = c ρ`` for a primitive (section 3.3)."""

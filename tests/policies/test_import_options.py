@@ -32,7 +32,9 @@ def test_spaces_are_read_from_gymnasium_s() -> None:
     assert WorldSpaces.of("w", seen, spaces.Box(-np.inf, np.inf, (2,))) == WorldSpaces(
         "w", 6, 2, shape=(2, 3)
     )
-    assert WorldSpaces.of("w", seen, spaces.Discrete(4)) == WorldSpaces("w", 6, 1, choices=4, shape=(2, 3))
+    assert WorldSpaces.of("w", seen, spaces.Discrete(4)) == WorldSpaces(
+        "w", 6, 1, discrete_actions=4, shape=(2, 3)
+    )
     with pytest.raises(PolicyError, match="expected observations of one shape"):
         WorldSpaces.of("w", spaces.Dict(a=seen), spaces.Discrete(4))
     with pytest.raises(

@@ -47,11 +47,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     torch.manual_seed(1)
     torch.save(nn.Sequential(nn.Linear(27, 12), nn.ReLU(), nn.Linear(12, 8)).state_dict(), maps / "agent.pt")
     np.savez(maps / "stats.npz", mean=np.full(27, 0.1), var=np.full(27, 0.5))
-    choices = ImportOptions("relu", "none", "stats.npz")
-    sha256 = load_policy(maps / "agent.pt", choices=choices).sha256
+    import_options = ImportOptions("relu", "none", "stats.npz")
+    sha256 = load_policy(maps / "agent.pt", import_options=import_options).sha256
     unclipped = CHOICES.replace("clip", "none")
-    (maps / "none.toml").write_text(MAP.format(sha256=sha256, choices=unclipped))
-    (maps / "open.toml").write_text(MAP.format(sha256=sha256, choices=""))
+    (maps / "none.toml").write_text(MAP.format(sha256=sha256, import_options=unclipped))
+    (maps / "open.toml").write_text(MAP.format(sha256=sha256, import_options=""))
     return tmp_path
 
 
@@ -63,7 +63,7 @@ def test_a_map_carries_the_choices_into_session_and_replay(folder: Path) -> None
     assert "# beside this map" in text
     kept = parse_map(text, "kept")
     assert kept.policy == "maps/agent.pt"
-    assert kept.choices == ImportOptions("relu", "none", "maps/stats.npz")
+    assert kept.import_options == ImportOptions("relu", "none", "maps/stats.npz")
     (folder / "maps" / "none.toml").unlink()
     assert run("replay", session).stdout == "identical: 30 steps\n"
 
@@ -136,4 +136,4 @@ def test_a_map_that_needs_nothing_stays_as_it_is(folder: Path) -> None:
 )
 def test_mistakes_in_the_choices_name_line_and_field(old: str, new: str, message: str) -> None:
     with pytest.raises(MapError, match=message):
-        parse_map(MAP.format(sha256="0", choices=CHOICES).replace(old, new), "m.toml")
+        parse_map(MAP.format(sha256="0", import_options=CHOICES).replace(old, new), "m.toml")

@@ -33,7 +33,7 @@ FORMATS = (
 
 def import_network(
     path: Path,
-    choices: ImportOptions = NO_OPTIONS,
+    import_options: ImportOptions = NO_OPTIONS,
     spaces: WorldSpaces | None = None,
     *,
     normaliser: Path | None = None,
@@ -42,7 +42,7 @@ def import_network(
 
     Args:
         path: the file; its content says what it is, not its name.
-        choices: what the file may leave open.
+        import_options: what the file may leave open.
         spaces: of the world that the policy is to act in; gives the bounds that a file may lack.
         normaliser: file of the statistics of the observation, found already.
 
@@ -51,20 +51,20 @@ def import_network(
     """
     source = str(path)
     try:
-        found = _find(read_bounded(path), source, choices)
-        if normaliser is not None and choices.normaliser != NO_NORMALISER:
+        found = _find(read_bounded(path), source, import_options)
+        if normaliser is not None and import_options.normaliser != NO_NORMALISER:
             found = found.having(read_statistics(normaliser, found.layers[0].shape[1]))
-        return assemble_network(found, choices, spaces, source)
+        return assemble_network(found, import_options, spaces, source)
     except PolicyError as error:
         text = str(error)
         named = text.startswith(source) or (normaliser is not None and text.startswith(str(normaliser)))
         raise error if named else PolicyError(f"{source}: {text}") from error
 
 
-def _find(content: bytes, source: str, choices: ImportOptions) -> PartialPolicy:
+def _find(content: bytes, source: str, import_options: ImportOptions) -> PartialPolicy:
     match file_kind_of(content):
         case FileKind.ZIP:
-            return _from_zip(content, source, choices)
+            return _from_zip(content, source, import_options)
         case FileKind.SAFETENSORS:
             return _from_tensors(flatten_tensors(from_safetensors(content, source)), source)
         case FileKind.PICKLE:
@@ -76,11 +76,11 @@ def _find(content: bytes, source: str, choices: ImportOptions) -> PartialPolicy:
             raise PolicyError(f"{source}: {other.value}; expected {FORMATS}")
 
 
-def _from_zip(content: bytes, source: str, choices: ImportOptions) -> PartialPolicy:
+def _from_zip(content: bytes, source: str, import_options: ImportOptions) -> PartialPolicy:
     archive = ZipArchive(content, source)
     names = archive.names
     if is_sb3(names):
-        return import_sb3(archive, choices)
+        return import_sb3(archive, import_options)
     if names and all(name.endswith(".npy") for name in names):
         return _from_tensors(flatten_tensors(from_npz(archive)), source)
     if any(name.endswith("/constants.pkl") for name in names):

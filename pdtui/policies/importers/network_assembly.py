@@ -11,7 +11,7 @@ from pdtui.policies.weights.policy_network import Head, NetworkSpec, PolicyNetwo
 
 
 def assemble_network(
-    found: PartialPolicy, choices: ImportOptions, spaces: WorldSpaces | None, source: str
+    found: PartialPolicy, import_options: ImportOptions, spaces: WorldSpaces | None, source: str
 ) -> PolicyNetwork:
     """Complete what was found; what is still open then is asked for.
 
@@ -28,13 +28,13 @@ def assemble_network(
     discrete = output == "categorical"
     if spaces is not None:
         spaces.check(source, observations, 1 if discrete else actions, actions if discrete else 0)
-    head, squash = _head(found, output, choices, source)
+    head, squash = _head(found, output, import_options, source)
     low, high = _bounds(found, squash, spaces, actions, source) if not discrete else ((), ())
     spec = NetworkSpec(
         robot="",
         observations=observations,
         layers=tuple(layer.shape[0] for layer in found.layers[:-1]),
-        activation=choices.activation or found.activation or _ask_activation(found, source),
+        activation=import_options.activation or found.activation or _ask_activation(found, source),
         actions=actions,
         head=head,
         action_low=low,
@@ -57,17 +57,17 @@ def _output(found: PartialPolicy, spaces: WorldSpaces | None) -> str:
     if found.output != "unknown pair":
         return found.output
     outputs = found.layers[-1].shape[0]
-    if spaces is not None and spaces.choices:
+    if spaces is not None and spaces.discrete_actions:
         return "categorical"
     if spaces is not None and outputs == 2 * spaces.actions:
         return "gaussian pair"
     return "action"
 
 
-def _head(found: PartialPolicy, output: str, choices: ImportOptions, source: str) -> tuple[Head, str]:
+def _head(found: PartialPolicy, output: str, import_options: ImportOptions, source: str) -> tuple[Head, str]:
     if output == "categorical":
         return "categorical", "none"
-    squash = choices.squash or found.squash
+    squash = import_options.squash or found.squash
     if not squash:
         raise PolicyError(
             f"{source}: {found.origin} does not say how outputs become actions; choose with --squash "

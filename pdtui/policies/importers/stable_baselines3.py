@@ -40,12 +40,13 @@ def is_sb3(names: tuple[str, ...]) -> bool:
     return "data" in names and "policy.pth" in names
 
 
-def import_sb3(archive: ZipArchive, choices: ImportOptions) -> PartialPolicy:
+def import_sb3(archive: ZipArchive, import_options: ImportOptions) -> PartialPolicy:
     """The policy of a Stable-Baselines3 archive.
 
     Args:
         archive: the open file.
-        choices: only to see whether the statistics of VecNormalize, which are not in the file, were given.
+        import_options: only to see whether the statistics of VecNormalize, which are not in the file,
+            were given.
 
     Raises:
         PolicyError: no MlpPolicy of the algorithms above, or a damaged file.
@@ -53,7 +54,7 @@ def import_sb3(archive: ZipArchive, choices: ImportOptions) -> PartialPolicy:
     source, data = archive.source, _data(archive)
     tensors = flatten_tensors(from_torch(archive.read("policy.pth"), f"{source}: policy.pth"))
     _check_flat(tensors, data, source)
-    if _normalised(data) and not choices.normaliser:
+    if _normalised(data) and not import_options.normaliser:
         raise PolicyError(
             f"{source}: trained behind VecNormalize, whose statistics are another file: give them with "
             f"--normaliser FILE, or --normaliser {NO_NORMALISER} if it normalised rewards only"

@@ -58,7 +58,7 @@ class WorldSpaces:
         observations: length of the observation.
         actions: length of the action; of a discrete action, 1.
         low, high: bounds of each action; empty where there are none, or where actions are discrete.
-        choices: number of discrete actions; 0 where actions are continuous.
+        discrete_actions: number of discrete actions; 0 where actions are continuous.
         shape: of the observation.
     """
 
@@ -67,7 +67,7 @@ class WorldSpaces:
     actions: int
     low: tuple[float, ...] = ()
     high: tuple[float, ...] = ()
-    choices: int = 0
+    discrete_actions: int = 0
     shape: tuple[int, ...] = ()
 
     @classmethod
@@ -82,7 +82,7 @@ class WorldSpaces:
         shape = tuple(int(size) for size in observation_space.shape)
         observations = math.prod(shape)
         if hasattr(action_space, "start") and hasattr(action_space, "n"):
-            return cls(owner, observations, 1, choices=int(action_space.n), shape=shape)
+            return cls(owner, observations, 1, discrete_actions=int(action_space.n), shape=shape)
         actions = math.prod(action_space.shape or ())
         if not hasattr(action_space, "low"):
             return cls(owner, observations, actions, shape=shape)
@@ -100,20 +100,24 @@ class WorldSpaces:
         """
         return cls.of(world.name, world.observation_space, world.action_space)
 
-    def check(self, source: str, observations: int, actions: int, choices: int) -> None:
+    def check(self, source: str, observations: int, actions: int, discrete_actions: int) -> None:
         """See that a policy of these sizes fits.
 
         Raises:
             PolicyError: it does not; the message names both shapes.
         """
-        if (observations, actions, choices) == (self.observations, self.actions, self.choices):
+        if (observations, actions, discrete_actions) == (
+            self.observations,
+            self.actions,
+            self.discrete_actions,
+        ):
             return
         raise PolicyError(
-            f"{source}: expected {_words(self.observations, self.actions, self.choices)}, as "
-            f"{self.owner} has; the policy has {_words(observations, actions, choices)}"
+            f"{source}: expected {_words(self.observations, self.actions, self.discrete_actions)}, as "
+            f"{self.owner} has; the policy has {_words(observations, actions, discrete_actions)}"
         )
 
 
-def _words(observations: int, actions: int, choices: int) -> str:
-    acts = f"{choices} discrete actions" if choices else f"actions of shape ({actions},)"
+def _words(observations: int, actions: int, discrete_actions: int) -> str:
+    acts = f"{discrete_actions} discrete actions" if discrete_actions else f"actions of shape ({actions},)"
     return f"observations of shape ({observations},) and {acts}"

@@ -31,7 +31,7 @@ def load_policy(
     name: str | Path,
     robot: str | None = None,
     *,
-    choices: ImportOptions = NO_OPTIONS,
+    import_options: ImportOptions = NO_OPTIONS,
     spaces: WorldSpaces | None = None,
     folders: Sequence[Path] = (),
 ) -> Policy:
@@ -44,7 +44,7 @@ def load_policy(
     Args:
         name: file or shipped name.
         robot: what it is to drive.
-        choices: what the file may leave open.
+        import_options: what the file may leave open.
         spaces: of the world that it is to act in, to be compared with the policy's shapes.
         folders: where to look for files beside the working directory.
 
@@ -54,8 +54,8 @@ def load_policy(
     """
     path = find_weights_file(str(name), folders)
     if is_torchscript(path):
-        return load_torchscript_policy(path, spaces, choices)
-    network, digest = load_any_network(path, choices, spaces, folders)
+        return load_torchscript_policy(path, spaces, import_options)
+    network, digest = load_any_network(path, import_options, spaces, folders)
     spec = network.spec
     if robot is not None and spec.robot not in ("", robot):
         raise PolicyError(f"{path}: expected a policy for robot '{robot}', found one for '{spec.robot}'")
@@ -67,7 +67,7 @@ def load_policy(
 
 
 def load_any_network(
-    path: Path, choices: ImportOptions, spaces: WorldSpaces | None, folders: Sequence[Path] = ()
+    path: Path, import_options: ImportOptions, spaces: WorldSpaces | None, folders: Sequence[Path] = ()
 ) -> tuple[PolicyNetwork, str]:
     """The network of a file that pdtui or somebody else wrote, and its hash.
 
@@ -79,31 +79,36 @@ def load_any_network(
     digest = hash_file(path)
     if is_own_format(path):
         network = load_network(path)
-        _check_agreement(path, network.spec, choices)
+        _check_agreement(path, network.spec, import_options)
         return network, digest
-    statistics = _find_statistics(path, choices, folders)
-    network = import_network(path, choices, spaces, normaliser=statistics)
-    if choices != NO_OPTIONS:
-        parts = digest, choices.activation, choices.squash, hash_file(statistics) if statistics else ""
+    statistics = _find_statistics(path, import_options, folders)
+    network = import_network(path, import_options, spaces, normaliser=statistics)
+    if import_options != NO_OPTIONS:
+        parts = (
+            digest,
+            import_options.activation,
+            import_options.squash,
+            hash_file(statistics) if statistics else "",
+        )
         digest = sha256("\n".join(parts).encode()).hexdigest()
     return network, digest
 
 
-def _check_agreement(path: Path, spec: NetworkSpec, choices: ImportOptions) -> None:
+def _check_agreement(path: Path, spec: NetworkSpec, import_options: ImportOptions) -> None:
     """A file of pdtui's own states everything: a choice may repeat it, not change it."""
     squash = "tanh" if spec.head in ("squashed_gaussian", "tanh") else "clip" if spec.action_low else "none"
     for what, stated, chosen in (
-        ("activation", spec.activation, choices.activation),
-        ("squash", squash, choices.squash),
-        ("normaliser", NO_NORMALISER, choices.normaliser),
+        ("activation", spec.activation, import_options.activation),
+        ("squash", squash, import_options.squash),
+        ("normaliser", NO_NORMALISER, import_options.normaliser),
     ):
         if chosen and chosen != stated:
             raise PolicyError(f"{path}: its {what} is '{stated}' and cannot be chosen, found '{chosen}'")
 
 
-def _find_statistics(path: Path, choices: ImportOptions, folders: Sequence[Path]) -> Path | None:
+def _find_statistics(path: Path, import_options: ImportOptions, folders: Sequence[Path]) -> Path | None:
     """The file that the choices name: from the working directory, a folder, or beside the weights."""
-    name = choices.normaliser
+    name = import_options.normaliser
     if not name or name == NO_NORMALISER:
         return None
     found = find_beside(name, (*folders, path.parent)) or find_beside(str(path.parent / Path(name).name), ())
@@ -113,7 +118,7 @@ def _find_statistics(path: Path, choices: ImportOptions, folders: Sequence[Path]
 
 
 def convert_policy(
-    path: Path, output: Path, choices: ImportOptions, spaces: WorldSpaces | None
+    path: Path, output: Path, import_options: ImportOptions, spaces: WorldSpaces | None
 ) -> NetworkSpec:
     """Write somebody else's policy as safetensors that state everything, for the world of these spaces.
 
@@ -125,7 +130,7 @@ def convert_policy(
     """
     if output.exists():
         raise PolicyError(f"{output}: exists already; a policy is converted into a new file")
-    network, _ = load_any_network(path, choices, spaces)
+    network, _ = load_any_network(path, import_options, spaces)
     if spaces is not None:
         network.spec = replace(network.spec, robot=spaces.owner)
     try:

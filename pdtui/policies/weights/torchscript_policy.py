@@ -16,7 +16,7 @@ from pdtui.policies.weights.weights_file import hash_file
 
 
 def load_torchscript_policy(
-    path: Path, spaces: WorldSpaces | None, choices: ImportOptions = NO_OPTIONS
+    path: Path, spaces: WorldSpaces | None, import_options: ImportOptions = NO_OPTIONS
 ) -> Policy:
     """The network of a TorchScript file, whose output is the action, or the logits of discrete actions.
 
@@ -29,7 +29,7 @@ def load_torchscript_policy(
     """
     if spaces is None:
         raise PolicyError(f"{path}: TorchScript says no shapes; expected the robot that it is for")
-    if choices != NO_OPTIONS:
+    if import_options != NO_OPTIONS:
         raise PolicyError(f"{path}: TorchScript states its whole computation; expected no choices")
     module, digest = read_torchscript(path), hash_file(path)
     torch.set_num_threads(1)
@@ -42,12 +42,12 @@ def load_torchscript_policy(
             problems.append(str(error))
             continue
         found = policy.act(np.zeros(shape)).action.size
-        if found != (spaces.choices or spaces.actions):
+        if found != (spaces.discrete_actions or spaces.actions):
             problems.append(
-                f"{path}: expected {spaces.choices or spaces.actions} outputs for '{spaces.owner}', "
+                f"{path}: expected {spaces.discrete_actions or spaces.actions} outputs for '{spaces.owner}', "
                 f"the network gives {found}"
             )
-        elif spaces.choices:
+        elif spaces.discrete_actions:
             return Policy(module, shape, batched=batched, decode=categorical, name=path.stem, sha256=digest)
         else:
             return policy

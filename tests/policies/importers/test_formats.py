@@ -78,15 +78,15 @@ def test_cleanrl_ppo_asks_and_then_acts(tmp_path: Path, observations: Draw) -> N
     agent, path = PpoAgent(), tmp_path / "agent.pt"
     torch.save(agent.state_dict(), path)
     with pytest.raises(PolicyError, match=r"CleanRL PPO does not say how outputs.*--squash none\|tanh\|clip"):
-        load_policy(path, choices=TANH, spaces=BOUNDS)
+        load_policy(path, import_options=TANH, spaces=BOUNDS)
     with pytest.raises(PolicyError, match=r"does not say the activation function of its 2 hidden layers"):
-        load_policy(path, choices=ImportOptions(squash="clip"), spaces=BOUNDS)
+        load_policy(path, import_options=ImportOptions(squash="clip"), spaces=BOUNDS)
     with pytest.raises(PolicyError, match=r"bounds of the 2 actions, which --squash clip needs"):
-        load_policy(path, choices=ImportOptions("tanh", "clip"))
-    policy = load_policy(path, choices=ImportOptions("tanh", "clip"), spaces=BOUNDS)
+        load_policy(path, import_options=ImportOptions("tanh", "clip"))
+    policy = load_policy(path, import_options=ImportOptions("tanh", "clip"), spaces=BOUNDS)
     low, high = torch.tensor(BOUNDS.low), torch.tensor(BOUNDS.high)
     agree(policy, lambda x: torch.clamp(agent.actor_mean(x), low, high), observations(5))
-    free = load_policy(path, choices=ImportOptions("tanh", "none"))
+    free = load_policy(path, import_options=ImportOptions("tanh", "none"))
     agree(free, agent.actor_mean, observations(5))
     rng = np.random.default_rng(0)
     drawn = np.array([free.act(observations(5)[0], rng=rng).action for _ in range(2000)])
@@ -97,7 +97,7 @@ def test_cleanrl_ppo_asks_and_then_acts(tmp_path: Path, observations: Draw) -> N
 def test_cleanrl_sac_and_td3_state_their_bounds(mean: str, tmp_path: Path, observations: Draw) -> None:
     actor, path = SacActor(mean), tmp_path / "actor.pt"
     torch.save((actor.state_dict(), {"fc1.weight": torch.zeros(3, 7)}), path)
-    policy = load_policy(path, choices=ImportOptions("relu"))
+    policy = load_policy(path, import_options=ImportOptions("relu"))
     agree(policy, actor, observations(5))
 
 
@@ -105,7 +105,7 @@ def test_discrete_logits_choose(tmp_path: Path, observations: Draw) -> None:
     actor, path = mlp(5, 6, 3), tmp_path / "agent.pt"
     tensors = {f"actor.{name}": tensor for name, tensor in actor.state_dict().items()}
     torch.save(tensors | {f"critic.{name}": t for name, t in mlp(5, 6, 1).state_dict().items()}, path)
-    policy = load_policy(path, choices=TANH, spaces=WorldSpaces("world", 5, 1, choices=3))
+    policy = load_policy(path, import_options=TANH, spaces=WorldSpaces("world", 5, 1, discrete_actions=3))
     agree(policy, lambda x: actor(x).argmax().reshape(1).float(), observations(5))
     rng, observation = np.random.default_rng(0), observations(5)[0]
     drawn = np.bincount([int(policy.act(observation, rng=rng).action[0]) for _ in range(4000)], minlength=3)
@@ -133,7 +133,7 @@ def test_rsl_rl_checkpoints_of_three_generations(generation: int, tmp_path: Path
             checkpoint["obs_norm_state_dict"] = normaliser
         checkpoint["model_state_dict"] = model
     torch.save(checkpoint, tmp_path / "model_7.pt")
-    policy = load_policy(tmp_path / "model_7.pt", choices=ImportOptions("elu"))
+    policy = load_policy(tmp_path / "model_7.pt", import_options=ImportOptions("elu"))
     agree(policy, lambda x: actor((x - mean) / (std + 0.01)), observations(5))
 
 
@@ -147,7 +147,7 @@ def test_a_plain_chain_in_every_container(suffix: str, tmp_path: Path, observati
         np.savez_compressed(path, **{name: tensor.numpy() for name, tensor in tensors.items()})
     else:
         save_file(tensors, path)
-    policy = load_policy(path, choices=ImportOptions("silu", "none"))
+    policy = load_policy(path, import_options=ImportOptions("silu", "none"))
     assert policy.layers == (9, 8, 7)
     agree(policy, chain, observations(5))
 
@@ -161,20 +161,22 @@ def test_rllib_ppo_is_a_pair_or_logits_as_the_world_says(tmp_path: Path, observa
         arrays[f"default_policy/{name}/kernel"] = stage.weight.detach().numpy().T
         arrays[f"default_policy/{name}/bias"] = stage.bias.detach().numpy()
     np.savez(tmp_path / "ppo.npz", **arrays)
-    pair = load_policy(tmp_path / "ppo.npz", choices=ImportOptions("tanh", "clip"), spaces=BOUNDS)
+    pair = load_policy(tmp_path / "ppo.npz", import_options=ImportOptions("tanh", "clip"), spaces=BOUNDS)
     low, high = torch.tensor(BOUNDS.low), torch.tensor(BOUNDS.high)
     agree(pair, lambda x: torch.clamp(chain(x)[:2], low, high), observations(5))
-    logits = load_policy(tmp_path / "ppo.npz", choices=TANH, spaces=WorldSpaces("world", 5, 1, choices=4))
+    logits = load_policy(
+        tmp_path / "ppo.npz", import_options=TANH, spaces=WorldSpaces("world", 5, 1, discrete_actions=4)
+    )
     agree(logits, lambda x: chain(x).argmax().reshape(1).float(), observations(5))
 
 
 def test_a_converted_policy_states_everything(tmp_path: Path, observations: Draw) -> None:
     torch.save(PpoAgent().state_dict(), tmp_path / "agent.pt")
     np.savez(tmp_path / "stats.npz", mean=np.ones(5), var=np.full(5, 4.0), clip_obs=3.0)
-    choices = ImportOptions("tanh", "clip", "stats.npz")
-    spec = convert_policy(tmp_path / "agent.pt", tmp_path / "agent.safetensors", choices, BOUNDS)
+    import_options = ImportOptions("tanh", "clip", "stats.npz")
+    spec = convert_policy(tmp_path / "agent.pt", tmp_path / "agent.safetensors", import_options, BOUNDS)
     assert (spec.robot, spec.layers, spec.observation_clip) == ("world", (7, 6), 3.0)
-    before = load_policy(tmp_path / "agent.pt", choices=choices, spaces=BOUNDS)
+    before = load_policy(tmp_path / "agent.pt", import_options=import_options, spaces=BOUNDS)
     after = load_policy(tmp_path / "agent.safetensors", "world")
     for observation in observations(5):
         np.testing.assert_array_equal(before.act(observation).action, after.act(observation).action)
@@ -183,9 +185,9 @@ def test_a_converted_policy_states_everything(tmp_path: Path, observations: Draw
             after.act(observation, rng=np.random.default_rng(1)).action,
         )
     with pytest.raises(PolicyError, match="exists already"):
-        convert_policy(tmp_path / "agent.pt", tmp_path / "agent.safetensors", choices, BOUNDS)
+        convert_policy(tmp_path / "agent.pt", tmp_path / "agent.safetensors", import_options, BOUNDS)
     with pytest.raises(PolicyError, match="its activation is 'tanh' and cannot be chosen, found 'relu'"):
-        load_policy(tmp_path / "agent.safetensors", choices=ImportOptions("relu"))
+        load_policy(tmp_path / "agent.safetensors", import_options=ImportOptions("relu"))
 
 
 def zipped(**entries: bytes) -> bytes:
@@ -297,7 +299,7 @@ def test_what_is_no_policy_is_refused_in_one_line(
     path = tmp_path / "policy.bin"
     path.write_bytes(content())
     with pytest.raises(PolicyError, match=message) as caught:
-        load_policy(path, choices=ImportOptions("tanh", "none"))
+        load_policy(path, import_options=ImportOptions("tanh", "none"))
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
     assert "executed" not in capsys.readouterr().out
@@ -322,7 +324,7 @@ def test_statistics_are_checked(content: str, message: str, tmp_path: Path) -> N
     torch.save(PpoAgent().state_dict(), tmp_path / "agent.pt")
     (tmp_path / "stats.json").write_text(content)
     with pytest.raises(PolicyError, match=message):
-        load_policy(tmp_path / "agent.pt", choices=ImportOptions("tanh", "none", "stats.json"))
+        load_policy(tmp_path / "agent.pt", import_options=ImportOptions("tanh", "none", "stats.json"))
     with pytest.raises(PolicyError, match=r"gone\.npz: no such file"):
-        load_policy(tmp_path / "agent.pt", choices=ImportOptions("tanh", "none", "gone.npz"))
+        load_policy(tmp_path / "agent.pt", import_options=ImportOptions("tanh", "none", "gone.npz"))
     assert NO_OPTIONS.over(TANH) == TANH

@@ -47,7 +47,7 @@ def _layers(path: Path, names: list[str]) -> list[tuple[NDArray[np.float64], NDA
 
 def test_the_ant_is_an_rllib_sac(reference: Reference, observations: Draw) -> None:
     path = reference("ant.npz")
-    policy = load_policy(path, choices=ImportOptions("tanh"), spaces=ANT)
+    policy = load_policy(path, import_options=ImportOptions("tanh"), spaces=ANT)
     assert (policy.shape, policy.layers) == ((111,), (256, 256))
     layers = _layers(path, [f"default_policy/sequential/action_{name}" for name in ("1", "2", "out")])
     for observation in observations(111):
@@ -72,7 +72,7 @@ def test_rsl_rl_weights(
     observations: Draw,
 ) -> None:
     path = reference(name)
-    policy = load_policy(path, choices=ImportOptions(activation))
+    policy = load_policy(path, import_options=ImportOptions(activation))
     assert (policy.shape, policy.layers) == ((observed,), widths)
     layers = _layers(path, [f"actor.{number}" for number in (0, 2, 4, 6)])
     for observation in observations(observed):
@@ -87,8 +87,10 @@ def test_rsl_rl_weights(
 
 def test_the_a1_is_a_plain_chain_with_statistics(reference: Reference, observations: Draw) -> None:
     path, statistics = reference("quadrupedal.npz"), reference("quadrupedal_obs_normalizer.npz")
-    choices = ImportOptions("tanh", "tanh", str(statistics))
-    policy = load_policy(path, choices=choices, spaces=WorldSpaces("A1", 93, 6, (-1.0,) * 6, (1.0,) * 6))
+    import_options = ImportOptions("tanh", "tanh", str(statistics))
+    policy = load_policy(
+        path, import_options=import_options, spaces=WorldSpaces("A1", 93, 6, (-1.0,) * 6, (1.0,) * 6)
+    )
     assert (policy.shape, policy.layers) == ((93,), (256,) * 4)
     names = ["base.seq_fcs.0", "base.seq_fcs.2", *(f"seq_append_fcs.{number}" for number in (0, 2, 4))]
     layers = _layers(path, names)
@@ -108,7 +110,7 @@ def test_the_authors_brake_brakes(reference: Reference) -> None:
     Braked at full speed, some rear up beyond the height at which an episode ends; the simulation goes on
     here, because the claim is about where the brake leads, and counts them.
     """
-    policy = load_policy(reference("ant.npz"), choices=ImportOptions("tanh"), spaces=ANT)
+    policy = load_policy(reference("ant.npz"), import_options=ImportOptions("tanh"), spaces=ANT)
     robot = make_robot("ant")
     speed = robot.attribute_index("speed")
 
@@ -152,7 +154,7 @@ class _PaddedAnt(Ant):
 @pytest.mark.slow
 def test_probing_sees_the_authors_brake_and_how_common_brakes_are(reference: Reference) -> None:
     """Probed like any unit, 0:156 brakes from every start; at such outputs many do, so it is not rare."""
-    policy = load_policy(reference("ant.npz"), choices=ImportOptions("tanh"), spaces=ANT)
+    policy = load_policy(reference("ant.npz"), import_options=ImportOptions("tanh"), spaces=ANT)
     others = np.random.default_rng(0).choice(512, 63, replace=False).tolist()
     units = sorted({156, *others})
     with RolloutPool(_PaddedAnt(), policy, 1) as crew:

@@ -65,7 +65,7 @@ def test_continuous_actions_are_those_of_predict(
 
 def test_discrete_actions_are_those_of_predict(tmp_path: Path, observations: Draw) -> None:
     model, path = saved(tmp_path, "PPO", "CartPole-v1", activation_fn=torch.nn.ReLU)
-    policy = load_policy(path, spaces=WorldSpaces("CartPole-v1", 4, 1, choices=2))
+    policy = load_policy(path, spaces=WorldSpaces("CartPole-v1", 4, 1, discrete_actions=2))
     chosen = []
     for observation in observations(4):
         expected, _ = model.predict(observation, deterministic=True)
@@ -117,7 +117,7 @@ def test_vecnormalize_is_asked_for_and_applied(tmp_path: Path, observations: Dra
     with pytest.raises(PolicyError, match=r"behind VecNormalize.*--normaliser FILE, or --normaliser none"):
         load_policy(path)
     with pytest.raises(PolicyError, match=r"stats\.pkl: a pickle.*numpy\.savez"):
-        load_policy(path, choices=ImportOptions(normaliser=str(tmp_path / "stats.pkl")))
+        load_policy(path, import_options=ImportOptions(normaliser=str(tmp_path / "stats.pkl")))
     statistics = {
         "mean": env.obs_rms.mean.tolist(),
         "var": env.obs_rms.var.tolist(),
@@ -126,10 +126,10 @@ def test_vecnormalize_is_asked_for_and_applied(tmp_path: Path, observations: Dra
     }
     (tmp_path / "stats.json").write_text(json.dumps(statistics))
     np.savez(tmp_path / "stats.npz", **statistics)
-    bare = load_policy(path, choices=ImportOptions(normaliser="none"))
+    bare = load_policy(path, import_options=ImportOptions(normaliser="none"))
     for name in ("stats.json", "stats.npz"):
         # Found beside the weights, by its name alone.
-        policy = load_policy(path, choices=ImportOptions(normaliser=name))
+        policy = load_policy(path, import_options=ImportOptions(normaliser=name))
         assert policy.sha256 != bare.sha256
         for observation in observations(3):
             expected, _ = model.predict(env.normalize_obs(observation), deterministic=True)
@@ -167,7 +167,7 @@ def test_an_own_policy_class_is_asked_for_its_activation(tmp_path: Path, observa
     model, path = saved(tmp_path, "PPO", activation_fn=torch.nn.Hardtanh)
     with pytest.raises(PolicyError, match=r"PPO does not say the activation.*--activation tanh\|relu\|elu"):
         load_policy(path)
-    policy = load_policy(path, choices=ImportOptions(activation="tanh"))
+    policy = load_policy(path, import_options=ImportOptions(activation="tanh"))
     observation = observations(3)[0] * 0.01
     expected, _ = model.predict(observation, deterministic=True)
     np.testing.assert_allclose(policy.act(observation).action, expected, atol=1e-2)
