@@ -1,7 +1,7 @@
-"""The real Rerun viewer without a window, for tests that want to see what a user sees.
+"""The real Rerun viewer without a window, for tests that check what a user sees.
 
-It needs a Vulkan driver; a software one does (Debian: mesa-vulkan-drivers, libvulkan1). Where there is none,
-the test is skipped, unless the environment says PDTUI_VIEWER=required, as continuous integration does.
+It needs a Vulkan driver; a software driver is enough (Debian: mesa-vulkan-drivers, libvulkan1). Without one,
+these tests are skipped, unless the environment says PDTUI_VIEWER=required, as continuous integration does.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -25,28 +26,41 @@ from rerun.experimental import ViewerClient, ViewerState
 from pdtui.sessions.viewer.viewer_address import LOCAL, find_viewer
 
 _PATIENCE = 30.0
+"""Longest wait for the viewer, s."""
 _NO_MATTER = ("Software rasterizer", "Failed to load examples")
 _NO_DRIVER = ("No graphics adapter", "Failed to get render context")
 ARTIFACTS = Path(os.environ.get("PDTUI_ARTIFACTS", Path(__file__).parents[1] / "test-artifacts"))
 """Where screenshots are kept."""
 
 
+class NoDriverError(Exception):
+    """The viewer has ended because it found no driver to draw with."""
+
+
 class RealViewer:
-    """A viewer that runs in a process group of its own.
+    """A viewer in a process group of its own, which has drawn a frame.
+
+    Without a driver the viewer answers first and ends when it is to draw, so only a drawn frame proves
+    that it works.
 
     Args:
-        port: a free one on this machine.
+        port: A free port of this machine.
+
+    Raises:
+        NoDriverError: The viewer cannot draw on this machine.
+        AssertionError: It ended for another reason, or did not answer.
     """
 
     def __init__(self, port: int) -> None:
         self.port = port
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the viewer
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the viewer
         command = [find_viewer(), "--headless", "--hide-welcome-screen", "--bind", LOCAL, "--port", str(port)]
         self._process = subprocess.Popen(
-            command, stdout=self._said, stderr=subprocess.STDOUT, start_new_session=True
+            command, stdout=self._log, stderr=subprocess.STDOUT, start_new_session=True
         )
         try:
             self.client = self._connect()
+            self._draw_first_frame()
         except BaseException:
             self.kill()
             raise
@@ -105,10 +119,7 @@ class RealViewer:
         deadline = time.monotonic() + _PATIENCE
         while time.monotonic() < deadline:
             if self._process.poll() is not None:
-                said = self._words()
-                if any(words in said for words in _NO_DRIVER):
-                    _skip("the Rerun viewer finds no Vulkan driver; mesa-vulkan-drivers is a software one")
-                raise AssertionError(f"the viewer ended with code {self._process.returncode}: {said[-2000:]}")
+                raise self._death()
             try:
                 socket.create_connection((LOCAL, self.port), 1.0).close()
                 client = ViewerClient.connect(f"rerun+http://{LOCAL}:{self.port}/proxy")
@@ -117,21 +128,53 @@ class RealViewer:
                 time.sleep(0.1)
             else:
                 return client
-        raise AssertionError(f"the viewer did not answer within {_PATIENCE:g} s: {self._words()[-2000:]}")
+        raise AssertionError(f"the viewer did not answer within {_PATIENCE:g} s: {self._output()[-2000:]}")
 
-    def _words(self) -> str:
-        self._said.seek(0)
-        return self._said.read().decode(errors="replace")
+    def _draw_first_frame(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                self.client.save_screenshot(str(Path(folder) / "first-frame.png"))
+                self.client.get_state()
+            except (OSError, RuntimeError):
+                self._process.wait(_PATIENCE)
+                raise self._death() from None
+
+    def _death(self) -> Exception:
+        """Return why the viewer has ended."""
+        output = self._output()
+        if any(words in output for words in _NO_DRIVER):
+            return NoDriverError(
+                "the Rerun viewer finds no Vulkan driver; mesa-vulkan-drivers is a software one"
+            )
+        return AssertionError(f"the viewer ended with code {self._process.returncode}: {output[-2000:]}")
+
+    def _output(self) -> str:
+        self._log.seek(0)
+        return self._log.read().decode(errors="replace")
 
 
 @contextmanager
 def real_viewer() -> Iterator[RealViewer]:
-    """A viewer that is gone afterwards, whatever happens."""
+    """Yield a viewer that is gone afterwards, whatever happens; skip the test where none can draw."""
+    if reason := why_no_viewer():
+        if os.environ.get("PDTUI_VIEWER") == "required":
+            pytest.fail(reason)
+        pytest.skip(reason)
     viewer = RealViewer(free_port())
     try:
         yield viewer
     finally:
         viewer.kill()
+
+
+@cache
+def why_no_viewer() -> str:
+    """Return why the viewer cannot draw on this machine, or an empty string where it can; decided once."""
+    try:
+        RealViewer(free_port()).kill()
+    except NoDriverError as error:
+        return str(error)
+    return ""
 
 
 def free_port() -> int:
@@ -145,9 +188,3 @@ def is_blank(picture: NDArray[np.uint8]) -> bool:
     """Whether nearly all of a picture is one colour."""
     _, counts = np.unique(picture.reshape(-1, 3), axis=0, return_counts=True)
     return bool(counts.max() > 0.98 * counts.sum())
-
-
-def _skip(reason: str) -> None:
-    if os.environ.get("PDTUI_VIEWER") == "required":
-        pytest.fail(reason)
-    pytest.skip(reason)

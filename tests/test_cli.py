@@ -202,6 +202,7 @@ def test_importing_the_commands_pulls_in_nothing_heavy() -> None:
     assert result.stdout.strip() == "[]"
 
 
+@pytest.mark.viewer
 def test_a_drive_is_shown_in_a_viewer_and_goes_on_without_one(
     map_path: Path, keys: Path, tmp_path: Path, viewer: RealViewer
 ) -> None:

@@ -155,6 +155,7 @@ def test_a_drive_whose_viewer_is_not_there_says_so_and_goes_on(
     assert read_session(recording).steps > 20
 
 
+@pytest.mark.viewer
 def test_a_viewer_killed_in_mid_drive_leaves_drive_and_session_whole(
     small_map: StimulationMap, recording: Path
 ) -> None:

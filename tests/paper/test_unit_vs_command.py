@@ -115,6 +115,7 @@ def test_a_map_without_a_heading_to_hold_is_named(map_text: str, tmp_path: Path)
         compare_unit_with_command([DriveConfig("ant", load_map(path), 0)], [100])
 
 
+@pytest.mark.viewer
 def test_the_command_compares_maps_and_draws(map_path: Path, tmp_path: Path, viewer: RealViewer) -> None:
     other, picture, recording = tmp_path / "other.toml", tmp_path / "f.png", tmp_path / "f.rrd"
     other.write_text(map_path.read_text().replace("kp = 2.0", "kp = 4.0"))

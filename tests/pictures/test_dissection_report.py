@@ -67,6 +67,7 @@ def test_bars_are_the_discrepancies(dissection: Dissection, entities: Entities) 
         )
 
 
+@pytest.mark.viewer
 def test_the_viewer_opens_it_without_a_complaint(viewer: RealViewer, report: Path) -> None:
     viewer.show(report)
     assert not is_blank(viewer.picture("dissection"))

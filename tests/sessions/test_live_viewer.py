@@ -23,6 +23,7 @@ def own_viewer() -> Iterator[RealViewer]:
         yield viewer
 
 
+@pytest.mark.viewer
 def test_a_drive_is_in_the_viewer_while_it_is_driven(
     viewer: RealViewer, tmp_path: Path, weights: Path
 ) -> None:
@@ -49,6 +50,7 @@ def test_a_drive_is_in_the_viewer_while_it_is_driven(
     assert read_session(path).outcome == "the operator quit"
 
 
+@pytest.mark.viewer
 @pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_viewer_that_goes_away_leaves_the_session_whole(
     own_viewer: RealViewer, tmp_path: Path, weights: Path, ending: signal.Signals

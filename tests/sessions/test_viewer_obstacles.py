@@ -109,6 +109,7 @@ def test_what_a_robot_has_not_is_not_counted() -> None:
     assert EpisodeStatisticsCounter(info).of(4) == EpisodeStatistics(4, 0, 0, 0.0, 0.0)
 
 
+@pytest.mark.viewer
 def test_the_viewer_shows_them(viewer: RealViewer, course: Course) -> None:
     path, _, _ = course
     viewer.show(path)
