@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.core.bodies import Link, RobotState
+from pdtui.core.robot_data import Link, RobotState
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.policies.runtime.action_decoders import decoder_for
 from pdtui.policies.runtime.policy import Policy

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,3 +53,26 @@ def unwrap_angles(values: Floats, attributes: Sequence[Attribute]) -> Floats:
         if attribute.wraps:
             smooth[:, column] = np.unwrap(smooth[:, column])
     return smooth
+
+
+AimDirection = Literal["increase", "decrease", "raise", "lower", "stop"]
+
+
+@dataclass(frozen=True)
+class BehaviorAim:
+    """What a behavior is meant to do, which `pdtui evaluate` measures.
+
+    Attributes:
+        attribute: its name.
+        direction: ``increase`` and ``decrease`` want the attribute itself above and below 0 (a drift to +y, a
+            turn to the left); ``raise`` and ``lower`` want it above and below what it is without the behavior
+            (a height, a joint's angle); ``stop`` wants it near 0.
+    """
+
+    attribute: str
+    direction: AimDirection
+
+    @property
+    def sign(self) -> float:
+        """1 where more of the attribute is wanted, −1 where less of it is."""
+        return 1.0 if self.direction in ("increase", "raise") else -1.0

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.core.bodies import NO_OBSTACLES
 from pdtui.core.events import Event
+from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.core.units import Stimulation
 
 

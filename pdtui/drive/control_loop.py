@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from pdtui.core.attributes import Floats
-from pdtui.core.bodies import RobotState
 from pdtui.core.errors import KeystrokeError, MapError, SimulationDiverged
 from pdtui.core.events import Event
+from pdtui.core.robot_data import RobotState
 from pdtui.core.step_record import StepRecord
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.recurrent_state import PolicyState

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pdtui.core.attributes import Floats
-from pdtui.core.bodies import NO_OBSTACLES
+from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.core.step_record import ActiveBehavior, StepRecord
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_snapshot import DriveSnapshot, StimulatedUnit

@@ -13,9 +13,9 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.legged.terrain import RoughGround, rough_ground, scatter_trees
-from pdtui.robots.legged.trunk_rays import nearness
+from pdtui.robots.legged.tree_rays import tree_nearness
 from pdtui.robots.simulators.bullet_robot import BulletRobot, add_ground, add_plane, add_trees, data_folder
-from pdtui.robots.simulators.urdf_links import links_of_urdf
+from pdtui.robots.simulators.urdf_links import read_urdf_links
 
 _LEGS = ("FR", "FL", "RR", "RL")
 _LEG_NAMES = {"FR": "front right", "FL": "front left", "RR": "rear right", "RL": "rear left"}
@@ -94,7 +94,7 @@ class A1(BulletRobot):
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93,), np.float64)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (6,), np.float32)
         self._urdf = data_folder() / "a1" / "a1.urdf"
-        self.links = links_of_urdf(self._urdf, ("trunk", *_JOINTS))
+        self.links = read_urdf_links(self._urdf, ("trunk", *_JOINTS))
         self.renew(0, terrain)
         limits = [self.bullet.getJointInfo(self.robot_id, joint)[10] for joint in self._joints]
         self.attributes = (
@@ -283,4 +283,4 @@ class A1Vision(A1):
     def observe(self) -> Floats:
         (x, y, _), yaw = self._base()[0], self._attitude()[2]
         nose = (x + _NOSE * math.cos(yaw), y + _NOSE * math.sin(yaw))
-        return np.concatenate([super().observe(), nearness(nose, yaw, self.obstacles, _FAN, _SIGHT)])
+        return np.concatenate([super().observe(), tree_nearness(nose, yaw, self.obstacles, _FAN, _SIGHT)])

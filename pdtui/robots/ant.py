@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.robots.geometry import roll_pitch_yaw
-from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, links_of
+from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, model_links
 
 _LEGS = {"1": "front left", "2": "back left", "3": "back right", "4": "front right"}
 
@@ -34,7 +34,7 @@ class Ant(MujocoRobot, AntEnv):
     def __init__(self, forward: str = "either") -> None:
         super().__init__(include_cfrc_ext_in_observation=False)
         self._forward = forward
-        self.links = links_of(self.model)
+        self.links = model_links(self.model)
         self._motors = GearedMotors(self.model)
         self.attributes = (
             Attribute("vx", "m/s"),

@@ -14,7 +14,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.core.bodies import CommandRange
+from pdtui.core.robot_data import CommandRange
 from pdtui.robots.geometry import roll_pitch_yaw, rotate
 from pdtui.robots.legged.legged_rewards import (
     COMMAND_SCALES,
@@ -24,7 +24,7 @@ from pdtui.robots.legged.legged_rewards import (
     legged_observations,
     legged_rewards,
 )
-from pdtui.robots.simulators.mujoco_robot import MujocoRobot, links_of
+from pdtui.robots.simulators.mujoco_robot import MujocoRobot, model_links
 
 MODEL = Path(__file__).parent / "models" / "anymal_c.xml"
 LEGS = ("LF", "LH", "RF", "RH")
@@ -74,7 +74,7 @@ class Anymal(MujocoRobot):
         self._random_commands = random_commands
         self.model = mujoco.MjModel.from_xml_path(str(MODEL))
         self.data = mujoco.MjData(self.model)
-        self.links = links_of(self.model)
+        self.links = model_links(self.model)
         self.action_space = spaces.Box(-_MOST, _MOST, (12,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (46 + len(self.commands),), np.float64)
         self._feet, self._feet_velocity = feet_of(self.model)

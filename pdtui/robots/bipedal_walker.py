@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from pdtui.core.angles import wrap_angle
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.core.bodies import Link
-from pdtui.robots.environments.environment_robot import EnvironmentRobot
+from pdtui.core.robot_data import Link
+from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
 
 FINISH = (stock.TERRAIN_LENGTH - stock.TERRAIN_GRASS) * stock.TERRAIN_STEP
 _GROUND = 2000.0
@@ -100,7 +100,7 @@ class FlatBipedalWalker(stock.BipedalWalker):
         return super().step(np.zeros(4, np.float32))[0]
 
 
-class BipedalWalker(EnvironmentRobot):
+class BipedalWalker(GymnasiumRobot):
     """Gymnasium's BipedalWalker on flat ground; 0.02 s a control step.
 
     Observation (24): hull angle and velocities, angles and speeds of the joints, foot contacts, 10 distances

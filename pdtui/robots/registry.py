@@ -112,12 +112,12 @@ def _from_entry(entry: EntryPoint, options: dict[str, Any]) -> Robot:
 
 
 def _from_environment(environment: str, name: str) -> Robot:
-    from pdtui.robots.environments.environment_robot import make_environment
-    from pdtui.robots.environments.mujoco_environment import MujocoEnvironmentRobot, is_mujoco
-    from pdtui.robots.environments.observation_robot import ObservationRobot
+    from pdtui.robots.environments.gymnasium_robot import make_environment
+    from pdtui.robots.environments.mujoco_gymnasium_robot import MujocoGymnasiumRobot, is_mujoco
+    from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
 
     env = make_environment(environment)
-    kind = MujocoEnvironmentRobot if is_mujoco(env) else ObservationRobot
+    kind = MujocoGymnasiumRobot if is_mujoco(env) else PlainGymnasiumRobot
     env.close()
     return kind(name, environment=environment)
 

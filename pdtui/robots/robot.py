@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, column_of
-from pdtui.core.bodies import NO_OBSTACLES, CommandRange, Link, RobotState
 from pdtui.core.errors import RobotError
+from pdtui.core.robot_data import NO_OBSTACLES, CommandRange, Link, RobotState
 
 
 class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):

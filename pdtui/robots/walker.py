@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.angles import wrap_angle
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, links_of
+from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, model_links
 
 _LONGEST_STRIDE = 0.4
 """s"""
@@ -41,7 +41,7 @@ class Walker(MujocoRobot, Walker2dEnv):
         super().__init__(xml_file="walker2d.xml")
         self._alternate, self._top_speed = alternate, top_speed
         self._in_air = np.zeros(len(_FEET))
-        self.links = links_of(self.model)
+        self.links = model_links(self.model)
         self._feet = [self.model.geom(geom).id for geom in _FEET.values()]
         self._motors = GearedMotors(self.model)
         self.attributes = (

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.attributes import Attribute, BehaviorAim, Floats
 from pdtui.probing.effect_probe import PlanEffects
-from pdtui.stimulation.stimulation_map import BehaviorAim
 
 
 @dataclass(frozen=True)

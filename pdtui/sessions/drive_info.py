@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from pdtui.core.attributes import Attribute
-from pdtui.core.bodies import Link
+from pdtui.core.robot_data import Link
 from pdtui.sessions.schema import ActivationsKept
 
 

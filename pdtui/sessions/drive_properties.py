@@ -9,8 +9,8 @@ from dataclasses import asdict
 from typing import Any, TypeVar
 
 from pdtui.core.attributes import Attribute
-from pdtui.core.bodies import Link
 from pdtui.core.errors import SessionError
+from pdtui.core.robot_data import Link
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.schema import ACTIVATIONS_KEPT, SCHEMA
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, unwrap_angles
-from pdtui.core.bodies import RobotState
 from pdtui.core.errors import RobotError, SimulationDiverged
+from pdtui.core.robot_data import RobotState
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.recurrent_state import PolicyState
 from pdtui.robots.robot import Robot

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import cast, get_args
 
+from pdtui.core.attributes import AimDirection, BehaviorAim
 from pdtui.core.bounded_read import read_at_most
 from pdtui.core.errors import MapError
 from pdtui.core.units import ADDRESS
@@ -15,9 +16,7 @@ from pdtui.stimulation.map_fields import NUMBER, MapTable
 from pdtui.stimulation.stimulation_map import (
     RESERVED_KEYS,
     SCHEMA,
-    AimDirection,
     Behavior,
-    BehaviorAim,
     BehaviorMode,
     MeasuredEffect,
     MotorPrimitive,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from pdtui.core.attributes import BehaviorAim
 from pdtui.core.errors import MapError
 from pdtui.core.units import parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
@@ -29,7 +30,6 @@ RESERVED_KEYS: dict[str, str] = {
 }
 
 BehaviorMode = Literal["fixed", "pid"]
-AimDirection = Literal["increase", "decrease", "raise", "lower", "stop"]
 
 
 @dataclass(frozen=True)
@@ -71,26 +71,6 @@ class MotorPrimitive:
     discrepancy: float | None = None
     value: float | None = None
     measured: MeasuredEffect | None = None
-
-
-@dataclass(frozen=True)
-class BehaviorAim:
-    """What a behavior is meant to do, which `pdtui evaluate` measures.
-
-    Attributes:
-        attribute: its name.
-        direction: ``increase`` and ``decrease`` want the attribute itself above and below 0 (a drift to +y, a
-            turn to the left); ``raise`` and ``lower`` want it above and below what it is without the behavior
-            (a height, a joint's angle); ``stop`` wants it near 0.
-    """
-
-    attribute: str
-    direction: AimDirection
-
-    @property
-    def sign(self) -> float:
-        """1 where more of the attribute is wanted, −1 where less of it is."""
-        return 1.0 if self.direction in ("increase", "raise") else -1.0
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from mujoco import rollout
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.core.bodies import RobotState
+from pdtui.core.robot_data import RobotState
 from pdtui.robots.anymal import ACTION_SCALE, COMMANDS, DEFAULT, HEIGHT, MODEL, SUBSTEPS, Anymal, feet_of
 from pdtui.robots.legged.legged_rewards import (
     LeggedMotion,

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
-from pdtui.core.bodies import RobotState
 from pdtui.core.errors import TrainingError
+from pdtui.core.robot_data import RobotState
 from pdtui.training.world_batch import WorldBatch, WorldBatchState
 
 _KEY = "pdtui-training"

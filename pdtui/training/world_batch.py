@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.core.bodies import RobotState
 from pdtui.core.errors import SimulationDiverged
+from pdtui.core.robot_data import RobotState
 from pdtui.robots.robot import Robot
 from pdtui.training.sac import TransitionBatch
 

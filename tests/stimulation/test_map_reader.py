@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from pdtui.core.attributes import BehaviorAim
 from pdtui.core.errors import MapError
 from pdtui.stimulation.map_library import bare_map, find_map, list_maps
 from pdtui.stimulation.map_reader import load_map, parse_map
-from pdtui.stimulation.stimulation_map import BehaviorAim, MeasuredEffect, PidGains, StimulationMap
+from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains, StimulationMap
 
 
 def test_a_map_is_read_whole(small_map: StimulationMap, map_text: str) -> None:

@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 
 from pdtui.core.attributes import Floats
-from pdtui.core.bodies import Link, RobotState
 from pdtui.core.errors import RobotError, SimulationDiverged
+from pdtui.core.robot_data import Link, RobotState
 from pdtui.robots.robot import Robot
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -33,7 +33,7 @@ _DIVERGED = (
 )
 
 
-def links_of(model: mujoco.MjModel) -> tuple[Link, ...]:
+def model_links(model: mujoco.MjModel) -> tuple[Link, ...]:
     """The model's visible geoms that belong to a body, as primitive shapes."""
     links = []
     for index in range(model.ngeom):
@@ -80,7 +80,7 @@ def set_state(model: mujoco.MjModel, data: mujoco.MjData, state: Floats, owner: 
         data.warning[index].number = 0
 
 
-def poses_of(data: mujoco.MjData) -> Floats:
+def body_poses(data: mujoco.MjData) -> Floats:
     """World poses of all bodies but the world, from up-to-date kinematics, shape (B, 7)."""
     poses: Floats = np.concatenate((data.xpos[1:], data.xquat[1:]), axis=1)
     return poses
@@ -138,7 +138,7 @@ class MujocoRobot(Robot):
     def read_poses(self) -> Floats:
         # After a step MuJoCo's poses are those of the state before its last substep.
         mujoco.mj_kinematics(self.model, self.data)
-        return poses_of(self.data)
+        return body_poses(self.data)
 
     def snapshot(self) -> RobotState:
         state = state_of(self.model, self.data)

@@ -11,11 +11,11 @@ from xml.etree import ElementTree
 import numpy as np
 
 from pdtui.core.attributes import Floats
-from pdtui.core.bodies import Link
+from pdtui.core.robot_data import Link
 from pdtui.robots.geometry import multiply_quaternions
 
 
-def links_of_urdf(path: Path, bodies: Sequence[str]) -> tuple[Link, ...]:
+def read_urdf_links(path: Path, bodies: Sequence[str]) -> tuple[Link, ...]:
     """The collision shapes of a robot; links on fixed joints belong to the body that they are fixed to.
 
     A cylinder is drawn as a capsule of the same radius and length.

@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 
 from pdtui.core.attributes import Floats
-from pdtui.core.bodies import NO_OBSTACLES
+from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.core.step_record import StepRecord
 from pdtui.sessions.schema import OBSTACLES, OBSTACLES_ABOVE
 from pdtui.sessions.viewer.viewer_curves import LogStatic, Send

@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 
 from pdtui.core.attributes import Floats
-from pdtui.core.bodies import Link
+from pdtui.core.robot_data import Link
 from pdtui.robots.geometry import capsule_ends, place_links
 from pdtui.sessions.writer.component_columns import ComponentColumn, vector_lists
 

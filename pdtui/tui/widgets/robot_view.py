@@ -9,7 +9,7 @@ from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
-from pdtui.core.bodies import NO_OBSTACLES
+from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.drive.drive_snapshot import DriveSnapshot
 from pdtui.robots.geometry import capsule_ends, place_links, root_body, rotate
 from pdtui.tui.braille_canvas import BrailleCanvas

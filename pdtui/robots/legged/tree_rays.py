@@ -7,7 +7,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 
 
-def nearness(place: tuple[float, float], yaw: float, trees: Floats, fan: Floats, reach: float) -> Floats:
+def tree_nearness(place: tuple[float, float], yaw: float, trees: Floats, fan: Floats, reach: float) -> Floats:
     """How near the next trunk is along each ray: 1 at the camera, 0 from `reach` on.
 
     Args:

@@ -11,7 +11,7 @@ from gymnasium import spaces
 
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.robots import make_robot
-from pdtui.robots.environments.observation_robot import ObservationRobot
+from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
 from tests.robots.wrapped_environments import follow, random_actions, values_of
 
 COPIED = ("Pendulum-v1", "CartPole-v1", "Acrobot-v1", "MountainCar-v0", "FrozenLake-v1", "Blackjack-v1")
@@ -143,7 +143,7 @@ def registered() -> Any:
 def test_a_picture_is_passed_as_it_is_and_gives_no_attributes() -> None:
     robot: Any = make_robot("test/Picture-v0")
     observation, _ = robot.reset(seed=0)
-    assert isinstance(robot, ObservationRobot)
+    assert isinstance(robot, PlainGymnasiumRobot)
     assert observation.shape == (4, 5, 3)
     assert observation.dtype == np.uint8
     assert values_of(robot) == {"reward": 0.0, "lives": 3.0}

@@ -9,13 +9,13 @@ import mujoco
 import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.robots.environments.environment_robot import EnvironmentRobot
+from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
 from pdtui.robots.simulators.mujoco_attributes import model_attributes
 from pdtui.robots.simulators.mujoco_robot import (
+    body_poses,
     check_finite,
     digest_state,
-    links_of,
-    poses_of,
+    model_links,
     set_state,
     state_of,
 )
@@ -31,7 +31,7 @@ def is_mujoco(env: gymnasium.Env[Any, Any]) -> bool:
     )
 
 
-class MujocoEnvironmentRobot(EnvironmentRobot):
+class MujocoGymnasiumRobot(GymnasiumRobot):
     """An environment whose ``unwrapped`` has ``model`` and ``data`` of MuJoCo.
 
     The last attribute is the environment's reward. A snapshot holds what the next physics step reads, the
@@ -44,7 +44,7 @@ class MujocoEnvironmentRobot(EnvironmentRobot):
         model = self.world.model
         self._measured = model_attributes(model)
         self.attributes = (*(one.attribute for one in self._measured), REWARD)
-        self.links = links_of(model)
+        self.links = model_links(model)
         fresh = mujoco.MjData(model)
         self._derived = tuple(name for name in dir(fresh) if _is_derived(getattr(fresh, name)))
         self._posed = fresh
@@ -67,7 +67,7 @@ class MujocoEnvironmentRobot(EnvironmentRobot):
         posed.qpos[:], posed.mocap_pos[:] = world.data.qpos, world.data.mocap_pos
         posed.mocap_quat[:] = world.data.mocap_quat
         mujoco.mj_kinematics(world.model, posed)
-        return poses_of(posed)
+        return body_poses(posed)
 
     def digest(self) -> int:
         if self._repeats:

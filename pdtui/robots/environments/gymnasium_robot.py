@@ -13,8 +13,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.core.bodies import RobotState
 from pdtui.core.errors import RobotError, SimulationDiverged
+from pdtui.core.robot_data import RobotState
 from pdtui.robots.environments.space_conversion import (
     action_for,
     as_vector,
@@ -63,7 +63,7 @@ def make_environment(name: str) -> gymnasium.Env[Any, Any]:
             ) from error
 
 
-class EnvironmentRobot(Robot):
+class GymnasiumRobot(Robot):
     """Drives a Gymnasium environment as it is: its observation, its reward, its end of an episode.
 
     A reset without a seed draws one from the robot's own generator, so that every episode is a function of

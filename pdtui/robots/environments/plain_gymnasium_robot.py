@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.robots.environments.environment_robot import EnvironmentRobot
+from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
 from pdtui.robots.environments.space_conversion import as_vector, numbers_of
 
 _MOST_OBSERVED = 1000
 
 
-class ObservationRobot(EnvironmentRobot):
+class PlainGymnasiumRobot(GymnasiumRobot):
     """An environment whose attributes are ``obs 0``, ``obs 1``, …, then ``reward``, then numbers of its info.
 
     An observation that is no vector (an image), or one of more than 1000 numbers, gives no attributes: its
