@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from pdtui.cli.shared_options import json_option, judging_options, progress_bar_or_none, show_result
+from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.plain_text import printable
 
@@ -190,12 +191,7 @@ def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
     if output.exists() and not overwrite:
         raise SessionError(f"{output}: exists already; --overwrite replaces it")
     heading = read_session_header(file)
-    text = write_keystrokes(heading.events)
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        output.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise SessionError(f"{output}: cannot be written: {error.strerror}") from error
+    write_file(output, write_keystrokes(heading.events), SessionError)
     without = len(heading.events) - heading.keys
     note = f"; {without} events had no key and are not in it" if without else ""
     click.echo(printable(f"wrote {output}: {heading.keys} keys of {heading.steps} steps{note}"))

@@ -10,6 +10,7 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from pdtui.core.atomic_file import check_writable, write_file
 from pdtui.core.errors import MapError
 from pdtui.dissection.dissect import dissect
 from pdtui.dissection.dissection_result import Dissection
@@ -67,7 +68,7 @@ def dissect_to_map(
     """
     if output.exists() and not overwrite:
         raise MapError(f"{output}: exists already; --overwrite replaces it, -o writes elsewhere")
-    _check_writable(output)
+    check_writable(output, MapError)
 
     def advance(stage: str, done: int, total: int) -> None:
         if progress is not None:
@@ -90,23 +91,10 @@ def dissect_to_map(
     )
     text = draft_map(dissection)
     stimulation_map = parse_map(text, str(output))
-    partial = output.with_name(output.name + ".part")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(output)
+    write_file(output, text, MapError)
     return WrittenDissection(dissection, output, tuple(stimulation_map.behaviors))
 
 
 def journal_path(output: Path) -> Path:
     """Where the roll-outs of an unfinished dissection are kept: beside the map."""
     return output.with_name(f".{output.stem}.rollouts")
-
-
-def _check_writable(output: Path) -> None:
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        with output.open("a"):
-            pass
-        if output.stat().st_size == 0:
-            output.unlink()
-    except OSError as error:
-        raise MapError(f"{output}: cannot be written: {error.strerror}") from error

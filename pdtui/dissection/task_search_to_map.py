@@ -12,6 +12,7 @@ import tomlkit
 from rich.console import RenderableType
 from rich.text import Text
 
+from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import MapError
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
@@ -124,8 +125,4 @@ def _new_map(path: Path, robot: str, policy: str, sha256: str, import_options: I
     document["schema"], document["robot"] = 1, robot
     given = {name: value for name, value in vars(import_options).items() if value}
     document["policy"] = {"name": policy, "sha256": sha256, **given}
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(tomlkit.dumps(document), encoding="utf-8")
-    except OSError as error:
-        raise MapError(f"{path}: cannot be written: {error.strerror}") from error
+    write_file(path, tomlkit.dumps(document), MapError)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import SessionError
 from pdtui.core.events import Event
 from pdtui.drive.control_loop import ControlLoop
@@ -105,11 +106,7 @@ def record_forest_episode(
         raise SessionError(f"{path}: exists already; a drive is recorded into a new file")
     with SessionRecorder(path, replace(loop.info, activations=activations)) as recorder:
         run, events = drive_forest_episode(loop, steps, operator, recorder)
-    keys = path.with_suffix(".keys")
-    try:
-        keys.write_text(write_keystrokes(events))
-    except OSError as error:
-        raise SessionError(f"{keys}: cannot be written: {error.strerror}") from error
+    write_file(path.with_suffix(".keys"), write_keystrokes(events), SessionError)
     return run
 
 

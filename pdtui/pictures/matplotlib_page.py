@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import PictureError
 from pdtui.dissection.dissection_result import Dissection
 
@@ -79,21 +80,13 @@ def figure_page(path: Path, height: float, title: str) -> Iterator[Figure]:
     from matplotlib.figure import Figure
 
     settings: dict[Any, Any] = {**matplotlib.rcParamsDefault, "backend": "agg", **_STYLE}
-    partial = path.with_name(path.name + ".part")
     with matplotlib.rc_context(settings):
         figure = Figure(figsize=(WIDTH, height), dpi=_DPI)
         FigureCanvasAgg(figure)
         figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
         yield figure
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+        with replace_file(path, PictureError) as partial:
             figure.savefig(partial, format="png", metadata={"Title": title, "Software": "pdtui"})
-            partial.replace(path)
-        except OSError as error:
-            raise PictureError(f"{path}: cannot be written: {error.strerror}") from error
-        finally:
-            with suppress(OSError):
-                partial.unlink()
 
 
 def policy_title(dissection: Dissection) -> str:

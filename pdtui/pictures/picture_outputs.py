@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from pdtui.core.atomic_file import check_writable
 from pdtui.core.errors import PictureError
 from pdtui.dissection.dissection_result import Dissection
 
@@ -40,8 +41,8 @@ class PictureOutputs:
             found += existing_figures(self.figures)
         if found and not self.overwrite:
             raise PictureError(f"{found[0]}: exists already; --overwrite replaces it")
-        for folder in (self.report.parent, *([] if self.figures is None else [self.figures])):
-            _check_writable(folder)
+        for path in (self.report, *([] if self.figures is None else [self.figures / "figure.png"])):
+            check_writable(path, PictureError)
 
     def draw(self, dissection: Dissection) -> list[Path]:
         """Write them.
@@ -60,13 +61,3 @@ class PictureOutputs:
         from pdtui.pictures.dissection_figures import draw_dissection_figures
 
         return [self.report, *draw_dissection_figures(self.figures, dissection)]
-
-
-def _check_writable(folder: Path) -> None:
-    probe = folder / ".pdtui.part"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise PictureError(f"{folder}: cannot be written: {error.strerror}") from error

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.recording_stream import is_enabled
 
+from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import PictureError
 
 
@@ -25,22 +26,15 @@ def open_report_file(path: Path, app: str, layout: rrb.Blueprint) -> Iterator[rr
     Raises:
         PictureError: the file cannot be written.
     """
-    partial = path.with_name(path.name + ".part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         recording = rr.RecordingStream(app)
         if not is_enabled(recording):
             raise PictureError(f"{path}: cannot be written: the environment says RERUN=off")
-        recording.set_sinks(rr.FileSink(partial), default_blueprint=layout)
-        try:
-            yield recording
-        finally:
-            recording.disconnect()
-        partial.replace(path)
-    except OSError as error:
-        raise PictureError(f"{path}: cannot be written: {error.strerror}") from error
+        with replace_file(path, PictureError) as partial:
+            recording.set_sinks(rr.FileSink(partial), default_blueprint=layout)
+            try:
+                yield recording
+            finally:
+                recording.disconnect()
     except RuntimeError as error:
         raise PictureError(f"{path}: cannot be written: {error}") from error
-    finally:
-        with suppress(OSError):
-            partial.unlink()

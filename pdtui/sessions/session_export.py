@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
+from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import SessionError
 from pdtui.core.units import format_unit
 from pdtui.sessions.schema import ACTIVE_FIELDS
@@ -49,9 +50,9 @@ def export_stream(path: Path, stream: str, output: Path, *, overwrite: bool = Fa
     steps = np.asarray(columns.pop("step", np.arange(session.steps)), np.int64)
     table = pa.table({"step": steps, "time": steps * session.info.dt, **columns})
     try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        _WRITERS[output.suffix](table, str(output))
-    except (OSError, pa.ArrowException) as error:
+        with replace_file(output, SessionError) as partial:
+            _WRITERS[output.suffix](table, str(partial))
+    except pa.ArrowException as error:
         raise SessionError(f"{output}: cannot be written: {error}") from error
     return int(table.num_rows)
 

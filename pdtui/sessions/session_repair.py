@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import rerun.chunk
 
+from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.drive_properties import info_from_properties
@@ -77,36 +76,27 @@ def repair_session(path: Path, output: Path) -> SessionHeader:
         SessionError: nothing can be rescued, or the output cannot be written.
     """
     condition = examine_session(path)
-    permissions = path.stat().st_mode & 0o777
-    target = output.resolve()  # what a link points to is replaced, not the link
-    with errors_named(output):
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".rrd")
-        os.close(handle)
-    beside = Path(name)
-    try:
-        _rewrite(path, beside, condition)
-        repaired = read_session_header(beside)
+    if not output.parent.is_dir():
+        raise SessionError(f"{output}: cannot be written: the folder does not exist")
+    with errors_named(output), replace_file(output, SessionError) as partial:
+        _rewrite(path, partial, condition)
+        repaired = read_session_header(partial)
         if repaired.steps != condition.steps:
             raise SessionError(f"{path}: {condition.steps} steps were there, {repaired.steps} were rescued")
-        with errors_named(output):
-            beside.chmod(permissions)
-            beside.replace(target)
-    finally:
-        beside.unlink(missing_ok=True)
-    return read_session_header(output)
+        partial.chmod(path.stat().st_mode & 0o777)
+    return replace(repaired, path=output)
 
 
 def _rewrite(path: Path, output: Path, condition: SessionCondition) -> None:
     recording = open_recording(output, condition.info, condition.recording_id)
     try:
-        with errors_named(output):
-            for number, chunk in enumerate(_kept(path, condition.steps)):
-                recording.send_chunks(chunk)
-                if number % _CHUNKS_A_FLUSH == 0:
-                    recording.flush()
-            if not condition.outcome:
-                send_property(recording, OUTCOME, {"outcome": f"repaired: cut at step {condition.steps}"})
-            recording.flush()
+        for number, chunk in enumerate(_kept(path, condition.steps)):
+            recording.send_chunks(chunk)
+            if number % _CHUNKS_A_FLUSH == 0:
+                recording.flush()
+        if not condition.outcome:
+            send_property(recording, OUTCOME, {"outcome": f"repaired: cut at step {condition.steps}"})
+        recording.flush()
     finally:
         recording.disconnect()
 

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import tomlkit
 
+from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import MapError
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains
@@ -124,10 +125,8 @@ def rewrite_map(path: Path, change: Callable[[str], str]) -> None:
     Raises:
         MapError: what `change` raises, or the file cannot be read or written.
     """
-    partial = path.with_name(path.name + ".part")
     try:
-        changed = change(path.read_text(encoding="utf-8"))
-        partial.write_text(changed, encoding="utf-8")
-        partial.replace(path)
+        text = path.read_text(encoding="utf-8")
     except OSError as error:
-        raise MapError(f"{path}: cannot be written: {error.strerror}") from error
+        raise MapError(f"{path}: cannot be read: {error.strerror}") from error
+    write_file(path, change(text), MapError)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
+from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import TrainingError
 from pdtui.core.robot_data import RobotState
 from pdtui.training.world_batch import WorldBatch, WorldBatchState
@@ -58,9 +59,8 @@ def save_checkpoint(
             }
         )
     record = {"progress": progress, "rng": rng.bit_generator.state, "worlds": groups}
-    partial = path.with_name(path.name + ".part")
-    save_file(arrays, partial, metadata={_KEY: json.dumps(record)})
-    partial.replace(path)
+    with replace_file(path, TrainingError) as partial:
+        save_file(arrays, partial, metadata={_KEY: json.dumps(record)})
 
 
 def load_checkpoint(

@@ -133,8 +133,5 @@ def convert_policy(
     network, _ = load_any_network(path, import_options, spaces)
     if spaces is not None:
         network.spec = replace(network.spec, robot=spaces.owner)
-    try:
-        save_network(output, network)
-    except OSError as error:
-        raise PolicyError(f"{output}: cannot be written: {error.strerror}") from error
+    save_network(output, network)
     return network.spec

@@ -14,6 +14,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
+from pdtui.core.atomic_file import write_file
 from pdtui.core.bounded_read import open_regular
 from pdtui.core.errors import PolicyError
 from pdtui.policies.weights.file_search import find_beside
@@ -65,13 +66,14 @@ def hash_file(path: Path) -> str:
 
 
 def save_network(path: Path, network: PolicyNetwork) -> None:
-    """Write weights and metadata, float32, replacing the file in one step."""
+    """Write weights as float32 and their metadata.
+
+    Raises:
+        PolicyError: the file cannot be written.
+    """
     tensors = {name: tensor.detach().float().contiguous() for name, tensor in network.state_dict().items()}
     payload = save(tensors, metadata={_KEY: json.dumps(asdict(network.spec), sort_keys=True)})
-    partial = path.with_name(path.name + ".part")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial.write_bytes(payload)
-    partial.replace(path)
+    write_file(path, payload, PolicyError)
 
 
 def load_network(path: Path) -> PolicyNetwork:
