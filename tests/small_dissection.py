@@ -9,9 +9,9 @@ import torch
 from pdtui.dissection.dissection_settings import DissectionSettings
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import save_network
+from pdtui.search.behavior_search_settings import BehaviorSearchSettings
 from pdtui.search.controller_search import ControllerSearchSettings
-from pdtui.search.imprints import ImprintSettings
-from pdtui.search.search_settings import BehaviorSearchSettings
+from pdtui.search.imprint_candidates import ImprintSettings
 
 SMALL = DissectionSettings(
     steps=130,
@@ -28,8 +28,8 @@ SMALL = DissectionSettings(
     walk=20,
     imprint=ImprintSettings(episodes=2, steps=10, bins=2, units=(3,), factors=(1.0,)),
     search=BehaviorSearchSettings(
-        pool=4, atoms=4, elite=3, children=3, promoted=2, most_units=(3,), generations=1, quick_starts=1,
-        quick_steps=12, full_starts=2, full_steps=16, finalists=2, final_steps=18,
+        random_sets=4, single_units=4, elite=3, children=3, promoted=2, max_units=(3,), generations=1,
+        quick_starts=1, quick_steps=12, full_starts=2, full_steps=16, finalists=2, final_steps=18,
     ),
     hold=ControllerSearchSettings(units=1, finalists=2, steps=12, final_steps=18),
 )  # fmt: skip

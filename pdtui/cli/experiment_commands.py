@@ -75,7 +75,7 @@ def _headings(result: UnitCommandComparison) -> HeadingFigure:
 
     from pdtui.paper.paper_tables import precision_table
     from pdtui.pictures.heading_figures import HeadingFigure, TrackedHeading
-    from pdtui.search.target_drives import STEPS_EACH
+    from pdtui.search.tracking_drives import STEPS_EACH
 
     several = len({row.map for row in result.rows}) > 1
     held = []

@@ -172,7 +172,7 @@ def pursue(
             seed=seed,
             workers=core_count(workers),
             minutes=minutes,
-            sizes=QUICK_TASK_SEARCH if quick else TaskSearchSettings(),
+            settings=QUICK_TASK_SEARCH if quick else TaskSearchSettings(),
             progress=advance,
         )
     show_result(found.as_dict(), as_json, found.text)

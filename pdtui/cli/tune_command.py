@@ -83,7 +83,7 @@ def tune(
             order,
             behaviors,
             seeds,
-            effort=TuningSettings(points, refinements, minutes),
+            settings=TuningSettings(points, refinements, minutes),
             workers=core_count(workers),
             progress=advance,
         )

@@ -13,7 +13,7 @@ import numpy as np
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_searches import DissectionSearches, TimeShare
+from pdtui.dissection.dissection_searches import DissectionSearches, TimeBudget
 from pdtui.dissection.dissection_settings import DissectionSettings
 from pdtui.dissection.sample_episode import pick_sample_episode
 from pdtui.dissection.start_states import gather_start_states
@@ -120,7 +120,7 @@ def dissect(
             stage("up and down"),
         )
         searches = DissectionSearches(
-            prober, world, plan, seed, TimeShare(began, budget_minutes), stage, known
+            prober, world, plan, seed, TimeBudget(began, budget_minutes), stage, known
         )
         behaviors, holds = searches.run(screen, refined, starts.searches)
         if remembered is not None:

@@ -12,8 +12,8 @@ from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.sample_episode import SampleEpisode
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.effect_probe import EffectCurves
-from pdtui.search.behavior_search import FoundBehavior
-from pdtui.search.controller_search import FoundController
+from pdtui.search.behavior_search import BehaviorSearchResult
+from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.spectra.matching import Discrepancies
 from pdtui.spectra.phase_correlation import PhaseCorrelations
 from pdtui.spectra.spectrogram import MatchingPreset
@@ -67,8 +67,8 @@ class Dissection:
     spread: Floats
     movable: tuple[int, ...]
     steered: tuple[AttributeMover, ...]
-    behaviors: tuple[FoundBehavior, ...]
-    holds: tuple[FoundController, ...]
+    behaviors: tuple[BehaviorSearchResult, ...]
+    holds: tuple[ControllerSearchResult, ...]
     rollouts: int
     control_steps: int
     minutes: float

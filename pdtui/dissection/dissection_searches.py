@@ -13,17 +13,17 @@ from pdtui.dissection.dissection_settings import DissectionSettings
 from pdtui.probing.effect_probe import EffectCurves, EffectProber
 from pdtui.robots.robot import Robot
 from pdtui.search.behavior_goals import STANDING, BehaviorGoal, goals_for
-from pdtui.search.behavior_search import BehaviorSearch, FoundBehavior, SearchStarts
-from pdtui.search.controller_search import ControllerSearch, FoundController, HeldAttribute
-from pdtui.search.imprints import find_imprints
-from pdtui.search.unit_sets import UnitSetPool, draw_unit_sets
+from pdtui.search.behavior_search import BehaviorSearch, BehaviorSearchResult, SearchStartStates
+from pdtui.search.controller_search import ControllerGoal, ControllerSearch, ControllerSearchResult
+from pdtui.search.imprint_candidates import build_imprint_candidates
+from pdtui.search.shared_candidates import SharedCandidates, draw_random_candidates
 from pdtui.spectra.monitor import StepProgress, monitor_episodes
 
 _IMPRINT_SEEDS = 1000
 """Beyond the first seed of a dissection: no other stage has these."""
 
 
-class TimeShare:
+class TimeBudget:
     """Shares what is left of a time budget fairly among the searches to come."""
 
     def __init__(self, began: float, minutes: float | None) -> None:
@@ -56,13 +56,13 @@ class DissectionSearches:
     world: Robot
     plan: DissectionSettings
     seed: int
-    clock: TimeShare
+    clock: TimeBudget
     stage: Callable[[str], StepProgress | None]
     known: Sequence[Stimulation] = ()
 
     def run(
-        self, screen: EffectCurves, refined: EffectCurves, starts: SearchStarts
-    ) -> tuple[tuple[FoundBehavior, ...], tuple[FoundController, ...]]:
+        self, screen: EffectCurves, refined: EffectCurves, starts: SearchStartStates
+    ) -> tuple[tuple[BehaviorSearchResult, ...], tuple[ControllerSearchResult, ...]]:
         """A behavior for each goal, and a controller for each attribute, that means anything here."""
         goals, targets = goals_for(self.world.attributes, refined.unperturbed), self._targets(refined)
         if not goals and not targets:
@@ -76,9 +76,9 @@ class DissectionSearches:
         self,
         goals: Sequence[BehaviorGoal],
         sweeps: Sequence[EffectCurves],
-        pool: UnitSetPool,
-        starts: SearchStarts,
-    ) -> tuple[FoundBehavior, ...]:
+        pool: SharedCandidates,
+        starts: SearchStartStates,
+    ) -> tuple[BehaviorSearchResult, ...]:
         found = []
         for number, goal in enumerate(goals):
             column = self.world.attribute_index(goal.aim.attribute)
@@ -87,34 +87,38 @@ class DissectionSearches:
             found.append(search.run(sweeps, pool, deadline, self.stage(f"search: {goal.name}")))
         return tuple(found)
 
-    def pool(self, starts: SearchStarts) -> UnitSetPool:
+    def pool(self, starts: SearchStartStates) -> SharedCandidates:
         """Random sets and imprints, probed once for all searches."""
         crew, sizes, imprint = self.prober.crew, self.plan.search, self.plan.imprint
         seeds = range(self.seed + _IMPRINT_SEEDS, self.seed + _IMPRINT_SEEDS + imprint.episodes)
         episodes = monitor_episodes(self.world, crew.policy, seeds, imprint.steps)
         plans = [
             *self.known,
-            *draw_unit_sets(crew.policy.units, sizes, self.seed),
-            *find_imprints(
+            *draw_random_candidates(crew.policy.units, sizes, self.seed),
+            *build_imprint_candidates(
                 episodes, self.world.attributes, crew.policy.layers, imprint, sizes.bounds.largest
             ),
         ]
         few = starts.search[: sizes.quick_starts]
-        return UnitSetPool(self.prober, plans, few, sizes.quick_steps, self.stage("sets of units"))
+        return SharedCandidates(self.prober, plans, few, sizes.quick_steps, self.stage("sets of units"))
 
-    def _targets(self, sweep: EffectCurves) -> list[HeldAttribute]:
+    def _targets(self, sweep: EffectCurves) -> list[ControllerGoal]:
         """Heading and speed, where the robot has them; a robot that stands has no speed to hold."""
         names = [attribute.name for attribute in self.world.attributes]
-        wanted = [HeldAttribute("yaw", (-0.8, -0.4, 0.4, 0.8), True)] if "yaw" in names else []
+        wanted = [ControllerGoal("yaw", (-0.8, -0.4, 0.4, 0.8), True)] if "yaw" in names else []
         if "speed" in names:
             usual = float(np.mean(sweep.unperturbed[:, names.index("speed")]))
             if usual > STANDING:
-                wanted.append(HeldAttribute("speed", (0.4 * usual, 0.7 * usual), False))
+                wanted.append(ControllerGoal("speed", (0.4 * usual, 0.7 * usual), False))
         return wanted
 
     def _holds(
-        self, targets: Sequence[HeldAttribute], sweep: EffectCurves, pool: UnitSetPool, starts: SearchStarts
-    ) -> tuple[FoundController, ...]:
+        self,
+        targets: Sequence[ControllerGoal],
+        sweep: EffectCurves,
+        pool: SharedCandidates,
+        starts: SearchStartStates,
+    ) -> tuple[ControllerSearchResult, ...]:
         """The best controllers, as long as the time is not up."""
         held = []
         for number, target in enumerate(targets):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from pdtui.search.behavior_search_settings import BehaviorSearchSettings
 from pdtui.search.controller_search import ControllerSearchSettings
-from pdtui.search.imprints import ImprintSettings
-from pdtui.search.search_settings import BehaviorSearchSettings
+from pdtui.search.imprint_candidates import ImprintSettings
 
 
 @dataclass(frozen=True)
@@ -101,8 +101,8 @@ QUICK_DISSECTION = DissectionSettings(
     walk=50,
     imprint=ImprintSettings(episodes=4, steps=40, bins=3, units=(8,), factors=(1.0,)),
     search=BehaviorSearchSettings(
-        pool=12, atoms=6, elite=4, children=6, promoted=2, most_units=(3,), generations=2, quick_starts=1,
-        quick_steps=60, full_starts=3, full_steps=120, finalists=2, final_steps=160,
+        random_sets=12, single_units=6, elite=4, children=6, promoted=2, max_units=(3,), generations=2,
+        quick_starts=1, quick_steps=60, full_starts=3, full_steps=120, finalists=2, final_steps=160,
     ),
     hold=ControllerSearchSettings(units=1, pairs=1, finalists=2, steps=60, final_steps=160),
 )  # fmt: skip

@@ -12,8 +12,8 @@ from pdtui.core.units import NO_STIMULATION, Stimulation, format_unit
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.key_allocator import KeyAllocator
 from pdtui.probing.confirmation import PrimitiveConfirmation, best_probed
-from pdtui.search.behavior_search import FoundBehavior
-from pdtui.search.controller_search import FoundController
+from pdtui.search.behavior_search import BehaviorSearchResult
+from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.stimulation.map_text import block_table, inline_table, outputs_table, table_array
 from pdtui.stimulation.map_writer import effect_table
 from pdtui.stimulation.stimulation_map import SCHEMA
@@ -137,7 +137,7 @@ def _primitive(
 
 
 def _behavior(
-    found: FoundBehavior, dissection: Dissection, names: dict[str, tuple[str, float]]
+    found: BehaviorSearchResult, dissection: Dissection, names: dict[str, tuple[str, float]]
 ) -> dict[str, Any]:
     magnitudes: dict[str, float] = {}
     for unit, value in zip(found.stimulation.units, found.stimulation.values, strict=True):
@@ -187,7 +187,7 @@ def _steered(dissection: Dissection, taken: set[str]) -> list[dict[str, Any]]:
     return entries
 
 
-def _hold(held: FoundController, dissection: Dissection) -> dict[str, Any]:
+def _hold(held: ControllerSearchResult, dissection: Dissection) -> dict[str, Any]:
     name, key, says = _HOLDS[held.pid.attribute]
     pid, layers = held.pid, dissection.layers
     gains = {"kp": pid.kp, "ki": pid.ki, "kd": pid.kd, "limit": pid.limit, "step": pid.step}

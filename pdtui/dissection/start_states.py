@@ -7,7 +7,7 @@ from typing import NamedTuple
 from pdtui.core.errors import RobotError
 from pdtui.dissection.dissection_settings import DissectionSettings
 from pdtui.probing.rollout_pool import RolloutPool
-from pdtui.search.behavior_search import SearchStarts
+from pdtui.search.behavior_search import SearchStartStates
 from pdtui.spectra.monitor import StartState, collect_start_states, walk_lengths
 
 _SHORTEST = 24
@@ -26,7 +26,7 @@ class ProbeStarts(NamedTuple):
 
     screen: tuple[StartState, ...]
     refine: tuple[StartState, ...]
-    searches: SearchStarts
+    searches: SearchStartStates
     plan: DissectionSettings
     shortened: str
 
@@ -71,4 +71,4 @@ def gather_start_states(crew: RolloutPool, plan: DissectionSettings, first_seed:
     for count in counts:
         pools.append(tuple(everything[taken : taken + count]))
         taken += count
-    return ProbeStarts(pools[0], pools[1], SearchStarts(*pools[2:]), plan, shortened)
+    return ProbeStarts(pools[0], pools[1], SearchStartStates(*pools[2:]), plan, shortened)

@@ -19,8 +19,8 @@ from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.tasks.task import mean_figures
 from pdtui.robots.tasks.task_lookup import find_task
-from pdtui.search.task_run import TimedStimulation
-from pdtui.search.task_search import FoundTask, TaskSearch, TaskSearchSettings
+from pdtui.search.task_rollout import TimedStimulation
+from pdtui.search.task_search import TaskSearch, TaskSearchResult, TaskSearchSettings
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.map_text import outputs_table
 from pdtui.stimulation.map_writer import add_behavior, rewrite_map
@@ -31,7 +31,7 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 class WrittenBehavior:
     """What was found and where it was written."""
 
-    result: FoundTask
+    result: TaskSearchResult
     units: dict[str, float]
     seconds: float | None
     output: Path
@@ -76,7 +76,7 @@ def search_task_into_map(
     seed: int,
     workers: int,
     minutes: float,
-    sizes: TaskSearchSettings,
+    settings: TaskSearchSettings,
     progress: Callable[[int, int], None] | None = None,
 ) -> WrittenBehavior:
     """Search, and write the behavior into a map: a new file, or one of this policy.
@@ -89,17 +89,17 @@ def search_task_into_map(
     """
     wanted = find_task(task, robot)
     known = load_map(output) if output.exists() else None
-    with RolloutPool(robot, policy, workers, import_options) as crew:
+    with RolloutPool(robot, policy, workers, import_options) as pool:
         if known is not None:
-            known.check(robot, crew.policy.layers, crew.policy.sha256)
-        begin = [] if known is None else _known(known, task, crew)
+            known.check(robot, pool.policy.layers, pool.policy.sha256)
+        begin = [] if known is None else _known(known, task, pool)
         until = time.monotonic() + 60.0 * minutes
-        pursuit = TaskSearch(crew, wanted, seed, sizes)
+        pursuit = TaskSearch(pool, wanted, seed, settings)
         result = pursuit.run(begin, lambda: time.monotonic() >= until, progress)
-        dt, addressed = crew.robot.control_dt, result.burst.stimulation.by_address(crew.policy.layers)
+        dt, addressed = pool.robot.control_dt, result.plan.stimulation.by_address(pool.policy.layers)
         if known is None:
-            _new_map(output, robot, crew.policy.name, crew.policy.sha256, import_options)
-    seconds = None if result.burst.steps is None else round(result.burst.steps * dt, 6)
+            _new_map(output, robot, pool.policy.name, pool.policy.sha256, import_options)
+    seconds = None if result.plan.steps is None else round(result.plan.steps * dt, 6)
     entry: dict[str, Any] = {"name": wanted.name, "key": wanted.key, "says": wanted.says}
     if seconds is not None:
         entry["period"] = seconds
@@ -108,14 +108,14 @@ def search_task_into_map(
     return WrittenBehavior(result, addressed, seconds, output)
 
 
-def _known(stimulation_map: StimulationMap, task: str, crew: RolloutPool) -> list[TimedStimulation]:
+def _known(stimulation_map: StimulationMap, task: str, pool: RolloutPool) -> list[TimedStimulation]:
     """The map's own behavior for the task."""
     found = []
     for behavior in stimulation_map.behaviors.values():
         if behavior.task == task and behavior.mode == "fixed":
             addressed = stimulation_map.units_of(behavior).items()
-            values = {parse_unit(address, crew.policy.layers): value for address, value in addressed}
-            steps = None if behavior.period is None else round(behavior.period / crew.robot.control_dt)
+            values = {parse_unit(address, pool.policy.layers): value for address, value in addressed}
+            steps = None if behavior.period is None else round(behavior.period / pool.robot.control_dt)
             found.append(TimedStimulation(Stimulation.of(values), steps))
     return found
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 
 from pdtui.core.errors import MapError
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.search.target_drives import TargetDrive, TargetDriver
-from pdtui.search.tracking_figures import (
-    TargetTracking,
-    choose_targets,
+from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveRunner
+from pdtui.search.tracking_summary import (
+    TrackingSummary,
+    choose_tracking_targets,
     finite_mean,
     seed_errors,
     summarise_tracking,
@@ -25,14 +25,14 @@ def evaluate_tracking(
     targets: Sequence[float] = (),
     workers: int = 1,
     progress: Callable[[int, int], None] | None = None,
-) -> TargetTracking:
+) -> TrackingSummary:
     """Set the targets one after the other, 100 control steps each, on every seed; and once without control.
 
     Args:
         config: robot, map and policy; its seed is not used.
         attribute: what is to be held.
         seeds: of the resets.
-        targets: in the attribute's unit; empty takes `choose_targets`.
+        targets: in the attribute's unit; empty takes `choose_tracking_targets`.
         workers: processes.
         progress: called with drives done and drives in all.
 
@@ -41,16 +41,16 @@ def evaluate_tracking(
         PdtuiError: robot or policy cannot be had.
     """
     behavior = holding_behavior(config, attribute)
-    with TargetDriver(config, workers) as followers:
-        targets = tuple(targets) or choose_targets(followers, behavior, seeds[:3])
+    with TrackingDriveRunner(config, workers) as runner:
+        targets = tuple(targets) or choose_tracking_targets(runner, behavior, seeds[:3])
         drives = [
-            TargetDrive(attribute, name, seed, tuple(targets))
+            TrackingDrive(attribute, name, seed, tuple(targets))
             for name in (behavior.name, "")
             for seed in seeds
         ]
         total = len(drives)
-        followed = followers.run(drives, progress and (lambda done: progress(done, total)))
-        unit = followers.attribute(attribute).unit
+        followed = runner.run(drives, progress and (lambda done: progress(done, total)))
+        unit = runner.attribute(attribute).unit
     untouched = finite_mean(seed_errors(followed[len(seeds) :]))
     return summarise_tracking(followed[: len(seeds)], unit, untouched)
 

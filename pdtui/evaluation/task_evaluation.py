@@ -12,7 +12,7 @@ from pdtui.core.events import Event
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.robots.tasks.task import RunTrace, Task, TaskVerdict, mean_figures
 from pdtui.robots.tasks.task_lookup import find_task
-from pdtui.search.task_run import walk_steps
+from pdtui.search.task_rollout import walk_steps
 from pdtui.stimulation.stimulation_map import Behavior
 
 

@@ -10,10 +10,10 @@ from rich.table import Table
 from pdtui.core.text_tables import new_table, seed_range
 from pdtui.search.gain_tuning import TunedGains
 from pdtui.search.step_response import StepResponseSummary
-from pdtui.search.tracking_figures import TargetTracking
+from pdtui.search.tracking_summary import TrackingSummary
 
 
-def tracking_table(result: TargetTracking) -> Table:
+def tracking_table(result: TrackingSummary) -> Table:
     """One row a target, and the mean."""
     unit = result.unit
     table = new_table(
@@ -50,7 +50,7 @@ def _tuned(result: TunedGains) -> Table:
     return table
 
 
-def add_tracking_figures(table: Table, columns: Sequence[TargetTracking]) -> None:
+def add_tracking_figures(table: Table, columns: Sequence[TrackingSummary]) -> None:
     unit, answers = columns[0].unit, [one.responses for one in columns]
     table.add_row(f"mean |error| ({unit})", *(_with_interval(one) for one in columns))
     table.add_row("over the last 25 steps", *(f"{one.settled:.3f}" for one in columns))
@@ -60,7 +60,7 @@ def add_tracking_figures(table: Table, columns: Sequence[TargetTracking]) -> Non
     table.add_row("falls", *(f"{one.falls} of {len(one.seeds)}" for one in columns))
 
 
-def _with_interval(figures: TargetTracking) -> str:
+def _with_interval(figures: TrackingSummary) -> str:
     return f"{figures.error:.3f} [{figures.low:.3f}, {figures.high:.3f}]"
 
 

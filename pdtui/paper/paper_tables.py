@@ -13,7 +13,7 @@ from pdtui.evaluation.tracking_tables import add_tracking_figures
 from pdtui.paper.command_following import CommandFollowing
 from pdtui.paper.forest_results import ForestResult, RepeatSpread
 from pdtui.paper.unit_vs_command import HeadingController, UnitCommandComparison
-from pdtui.search.target_drives import STEPS_EACH
+from pdtui.search.tracking_drives import STEPS_EACH
 
 
 def commands_table(result: CommandFollowing) -> Table:

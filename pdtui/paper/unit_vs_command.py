@@ -16,8 +16,8 @@ from scipy import stats
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.search.target_drives import STEPS_EACH, TargetDrive, TargetDriver, TargetDriveResult
-from pdtui.search.tracking_figures import HEADINGS, TargetTracking, seed_errors, summarise_tracking
+from pdtui.search.tracking_drives import STEPS_EACH, TrackingDrive, TrackingDriveResult, TrackingDriveRunner
+from pdtui.search.tracking_summary import HEADINGS, TrackingSummary, seed_errors, summarise_tracking
 from pdtui.stimulation.stimulation_map import Behavior
 
 ATTRIBUTE = "yaw"
@@ -59,7 +59,7 @@ class HeadingController:
     by: ControlMeans
     driven: tuple[str, ...]
     asked: dict[str, float]
-    tracking: TargetTracking
+    tracking: TrackingSummary
     ratio: ErrorRatio | None
     values: Floats
 
@@ -142,12 +142,14 @@ def compare_unit_with_command(
             if progress is not None:
                 progress(before + done, total)
 
-        with TargetDriver(config, workers) as followers:
-            steps[config.stimulation_map.source] = followers.loop.robot.control_dt
+        with TrackingDriveRunner(config, workers) as runner:
+            steps[config.stimulation_map.source] = runner.loop.robot.control_dt
             drives = [
-                TargetDrive(ATTRIBUTE, one.name, seed, tuple(targets)) for one in behaviors for seed in seeds
+                TrackingDrive(ATTRIBUTE, one.name, seed, tuple(targets))
+                for one in behaviors
+                for seed in seeds
             ]
-            rows += _rows(followers, behaviors, followers.run(drives, tell), len(seeds))
+            rows += _rows(runner, behaviors, runner.run(drives, tell), len(seeds))
         before += len(seeds) * len(behaviors)
     if len(set(steps.values())) > 1:
         told = ", ".join(f"{source} has {dt:g} s" for source, dt in steps.items())
@@ -168,9 +170,12 @@ def _holding(config: DriveConfig) -> list[Behavior]:
 
 
 def _rows(
-    followers: TargetDriver, behaviors: Sequence[Behavior], followed: Sequence[TargetDriveResult], count: int
+    runner: TrackingDriveRunner,
+    behaviors: Sequence[Behavior],
+    followed: Sequence[TrackingDriveResult],
+    count: int,
 ) -> list[HeadingController]:
-    loop = followers.loop
+    loop = runner.loop
     parts = [list(followed[number * count :][:count]) for number in range(len(behaviors))]
     by_command = next(
         (p for b, p in zip(behaviors, parts, strict=True) if control_means(b) == "command"), None
@@ -183,7 +188,7 @@ def _rows(
             control_means(behavior),
             (*behavior.commands, *loop.map.units_of(behavior)),
             {name: value for name, value in loop.robot.commands.items() if name not in behavior.commands},
-            summarise_tracking(part, followers.attribute(ATTRIBUTE).unit),
+            summarise_tracking(part, runner.attribute(ATTRIBUTE).unit),
             None if by_command is None or part is by_command else paired_ratio(part, by_command),
             np.array([one.values.ravel() for one in part]),
         )
@@ -191,7 +196,7 @@ def _rows(
     ]
 
 
-def paired_ratio(units: Sequence[TargetDriveResult], command: Sequence[TargetDriveResult]) -> ErrorRatio:
+def paired_ratio(units: Sequence[TrackingDriveResult], command: Sequence[TrackingDriveResult]) -> ErrorRatio:
     """Ratio of mean |errors| over the same seeds, of which both drives came to the first target."""
     above, below = seed_errors(units), seed_errors(command)
     both = np.isfinite(above) & np.isfinite(below)

@@ -11,15 +11,15 @@ from pdtui.core.attributes import Floats
 from pdtui.core.units import Stimulation
 from pdtui.probing.effect_probe import EffectCurves, EffectProber, PlanEffects, bootstrap_interval
 from pdtui.search.behavior_goals import BehaviorGoal, goal_gains, goal_scores
-from pdtui.search.search_settings import BehaviorSearchSettings
-from pdtui.search.stimulation_candidates import CandidateSampler
-from pdtui.search.unit_sets import UnitSetPool
+from pdtui.search.behavior_search_settings import BehaviorSearchSettings
+from pdtui.search.shared_candidates import SharedCandidates
+from pdtui.search.stimulation_sampler import StimulationSampler
 from pdtui.spectra.monitor import StartState, StepProgress
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
 
 @dataclass(frozen=True)
-class FoundBehavior:
+class BehaviorSearchResult:
     """The best stimulation for a goal.
 
     Attributes:
@@ -55,7 +55,7 @@ class FoundBehavior:
 
 
 @dataclass(frozen=True)
-class SearchStarts:
+class SearchStartStates:
     """Snapshots for the three stages of a search; no walk is in two of them."""
 
     search: tuple[StartState, ...]
@@ -75,7 +75,7 @@ class BehaviorSearch:
         column: of the goal's attribute.
         starts: of the three stages.
         seed: of every random choice.
-        sizes: how much to do.
+        settings: how much to do.
     """
 
     def __init__(
@@ -83,12 +83,12 @@ class BehaviorSearch:
         prober: EffectProber,
         goal: BehaviorGoal,
         column: int,
-        starts: SearchStarts,
+        starts: SearchStartStates,
         seed: int,
-        sizes: BehaviorSearchSettings,
+        settings: BehaviorSearchSettings,
     ) -> None:
         self._prober, self._goal, self._column = prober, goal, column
-        self._starts, self._sizes, self._seed = starts, sizes, seed
+        self._starts, self._settings, self._seed = starts, settings, seed
         self._seen: set[Stimulation] = set()
         self._elite: list[tuple[float, Stimulation]] = []
         self._began = prober.crew.rollouts
@@ -96,10 +96,10 @@ class BehaviorSearch:
     def run(
         self,
         sweeps: Sequence[EffectCurves],
-        pool: UnitSetPool,
+        pool: SharedCandidates,
         deadline: Callable[[], bool],
         progress: StepProgress | None = None,
-    ) -> FoundBehavior:
+    ) -> BehaviorSearchResult:
         """Search, select on other starts, and score the winner on held-out ones.
 
         Args:
@@ -108,22 +108,22 @@ class BehaviorSearch:
             deadline: says when time is up.
             progress: called with (generations done, generations).
         """
-        sizes, source = self._sizes, self._candidates(sweeps)
-        total = sizes.generations * len(sizes.most_units)
+        settings, source = self._settings, self._candidates(sweeps)
+        total = settings.generations * len(settings.max_units)
         # Nothing stops more than wholly: a stop's score has an end, and the search must know it.
         end = 1.0 / self._goal.enough if self._goal.aim.direction == "stop" else float("inf")
-        satisfied, safe = min(sizes.satisfied, 0.96 * end), min(sizes.safe, 0.92 * end)
-        for round_, most in enumerate(sizes.most_units):
-            first = self._atoms(sweeps) if round_ == 0 else []
-            self._generation([*first, *pool.best(self._goal, self._column, sizes.children, most)])
+        satisfied, safe = min(settings.satisfied, 0.96 * end), min(settings.safe, 0.92 * end)
+        for round_, most in enumerate(settings.max_units):
+            first = self._best_single_units(sweeps) if round_ == 0 else []
+            self._generation([*first, *pool.best(self._goal, self._column, settings.children, most)])
             idle = 0
-            for number in range(sizes.generations):
+            for number in range(settings.generations):
                 if progress is not None:
-                    progress(round_ * sizes.generations + number, total)
+                    progress(round_ * settings.generations + number, total)
                 best = self._elite[0][0]
-                if best >= satisfied or idle >= sizes.patience or deadline():
+                if best >= satisfied or idle >= settings.patience or deadline():
                     break
-                self._generation([self._child(source, most) for _ in range(sizes.children)])
+                self._generation([self._child(source, most) for _ in range(settings.children)])
                 idle = 0 if self._elite[0][0] > best + 0.01 else idle + 1
             if self._elite[0][0] >= safe:
                 break
@@ -131,7 +131,7 @@ class BehaviorSearch:
             progress(total, total)
         return self._finish()
 
-    def _atoms(self, sweeps: Sequence[EffectCurves]) -> list[Stimulation]:
+    def _best_single_units(self, sweeps: Sequence[EffectCurves]) -> list[Stimulation]:
         """Single units and values that went the goal's way from every start, the best first."""
         scored: dict[Stimulation, float] = {}
         for sweep in sweeps:
@@ -146,32 +146,32 @@ class BehaviorSearch:
             if key not in best or gain > best[key][0]:
                 best[key] = (gain, atom)
         ranked = sorted(best.values(), key=lambda pair: (-pair[0], pair[1].units, pair[1].values))
-        return [atom for _, atom in ranked[: self._sizes.atoms]]
+        return [atom for _, atom in ranked[: self._settings.single_units]]
 
-    def _candidates(self, sweeps: Sequence[EffectCurves]) -> CandidateSampler:
+    def _candidates(self, sweeps: Sequence[EffectCurves]) -> StimulationSampler:
         """Draws units twice as often as others where screening saw them go the goal's way, on average."""
         weights = np.zeros(self._prober.crew.policy.units)
         for sweep in sweeps:
             mean = self._sign * np.nan_to_num(sweep.effects[..., self._column]).mean(axis=-1)
             np.maximum.at(weights, np.array(sweep.units), np.maximum(mean.max(axis=1), 0.0))
         weights += weights.mean() or 1.0
-        return CandidateSampler(weights, self._sizes.bounds, self._seed)
+        return StimulationSampler(weights, self._settings.bounds, self._seed)
 
     @property
     def _sign(self) -> float:
         return self._goal.aim.sign
 
-    def _child(self, source: CandidateSampler, most: int) -> Stimulation:
+    def _child(self, source: StimulationSampler, most: int) -> Stimulation:
         """A changed or crossed elite that was not tried before."""
         elite = [plan for _, plan in self._elite]
         most = min(most, self._prober.crew.policy.units)
         child = elite[0]
         for _ in range(20):
-            parent = source.favourite(elite)
+            parent = source.choose_parent(elite)
             if source.rng.random() < 0.25:
-                child = source.cross(parent, source.favourite(elite), most)
+                child = source.cross_over(parent, source.choose_parent(elite), most)
             else:
-                child = source.change(parent, most)
+                child = source.mutate(parent, most)
             if child not in self._seen:
                 break
         return child
@@ -181,13 +181,13 @@ class BehaviorSearch:
         if not fresh:
             return
         self._seen.update(fresh)
-        sizes = self._sizes
-        first = self._score(fresh, self._starts.search[: sizes.quick_starts], sizes.quick_steps)
-        promoted = [fresh[index] for index in np.argsort(-first, kind="stable")[: sizes.promoted]]
-        second = self._score(promoted, self._starts.search[: sizes.full_starts], sizes.full_steps)
+        settings = self._settings
+        first = self._score(fresh, self._starts.search[: settings.quick_starts], settings.quick_steps)
+        promoted = [fresh[index] for index in np.argsort(-first, kind="stable")[: settings.promoted]]
+        second = self._score(promoted, self._starts.search[: settings.full_starts], settings.full_steps)
         self._elite += zip(second.tolist(), promoted, strict=True)
         self._elite.sort(key=lambda pair: -pair[0])
-        del self._elite[sizes.elite :]
+        del self._elite[settings.elite :]
 
     def _probe(self, plans: Sequence[Stimulation], starts: Sequence[StartState], steps: int) -> PlanEffects:
         # The first third is the transient: evaluation leaves it out too.
@@ -197,12 +197,12 @@ class BehaviorSearch:
         units = [len(plan.units) for plan in plans]
         return goal_scores(self._goal, self._column, self._probe(plans, starts, steps), units)
 
-    def _finish(self) -> FoundBehavior:
-        sizes, column = self._sizes, self._column
-        finalists = [plan for _, plan in self._elite[: sizes.finalists]]
-        selected = self._score(finalists, self._starts.selection, sizes.final_steps)
+    def _finish(self) -> BehaviorSearchResult:
+        settings, column = self._settings, self._column
+        finalists = [plan for _, plan in self._elite[: settings.finalists]]
+        selected = self._score(finalists, self._starts.selection, settings.final_steps)
         best = finalists[int(np.argmax(selected))]
-        held = self._probe([best], self._starts.held_out, sizes.final_steps)
+        held = self._probe([best], self._starts.held_out, settings.final_steps)
         gain = goal_gains(self._goal, column, held)[0]
         low, high = bootstrap_interval(gain, 0)
         effects, falls = held.effects[0, :, column], held.falls[0]
@@ -212,7 +212,7 @@ class BehaviorSearch:
             int(falls.sum()),
             len(falls),
         )
-        return FoundBehavior(
+        return BehaviorSearchResult(
             goal=self._goal,
             stimulation=best,
             score=float(goal_scores(self._goal, column, held, [len(best.units)])[0]),

@@ -12,7 +12,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.probing.effect_probe import EffectCurves, EffectProber
 from pdtui.probing.stimulated_rollout import ControllerPlan
-from pdtui.search.stimulation_candidates import round_to_three_digits
+from pdtui.search.stimulation_sampler import round_to_three_digits
 from pdtui.spectra.monitor import StartState
 from pdtui.stimulation.stimulation_map import PidGains
 
@@ -20,7 +20,7 @@ _FALL = 2.0
 
 
 @dataclass(frozen=True)
-class FoundController:
+class ControllerSearchResult:
     """The best controller for an attribute.
 
     Attributes:
@@ -68,7 +68,7 @@ class ControllerSearchSettings:
 
 
 @dataclass(frozen=True)
-class HeldAttribute:
+class ControllerGoal:
     """What is to be held.
 
     Attributes:
@@ -101,11 +101,13 @@ class ControllerSearch:
     Args:
         prober: measures.
         aimed: what is to be held, and where.
-        sizes: how much to do.
+        settings: how much to do.
     """
 
-    def __init__(self, prober: EffectProber, aimed: HeldAttribute, sizes: ControllerSearchSettings) -> None:
-        self._prober, self._aimed, self._sizes = prober, aimed, sizes
+    def __init__(
+        self, prober: EffectProber, aimed: ControllerGoal, settings: ControllerSearchSettings
+    ) -> None:
+        self._prober, self._aimed, self._settings = prober, aimed, settings
 
     def run(
         self,
@@ -115,7 +117,7 @@ class ControllerSearch:
         search: Sequence[StartState],
         held_out: Sequence[StartState],
         deadline: Callable[[], bool],
-    ) -> FoundController | None:
+    ) -> ControllerSearchResult | None:
         """The best controller, or None where nothing moves the attribute or the time is up.
 
         Args:
@@ -127,20 +129,20 @@ class ControllerSearch:
                 finalists, the other half gives the figures.
             deadline: says when time is up.
         """
-        sizes = self._sizes
-        candidates = self._alone(_steerers(sweep, column)[: sizes.units])
-        candidates += self._between(opposites[: sizes.pairs])
+        settings = self._settings
+        candidates = self._alone(_steerers(sweep, column)[: settings.units])
+        candidates += self._between(opposites[: settings.pairs])
         if not candidates or deadline():
             return None
-        cost = self._cost(candidates, search, sizes.steps)
-        finalists = [candidates[index] for index in np.argsort(cost, kind="stable")[: sizes.finalists]]
+        cost = self._cost(candidates, search, settings.steps)
+        finalists = [candidates[index] for index in np.argsort(cost, kind="stable")[: settings.finalists]]
         half = len(held_out) // 2
-        cost = self._cost(finalists, held_out[:half], sizes.final_steps)
+        cost = self._cost(finalists, held_out[:half], settings.final_steps)
         best = finalists[int(np.argmin(cost))]
         without = _Candidate(NO_STIMULATION, (), best.pid)
-        errors, falls = self._measure([best, without], held_out[half:], sizes.final_steps)
+        errors, falls = self._measure([best, without], held_out[half:], settings.final_steps)
         aimed = self._aimed
-        return FoundController(
+        return ControllerSearchResult(
             best.weights,
             best.pid,
             float(errors[0]),

@@ -21,9 +21,9 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.search.gain_box import gains_at, point_from_gains, sample_gain_box
-from pdtui.search.target_drives import TargetDrive, TargetDriver, TargetDriveResult
-from pdtui.search.tracking_figures import TargetTracking, choose_targets, summarise_tracking
+from pdtui.search.gain_search_space import gains_from_point, point_from_gains, sample_gain_points
+from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveResult, TrackingDriveRunner
+from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarise_tracking
 from pdtui.stimulation.stimulation_map import Behavior, PidGains
 
 STEPS_OF_ANGLE = (0.0, 0.4, 1.2, 0.3, -0.9, -0.5, 0.0, 0.9, 0.0)
@@ -65,8 +65,8 @@ class TunedGains:
     behavior: str
     old: PidGains
     new: PidGains
-    before: TargetTracking
-    after: TargetTracking
+    before: TrackingSummary
+    after: TrackingSummary
     better: bool
     tried: int
     ended_early: bool
@@ -90,7 +90,7 @@ def tune_gains(
     names: Sequence[str],
     seeds: Sequence[int],
     *,
-    effort: TuningSettings = TuningSettings(),
+    settings: TuningSettings = TuningSettings(),
     workers: int = 1,
     progress: Progress | None = None,
 ) -> list[TunedGains]:
@@ -102,7 +102,7 @@ def tune_gains(
         config: robot, map and policy, or a loop of them.
         names: of behaviors of mode ``pid``; empty for all that the map has.
         seeds: half of them for the search, the others to judge what it found; at least 2.
-        effort: how much to search.
+        settings: how much to search.
         workers: processes.
         progress: called with controllers tried, controllers in all, and a note.
 
@@ -112,13 +112,13 @@ def tune_gains(
     """
     if len(seeds) < 2:
         raise MapError(f"expected at least 2 seeds, half of them to judge by, found {len(seeds)}")
-    deadline = None if effort.minutes is None else time.monotonic() + 60.0 * effort.minutes
-    with TargetDriver(config, workers) as followers:
-        behaviors = pid_behaviors(followers.loop.map.source, followers.loop.map.behaviors, names)
+    deadline = None if settings.minutes is None else time.monotonic() + 60.0 * settings.minutes
+    with TrackingDriveRunner(config, workers) as runner:
+        behaviors = pid_behaviors(runner.loop.map.source, runner.loop.map.behaviors, names)
         results = []
         for number, behavior in enumerate(behaviors, start=1):
             share = None if deadline is None else _share(deadline, len(behaviors) - number + 1)
-            results.append(_Search(followers, behavior, seeds, effort, share, progress).run())
+            results.append(_Search(runner, behavior, seeds, settings, share, progress).run())
         return results
 
 
@@ -156,23 +156,23 @@ class _Search:
 
     def __init__(
         self,
-        followers: TargetDriver,
+        runner: TrackingDriveRunner,
         behavior: Behavior,
         seeds: Sequence[int],
-        effort: TuningSettings,
+        settings: TuningSettings,
         deadline: float | None,
         progress: Progress | None,
     ) -> None:
         assert behavior.pid is not None
-        self._followers, self._behavior, self._old = followers, behavior, behavior.pid
+        self._runner, self._behavior, self._old = runner, behavior, behavior.pid
         self._search, self._judge = seeds[: len(seeds) // 2], seeds[len(seeds) // 2 :]
-        self._effort, self._deadline, self._progress, self._seed = effort, deadline, progress, seeds[0]
-        attribute = followers.attribute(self._old.attribute)
+        self._settings, self._deadline, self._progress, self._seed = settings, deadline, progress, seeds[0]
+        attribute = runner.attribute(self._old.attribute)
         self._unit = attribute.unit
         if attribute.wraps:
             self._targets: tuple[float, ...] = STEPS_OF_ANGLE
         else:
-            self._targets = choose_targets(followers, behavior, self._search[:3])
+            self._targets = choose_tracking_targets(runner, behavior, self._search[:3])
         self._range = float(np.ptp(self._targets))
         self._step = float(np.abs(np.diff(self._targets)).mean())
         self._costs: dict[PidGains, list[float]] = {}
@@ -202,8 +202,8 @@ class _Search:
 
     def _halve(self) -> PidGains:
         """The best of the hypercube and the map's own: each round the better half, on twice the seeds."""
-        points = sample_gain_box(self._effort.points, self._seed)
-        left = list(dict.fromkeys([self._old, *(gains_at(p, self._old, self._step) for p in points)]))
+        points = sample_gain_points(self._settings.points, self._seed)
+        left = list(dict.fromkeys([self._old, *(gains_from_point(p, self._old, self._step) for p in points)]))
         count = min(_FIRST_SEEDS, len(self._search))
         while True:
             costs = {pid: self._measure(pid, count) for pid in left}
@@ -216,21 +216,21 @@ class _Search:
     def _refine(self, best: PidGains) -> None:
         """Nelder and Mead's simplex in the logarithms, from the best point, with the parts that it has."""
         start = point_from_gains(best, self._old, self._step)
-        if start is None or not self._effort.refinements:
+        if start is None or not self._settings.refinements:
             return
         parts = np.isfinite(start)
 
         def cost(values: Floats) -> float:
             point = start.copy()
             point[parts] = values
-            return self._measure(gains_at(point, self._old, self._step), len(self._search))
+            return self._measure(gains_from_point(point, self._old, self._step), len(self._search))
 
         simplex = np.vstack([start[parts], start[parts] + 0.5 * np.eye(int(parts.sum()))])
         minimize(
             cost,
             start[parts],
             method="Nelder-Mead",
-            options={"maxfev": self._effort.refinements, "initial_simplex": simplex},
+            options={"maxfev": self._settings.refinements, "initial_simplex": simplex},
         )
 
     def _measure(self, pid: PidGains, count: int) -> float:
@@ -243,14 +243,14 @@ class _Search:
             self._costs[pid] = known + [self._cost(followed) for followed in new]
             if self._progress is not None:
                 note = f"{self._behavior.name}: best {self._mean(self._best()):.3g} {self._unit}"
-                self._progress(len(self._costs), self._effort.points + self._effort.refinements + 1, note)
+                self._progress(len(self._costs), self._settings.points + self._settings.refinements + 1, note)
         return float(np.mean(self._costs[pid][:count]))
 
-    def _drive(self, pid: PidGains, seeds: Sequence[int]) -> list[TargetDriveResult]:
+    def _drive(self, pid: PidGains, seeds: Sequence[int]) -> list[TrackingDriveResult]:
         name, targets = self._behavior.name, tuple(self._targets)
-        return self._followers.run([TargetDrive(pid.attribute, name, seed, targets, pid) for seed in seeds])
+        return self._runner.run([TrackingDrive(pid.attribute, name, seed, targets, pid) for seed in seeds])
 
-    def _cost(self, followed: TargetDriveResult) -> float:
+    def _cost(self, followed: TrackingDriveResult) -> float:
         """Mean |error|; after a fall, `FALL` times the targets' range."""
         errors = np.abs(followed.errors)
         return float(np.where(np.isfinite(errors), errors, FALL * self._range).mean())

@@ -54,7 +54,9 @@ class StepResponseSummary:
         )
 
 
-def step_response(start: float, values: Floats, target: float, step: float, dt: float) -> StepResponse:
+def measure_step_response(
+    start: float, values: Floats, target: float, step: float, dt: float
+) -> StepResponse:
     """Measure one step as control engineering does (rise time from 10 to 90 %, peak beyond the target).
 
     Args:

@@ -13,8 +13,8 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.robot import Robot
 from pdtui.robots.tasks.task import Task, TaskVerdict
-from pdtui.search.stimulation_candidates import CandidateBounds, CandidateSampler
-from pdtui.search.task_run import TimedStimulation, judge_stimulations
+from pdtui.search.stimulation_sampler import OutputBounds, StimulationSampler
+from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
 from pdtui.spectra.monitor import StepProgress
 
 _SEEDS_APART = 1000
@@ -31,7 +31,7 @@ class TaskSearchSettings:
         screen_units: how many units, drawn at random; None tries all.
         elite, children, promoted: kept between generations, made in one, and looked at again.
         quick_seeds, full_seeds: walks of the first look at a child, and of the second.
-        most_units: units at most, in the first round and in those that follow.
+        max_units: units at most, in the first round and in those that follow.
         generations, patience: of one round at most, and without progress before it ends.
         finalists, selection_seeds: elite that other walks decide between.
         held_out_seeds: walks of the figures.
@@ -47,29 +47,29 @@ class TaskSearchSettings:
     promoted: int = 8
     quick_seeds: int = 2
     full_seeds: int = 8
-    most_units: tuple[int, ...] = (3, 8, 24)
+    max_units: tuple[int, ...] = (3, 8, 24)
     generations: int = 16
     patience: int = 6
     finalists: int = 8
     selection_seeds: int = 20
     held_out_seeds: int = 20
     owed: float = 0.002
-    bounds: CandidateBounds = field(default_factory=CandidateBounds)
+    bounds: OutputBounds = field(default_factory=OutputBounds)
 
 
 QUICK_TASK_SEARCH = TaskSearchSettings(
     values=(-4.0, 4.0), screen_units=32, children=4, promoted=2, elite=4, quick_seeds=1, full_seeds=2,
-    most_units=(3,), generations=1, finalists=2, selection_seeds=2, held_out_seeds=4,
+    max_units=(3,), generations=1, finalists=2, selection_seeds=2, held_out_seeds=4,
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class FoundTask:
+class TaskSearchResult:
     """What a pursuit found.
 
     Attributes:
         task: what it was for.
-        burst: the stimulation and how long it lasts.
+        plan: the stimulation and how long it lasts.
         search_score: on the walks that the search saw; higher by what it owes to luck.
         verdicts: with it, on held-out walks.
         untouched: without it, on the same walks.
@@ -77,7 +77,7 @@ class FoundTask:
     """
 
     task: Task
-    burst: TimedStimulation
+    plan: TimedStimulation
     search_score: float
     verdicts: tuple[TaskVerdict, ...]
     untouched: tuple[TaskVerdict, ...]
@@ -91,14 +91,14 @@ class TaskSearch:
     selection and the figures.
 
     Args:
-        crew: runs the roll-outs.
+        pool: runs the roll-outs.
         task: what to do.
         seed: of the walks and of every random choice.
-        sizes: how much to do.
+        settings: how much to do.
     """
 
-    def __init__(self, crew: RolloutPool, task: Task, seed: int, sizes: TaskSearchSettings) -> None:
-        self._crew, self._task, self._seed, self._sizes = crew, task, seed, sizes
+    def __init__(self, pool: RolloutPool, task: Task, seed: int, settings: TaskSearchSettings) -> None:
+        self._pool, self._task, self._seed, self._settings = pool, task, seed, settings
         self._rng = np.random.default_rng(seed)
         self._seen: set[TimedStimulation] = set()
         self._elite: list[tuple[float, TimedStimulation]] = []
@@ -109,7 +109,7 @@ class TaskSearch:
         begin: Sequence[TimedStimulation],
         deadline: Callable[[], bool],
         progress: StepProgress | None = None,
-    ) -> FoundTask:
+    ) -> TaskSearchResult:
         """Screen, search, select on other walks, and measure on held-out ones.
 
         Args:
@@ -117,20 +117,20 @@ class TaskSearch:
             deadline: says when time is up.
             progress: called with (generations done, generations).
         """
-        sizes = self._sizes
+        settings = self._settings
         atoms, source = self._screen(progress)
-        total = sizes.generations * len(sizes.most_units)
-        for round_, most in enumerate(sizes.most_units):
+        total = settings.generations * len(settings.max_units)
+        for round_, most in enumerate(settings.max_units):
             if round_ == 0:
                 self._generation([*begin, *atoms])
             idle = 0
-            for number in range(sizes.generations):
+            for number in range(settings.generations):
                 if progress is not None:
-                    progress(round_ * sizes.generations + number, total)
-                if idle >= sizes.patience or deadline():
+                    progress(round_ * settings.generations + number, total)
+                if idle >= settings.patience or deadline():
                     break
                 best = self._elite[0][0]
-                self._generation([self._child(source, most) for _ in range(sizes.children)])
+                self._generation([self._child(source, most) for _ in range(settings.children)])
                 idle = 0 if self._elite[0][0] > best + 0.01 else idle + 1
             if deadline():
                 break
@@ -138,46 +138,46 @@ class TaskSearch:
             progress(total, total)
         return self._finish()
 
-    def _screen(self, progress: StepProgress | None) -> tuple[list[TimedStimulation], CandidateSampler]:
+    def _screen(self, progress: StepProgress | None) -> tuple[list[TimedStimulation], StimulationSampler]:
         """Units alone; the best of them, and a source that draws good ones more often."""
-        sizes, units = self._sizes, self._crew.policy.units
+        settings, units = self._settings, self._pool.policy.units
         periods: list[int | None] = [None]
         if self._task.period is not None:
             periods = [self._task.period // 2]
         tried = np.arange(units)
-        if sizes.screen_units is not None and sizes.screen_units < units:
-            tried = np.sort(self._rng.choice(units, sizes.screen_units, replace=False))
-        bursts = [
+        if settings.screen_units is not None and settings.screen_units < units:
+            tried = np.sort(self._rng.choice(units, settings.screen_units, replace=False))
+        plans = [
             TimedStimulation(Stimulation.of({unit: value}), period)
             for unit in tried.tolist()
-            for value in sizes.values
+            for value in settings.values
             for period in periods
         ]
-        scores = self._score(bursts, sizes.screen_seeds, progress)
+        scores = self._score(plans, settings.screen_seeds, progress)
         weights = np.zeros(units)
         best = scores.reshape(len(tried), -1).max(axis=1)
         weights[tried] = np.maximum(best - np.median(scores), 0.0)
         weights += weights.mean() or 1.0
         order = np.argsort(-scores, kind="stable")
-        return [bursts[index] for index in order[: sizes.children]], CandidateSampler(
-            weights, sizes.bounds, self._rng
+        return [plans[index] for index in order[: settings.children]], StimulationSampler(
+            weights, settings.bounds, self._rng
         )
 
-    def _child(self, source: CandidateSampler, most: int) -> TimedStimulation:
-        elite = [burst for _, burst in self._elite]
-        most = min(most, self._crew.policy.units)
+    def _child(self, source: StimulationSampler, most: int) -> TimedStimulation:
+        elite = [plan for _, plan in self._elite]
+        most = min(most, self._pool.policy.units)
         child = elite[0]
         for _ in range(_TRIES):
             first, second = (elite[int(self._rng.random() ** 2 * len(elite))] for _ in range(2))
             kind = self._rng.random()
             if kind < 0.25:
                 child = TimedStimulation(
-                    source.cross(first.stimulation, second.stimulation, most), first.steps
+                    source.cross_over(first.stimulation, second.stimulation, most), first.steps
                 )
             elif kind < 0.4 and first.steps is not None:
                 child = TimedStimulation(first.stimulation, self._period(first.steps))
             else:
-                child = TimedStimulation(source.change(first.stimulation, most), first.steps)
+                child = TimedStimulation(source.mutate(first.stimulation, most), first.steps)
             if child not in self._seen:
                 break
         return child
@@ -188,52 +188,54 @@ class TaskSearch:
         return int(np.clip(changed, 2, self._task.period))
 
     def _generation(self, candidates: Sequence[TimedStimulation]) -> None:
-        fresh = list(dict.fromkeys(burst for burst in candidates if burst not in self._seen))
+        fresh = list(dict.fromkeys(plan for plan in candidates if plan not in self._seen))
         if not fresh:
             return
         self._seen.update(fresh)
-        sizes = self._sizes
-        first = self._score(fresh, sizes.quick_seeds)
-        promoted = [fresh[index] for index in np.argsort(-first, kind="stable")[: sizes.promoted]]
-        second = self._score(promoted, sizes.full_seeds)
+        settings = self._settings
+        first = self._score(fresh, settings.quick_seeds)
+        promoted = [fresh[index] for index in np.argsort(-first, kind="stable")[: settings.promoted]]
+        second = self._score(promoted, settings.full_seeds)
         self._elite += zip(second.tolist(), promoted, strict=True)
         self._elite.sort(key=lambda pair: -pair[0])
-        del self._elite[sizes.elite :]
+        del self._elite[settings.elite :]
 
     def _score(
-        self, bursts: Sequence[TimedStimulation], seeds: int, progress: StepProgress | None = None
+        self, plans: Sequence[TimedStimulation], seeds: int, progress: StepProgress | None = None
     ) -> Floats:
-        table = self._judge(bursts, range(self._seed, self._seed + seeds), progress)
+        table = self._judge(plans, range(self._seed, self._seed + seeds), progress)
         means = np.array([np.mean([verdict.score for verdict in row]) for row in table])
-        owed: Floats = self._sizes.owed * np.array([len(burst.stimulation.units) for burst in bursts])
+        owed: Floats = self._settings.owed * np.array([len(plan.stimulation.units) for plan in plans])
         return means - owed
 
     def _judge(
-        self, bursts: Sequence[TimedStimulation], seeds: Sequence[int], progress: StepProgress | None = None
+        self, plans: Sequence[TimedStimulation], seeds: Sequence[int], progress: StepProgress | None = None
     ) -> list[list[TaskVerdict]]:
-        """Verdicts of each burst on each seed."""
-        self._rollouts += len(bursts) * len(seeds)
-        size = max(1, min(32, len(bursts) // 2 + 1))
-        parts = [tuple(bursts[low : low + size]) for low in range(0, len(bursts), size)]
+        """Verdicts of each plan on each seed."""
+        self._rollouts += len(plans) * len(seeds)
+        size = max(1, min(32, len(plans) // 2 + 1))
+        parts = [tuple(plans[low : low + size]) for low in range(0, len(plans), size)]
         jobs = [(self._task.name, part, seed) for part in parts for seed in seeds]
-        results = iter(self._crew.map(judge_task_job, jobs, progress))
+        results = iter(self._pool.map(judge_task_job, jobs, progress))
         rows: list[list[TaskVerdict]] = []
         for part in parts:
             columns = [next(results) for _ in seeds]
             rows += [[column[index] for column in columns] for index in range(len(part))]
         return rows
 
-    def _finish(self) -> FoundTask:
-        sizes = self._sizes
-        finalists = [burst for _, burst in self._elite[: sizes.finalists]]
+    def _finish(self) -> TaskSearchResult:
+        settings = self._settings
+        finalists = [plan for _, plan in self._elite[: settings.finalists]]
         first = self._seed + _SEEDS_APART
-        selected = self._judge(finalists, range(first, first + sizes.selection_seeds))
+        selected = self._judge(finalists, range(first, first + settings.selection_seeds))
         # Tasks are counted, so the choice is by successes; scores decide between equals.
         keys = [(sum(v.success for v in row), sum(v.score for v in row)) for row in selected]
         best = max(range(len(finalists)), key=keys.__getitem__)
         first = self._seed + 2 * _SEEDS_APART
-        held = self._judge([finalists[best], TimedStimulation()], range(first, first + sizes.held_out_seeds))
-        return FoundTask(
+        held = self._judge(
+            [finalists[best], TimedStimulation()], range(first, first + settings.held_out_seeds)
+        )
+        return TaskSearchResult(
             self._task, finalists[best], self._elite[best][0], tuple(held[0]), tuple(held[1]), self._rollouts
         )
 
@@ -244,5 +246,5 @@ def judge_task_job(
     """What a worker does; tasks hold functions, so they travel by name."""
     from pdtui.robots.tasks.task_lookup import find_task
 
-    name, bursts, seed = job
-    return judge_stimulations(robot, policy, find_task(name, robot.name), bursts, seed)
+    name, plans, seed = job
+    return judge_stimulations(robot, policy, find_task(name, robot.name), plans, seed)

@@ -15,7 +15,7 @@ from pdtui.core.errors import MapError
 from pdtui.core.units import Stimulation
 from pdtui.dissection.dissect import dissect
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_searches import DissectionSearches, TimeShare
+from pdtui.dissection.dissection_searches import DissectionSearches, TimeBudget
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.dissection.dissection_tables import print_tables
 from pdtui.dissection.draft_map import draft_map
@@ -24,8 +24,8 @@ from pdtui.probing.confirmation import rank_correlation
 from pdtui.probing.effect_probe import EffectProber, PlanEffects
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.search.behavior_goals import GOALS, goal_gains, goal_scores
-from pdtui.search.behavior_search import FoundBehavior, SearchStarts
-from pdtui.search.controller_search import FoundController
+from pdtui.search.behavior_search import BehaviorSearchResult, SearchStartStates
+from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.spectra.matching_presets import PRESETS, find_preset, preset_values
 from pdtui.spectra.monitor import collect_start_states
 from pdtui.stimulation.map_reader import parse_map
@@ -119,10 +119,10 @@ def test_a_small_trembling_ant_gets_no_behavior_and_the_map_says_so(dissection: 
 
 def test_what_was_found_is_in_the_map(dissection: Dissection) -> None:
     sure = MeasuredEffect(1.2, 1.0, 1.4)
-    up = FoundBehavior(
+    up = BehaviorSearchResult(
         GOALS[1], Stimulation((3, 9), (-2.5, 4.0)), 1.5, 1.6, sure, sure, 1.0, 0.0, 1.2, 0.0, 10
     )
-    held = FoundController(
+    held = ControllerSearchResult(
         Stimulation((9,), (-1.0,)), PidGains("yaw", 6.0, 0.0, 0.0, 4.0, 0.2), 0.1, 0.6, 0.0, (-0.4, 0.4), True
     )
     text = draft_map(replace(dissection, behaviors=(up,), holds=(held,)))
@@ -203,13 +203,15 @@ key = "l"
 magnitudes = {{ "0:3" = 9.5, "1:7" = -9.5 }}
 """
     known = Stimulation((3, 15), (9.5, -9.5))
-    effort = replace(SMALL, search=replace(SMALL.search, pool=1, atoms=0, children=8, promoted=8, elite=8))
+    effort = replace(
+        SMALL, search=replace(SMALL.search, random_sets=1, single_units=0, children=8, promoted=8, elite=8)
+    )
     with RolloutPool("ant", policy_file, 1) as crew:
         starts = collect_start_states(crew.robot, crew.policy, 1200, 1, at=5, survive=20)
         searches = DissectionSearches(
-            EffectProber(crew), crew.robot, effort, 1000, TimeShare(0.0, None), lambda _: None, (known,)
+            EffectProber(crew), crew.robot, effort, 1000, TimeBudget(0.0, None), lambda _: None, (known,)
         )
-        assert known in searches.pool(SearchStarts(tuple(starts), (), ())).plans
+        assert known in searches.pool(SearchStartStates(tuple(starts), (), ())).plans
     beginning = parse_map(text, "mine")
     quick = partial(dissect, "ant", policy_file, episodes=1, workers=1, effort=effort, budget_minutes=0.0)
     found, alone = quick(start_from=beginning), quick()

@@ -21,13 +21,15 @@ def _never() -> bool:
 
 def test_what_is_found_scores_above_the_untouched_policy_and_is_found_again() -> None:
     task = find_task("jump", "bipedal_walker")
-    sizes = QUICK_TASK_SEARCH.__class__(**{**vars(QUICK_TASK_SEARCH), "values": (6.0,), "held_out_seeds": 3})
+    settings = QUICK_TASK_SEARCH.__class__(
+        **{**vars(QUICK_TASK_SEARCH), "values": (6.0,), "held_out_seeds": 3}
+    )
     results = []
     for _ in range(2):
-        with RolloutPool("bipedal_walker", "bipedal_walker", workers=1) as crew:
-            results.append(TaskSearch(crew, task, 1000, sizes).run([], _never))
+        with RolloutPool("bipedal_walker", "bipedal_walker", workers=1) as pool:
+            results.append(TaskSearch(pool, task, 1000, settings).run([], _never))
     first, again = results
-    assert first.burst == again.burst
+    assert first.plan == again.plan
     assert first.verdicts == again.verdicts
     assert np.mean([v.score for v in first.verdicts]) > np.mean([v.score for v in first.untouched])
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pdtui.core.angles import wrap_angle
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.units import Stimulation
-from pdtui.search.stimulation_candidates import round_to_three_digits
+from pdtui.search.stimulation_sampler import round_to_three_digits
 from pdtui.spectra.monitor import MonitoredEpisode
 
 _FLOOR = 0.05
@@ -42,11 +42,11 @@ class ImprintSettings:
     factors: tuple[float, ...] = (1.0, 2.0)
 
 
-def find_imprints(
+def build_imprint_candidates(
     episodes: Sequence[MonitoredEpisode],
     attributes: Sequence[Attribute],
     layers: Sequence[int],
-    sizes: ImprintSettings,
+    settings: ImprintSettings,
     largest: float,
 ) -> tuple[Stimulation, ...]:
     """Stimulations that show each part of each attribute's range, in the first layer and in all.
@@ -57,7 +57,7 @@ def find_imprints(
         episodes: monitored, unstimulated.
         attributes: of the robot.
         layers: widths of the hidden layers.
-        sizes: how many.
+        settings: how many.
         largest: |v| at most.
     """
     activations = np.concatenate([episode.activations for episode in episodes])
@@ -68,14 +68,14 @@ def find_imprints(
     for column, attribute in enumerate(attributes):
         if attribute.unit == "N m" or not np.isfinite(values[:, column]).all():
             continue
-        part = range_parts(values[:, column], attribute, sizes.bins)
+        part = range_parts(values[:, column], attribute, settings.bins)
         shown, telling = _contrast(activations, part)
         for row in shown:
             for group in groups:
                 order = np.array(group)[np.argsort(-telling[group.start : group.stop], kind="stable")]
-                for count in sizes.units:
+                for count in settings.units:
                     chosen = np.sort(order[:count])
-                    for factor in sizes.factors:
+                    for factor in settings.factors:
                         outputs = np.clip(mean + factor * (row - mean), -largest, largest)[chosen]
                         rounded = [round_to_three_digits(v) for v in outputs.tolist()]
                         plans[Stimulation(tuple(chosen.tolist()), tuple(rounded))] = None

@@ -16,7 +16,7 @@ from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.headless import build_loop
 from pdtui.drive.loop_cache import cached_loop, drive_worker_pool
-from pdtui.search.step_response import StepResponse, step_response
+from pdtui.search.step_response import StepResponse, measure_step_response
 from pdtui.stimulation.stimulation_map import PidGains
 
 STEPS_UNTOUCHED = 100
@@ -26,7 +26,7 @@ STEPS_EACH = 100
 
 
 @dataclass(frozen=True)
-class TargetDrive:
+class TrackingDrive:
     """One drive.
 
     Attributes:
@@ -45,7 +45,7 @@ class TargetDrive:
 
 
 @dataclass(frozen=True)
-class TargetDriveResult:
+class TrackingDriveResult:
     """How a drive went.
 
     Attributes:
@@ -57,7 +57,7 @@ class TargetDriveResult:
         fell: whether the robot fell.
     """
 
-    drive: TargetDrive
+    drive: TrackingDrive
     values: Floats
     errors: Floats
     responses: tuple[StepResponse, ...]
@@ -70,7 +70,7 @@ class TargetDriveResult:
         return float(known.mean()) if known.size else float("nan")
 
 
-class TargetDriver(Closable):
+class TrackingDriveRunner(Closable):
     """Runs drives on one robot and policy; with one worker in this process, else in others.
 
     The results do not depend on the number of workers: each drive begins with a reset from its seed.
@@ -105,22 +105,22 @@ class TargetDriver(Closable):
         return self.loop.robot.attributes[self.loop.robot.attribute_index(name)]
 
     def run(
-        self, drives: Sequence[TargetDrive], done: Callable[[int], None] | None = None
-    ) -> list[TargetDriveResult]:
+        self, drives: Sequence[TrackingDrive], done: Callable[[int], None] | None = None
+    ) -> list[TrackingDriveResult]:
         """Drive them all; results in their order.
 
         Args:
             drives: what to drive.
             done: called with the number of drives finished so far.
         """
-        results: list[TargetDriveResult] = []
+        results: list[TrackingDriveResult] = []
         for followed in self._results(drives):
             results.append(followed)
             if done is not None:
                 done(len(results))
         return results
 
-    def _results(self, drives: Sequence[TargetDrive]) -> Iterable[TargetDriveResult]:
+    def _results(self, drives: Sequence[TrackingDrive]) -> Iterable[TrackingDriveResult]:
         config = self._order
         if config is None:
             return (drive_targets(self.loop, drive) for drive in drives)
@@ -129,12 +129,12 @@ class TargetDriver(Closable):
         return self._pool.imap(_follow_job, [(config, drive) for drive in drives])
 
 
-def _follow_job(job: tuple[DriveConfig, TargetDrive]) -> TargetDriveResult:
+def _follow_job(job: tuple[DriveConfig, TrackingDrive]) -> TrackingDriveResult:
     config, drive = job
     return drive_targets(cached_loop(config), drive)
 
 
-def drive_targets(built: ControlLoop, drive: TargetDrive) -> TargetDriveResult:
+def drive_targets(built: ControlLoop, drive: TrackingDrive) -> TrackingDriveResult:
     """Drive once; the loop given stays as it is but for its robot's and policy's state."""
     wanted = built.map
     if drive.pid is not None:
@@ -155,7 +155,7 @@ def drive_targets(built: ControlLoop, drive: TargetDrive) -> TargetDriveResult:
     return _summed_up(drive, path, fell, built.robot.attributes[column].wraps, built.robot.control_dt)
 
 
-def _events(step: int, drive: TargetDrive, number: int) -> list[Event]:
+def _events(step: int, drive: TrackingDrive, number: int) -> list[Event]:
     """What happens before a control step, counted from the first target."""
     if not drive.behavior or number % STEPS_EACH:
         return []
@@ -163,7 +163,7 @@ def _events(step: int, drive: TargetDrive, number: int) -> list[Event]:
     return [Event(step, "behavior", drive.behavior), target] if number == 0 else [target]
 
 
-def _summed_up(drive: TargetDrive, path: Floats, fell: bool, wraps: bool, dt: float) -> TargetDriveResult:
+def _summed_up(drive: TrackingDrive, path: Floats, fell: bool, wraps: bool, dt: float) -> TrackingDriveResult:
     smooth = np.unwrap(path) if wraps else path
     values = smooth[1:].reshape(len(drive.targets), STEPS_EACH)
     errors = np.array(drive.targets)[:, None] - values
@@ -176,5 +176,5 @@ def _summed_up(drive: TargetDrive, path: Floats, fell: bool, wraps: bool, dt: fl
             continue
         way = drive.targets[row] - start
         aim = start + (wrap_angle(way) if wraps else way)
-        responses.append(step_response(start, values[row], aim, step, dt))
-    return TargetDriveResult(drive, values, errors, tuple(responses), fell)
+        responses.append(measure_step_response(start, values[row], aim, step, dt))
+    return TrackingDriveResult(drive, values, errors, tuple(responses), fell)

@@ -9,12 +9,12 @@ import numpy as np
 from pdtui.core.units import Stimulation
 from pdtui.probing.effect_probe import EffectProber
 from pdtui.search.behavior_goals import BehaviorGoal, goal_scores
-from pdtui.search.search_settings import BehaviorSearchSettings
-from pdtui.search.stimulation_candidates import CandidateSampler
+from pdtui.search.behavior_search_settings import BehaviorSearchSettings
+from pdtui.search.stimulation_sampler import StimulationSampler
 from pdtui.spectra.monitor import StartState, StepProgress
 
 
-class UnitSetPool:
+class SharedCandidates:
     """Sets of units, probed once for all goals: where searches begin when no single unit leads the way.
 
     Args:
@@ -66,8 +66,10 @@ class UnitSetPool:
         return [(high, low) for _, high, low in pairs[:count]]
 
 
-def draw_unit_sets(units: int, sizes: BehaviorSearchSettings, seed: int) -> list[Stimulation]:
+def draw_random_candidates(units: int, settings: BehaviorSearchSettings, seed: int) -> list[Stimulation]:
     """Pairs and triples of units, drawn at random."""
-    source = CandidateSampler(np.ones(units), sizes.bounds, seed)
+    source = StimulationSampler(np.ones(units), settings.bounds, seed)
     most = min(3, units)
-    return [source.draw(int(source.rng.integers(min(2, most), most + 1))) for _ in range(sizes.pool)]
+    return [
+        source.draw(int(source.rng.integers(min(2, most), most + 1))) for _ in range(settings.random_sets)
+    ]

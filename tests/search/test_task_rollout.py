@@ -12,7 +12,7 @@ from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
 from pdtui.robots.tasks.task import RunTrace, TaskVerdict
 from pdtui.robots.tasks.task_lookup import find_task, tasks_of
-from pdtui.search.task_run import TimedStimulation, judge_stimulations
+from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
 
 WALKER = ("vx", "right foot clearance", "left foot clearance")
 BIPED = ("vx", "height", "pitch")
@@ -133,10 +133,10 @@ def test_an_unknown_task_lists_the_robots_own() -> None:
 
 @pytest.mark.parametrize("robot", ["walker", "bipedal_walker"])
 def test_bursts_of_one_seed_begin_from_the_same_walk(robot: str) -> None:
-    """Judged together or alone, a burst does the same; an empty one is the untouched policy."""
+    """Judged together or alone, a plan does the same; an empty one is the untouched policy."""
     world, policy, task = make_robot(robot), load_policy(robot, robot), tasks_of(robot)[0]
-    burst = TimedStimulation(Stimulation.of({3: 5.0}), 20)
-    together = judge_stimulations(world, policy, task, [TimedStimulation(), burst, TimedStimulation()], 5)
+    plan = TimedStimulation(Stimulation.of({3: 5.0}), 20)
+    together = judge_stimulations(world, policy, task, [TimedStimulation(), plan, TimedStimulation()], 5)
     assert together[0] == together[2]
-    assert judge_stimulations(world, policy, task, [burst], 5) == [together[1]]
+    assert judge_stimulations(world, policy, task, [plan], 5) == [together[1]]
     assert together[0] != together[1]

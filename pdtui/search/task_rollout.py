@@ -35,11 +35,11 @@ def walk_steps(task: Task, seed: int) -> int:
 
 
 def judge_stimulations(
-    robot: Robot, policy: Policy, task: Task, bursts: Sequence[TimedStimulation], seed: int
+    robot: Robot, policy: Policy, task: Task, plans: Sequence[TimedStimulation], seed: int
 ) -> list[TaskVerdict]:
-    """Judge each burst from the same walk.
+    """Judge each plan from the same walk.
 
-    The walk is unstimulated; where it falls before its end, no burst has done its task.
+    The walk is unstimulated; where it falls before its end, no plan has done its task.
     """
     options = {"start": task.start} if task.start else None
     observation, _ = robot.reset(seed=seed, options=options)
@@ -49,24 +49,24 @@ def judge_stimulations(
         observation, _, fell, _, _ = robot.step(policy.act(observation).action)
         walked.append(robot.read_attributes())
         if fell:
-            return [TaskVerdict(False, 0.0, {}) for _ in bursts]
+            return [TaskVerdict(False, 0.0, {}) for _ in plans]
     start, state = robot.snapshot(), policy.snapshot()
     verdicts = []
-    for burst in bursts:
+    for plan in plans:
         robot.restore(start)
         policy.restore(state)
-        verdicts.append(task.judge(_watch(robot, policy, task, burst, walked)))
+        verdicts.append(task.judge(_watch(robot, policy, task, plan, walked)))
     return verdicts
 
 
 def _watch(
-    robot: Robot, policy: Policy, task: Task, burst: TimedStimulation, walked: list[Floats]
+    robot: Robot, policy: Policy, task: Task, plan: TimedStimulation, walked: list[Floats]
 ) -> RunTrace:
     observation, fell = robot.observe(), False
     values: list[Floats] = []
     for step in range(task.steps):
-        on = burst.steps is None or step < burst.steps
-        acted = policy.act(observation, burst.stimulation if on else NO_STIMULATION)
+        on = plan.steps is None or step < plan.steps
+        acted = policy.act(observation, plan.stimulation if on else NO_STIMULATION)
         try:
             observation, _, fell, _, _ = robot.step(acted.action)
         except SimulationDiverged:

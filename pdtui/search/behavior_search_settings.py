@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from pdtui.search.stimulation_candidates import CandidateBounds
+from pdtui.search.stimulation_sampler import OutputBounds
 
 
 @dataclass(frozen=True)
@@ -12,12 +12,12 @@ class BehaviorSearchSettings:
     """How much a search does.
 
     Attributes:
-        pool: random pairs and triples, probed once and shared by all goals.
-        atoms: single units and values from the sweeps that it combines.
+        random_sets: random pairs and triples, probed once and shared by all goals.
+        single_units: single units and values from the sweeps that it combines.
         elite: candidates kept from one generation to the next.
         children: candidates of one generation.
         promoted: of them, those probed from more starts.
-        most_units: units of a candidate at most, in the first round and in those that follow where the goal
+        max_units: units of a candidate at most, in the first round and in those that follow where the goal
             was not reached: a behavior of many units is a direction in a layer.
         generations: of one round, at most.
         patience: generations without progress before a round ends.
@@ -30,12 +30,12 @@ class BehaviorSearchSettings:
         bounds: of the outputs v.
     """
 
-    pool: int = 240
-    atoms: int = 40
+    random_sets: int = 240
+    single_units: int = 40
     elite: int = 16
     children: int = 28
     promoted: int = 8
-    most_units: tuple[int, ...] = (3, 8, 24, 64)
+    max_units: tuple[int, ...] = (3, 8, 24, 64)
     generations: int = 24
     patience: int = 6
     quick_starts: int = 3
@@ -46,4 +46,4 @@ class BehaviorSearchSettings:
     final_steps: int = 300
     satisfied: float = 1.8
     safe: float = 1.25
-    bounds: CandidateBounds = field(default_factory=CandidateBounds)
+    bounds: OutputBounds = field(default_factory=OutputBounds)

@@ -15,7 +15,7 @@ _FLIP = 0.08
 
 
 @dataclass(frozen=True)
-class CandidateBounds:
+class OutputBounds:
     """What a candidate may be.
 
     Attributes:
@@ -29,7 +29,7 @@ class CandidateBounds:
     largest: float = 20.0
 
 
-class CandidateSampler:
+class StimulationSampler:
     """Seeded source of stimulations.
 
     Args:
@@ -38,7 +38,7 @@ class CandidateSampler:
         seed: of every random choice, or a generator that other choices share.
     """
 
-    def __init__(self, weights: Floats, bounds: CandidateBounds, seed: int | np.random.Generator) -> None:
+    def __init__(self, weights: Floats, bounds: OutputBounds, seed: int | np.random.Generator) -> None:
         self._shares = weights / weights.sum()
         self._bounds = bounds
         self.rng = np.random.default_rng(seed)
@@ -50,7 +50,7 @@ class CandidateSampler:
         sizes = np.exp(rng.uniform(np.log(bounds.smallest), np.log(bounds.drawn), units))
         return self._tidy(dict(zip(chosen.tolist(), sizes * rng.choice([-1.0, 1.0], units), strict=True)))
 
-    def change(self, parent: Stimulation, most: int) -> Stimulation:
+    def mutate(self, parent: Stimulation, most: int) -> Stimulation:
         """One change: scale some outputs, swap or add or drop units, or scale all; at most `most` units.
 
         Of many units an eighth changes at once: one alone would hardly show.
@@ -77,11 +77,11 @@ class CandidateSampler:
             values = {unit: v * float(f) for (unit, v), f in zip(values.items(), factors, strict=True)}
         return self._tidy(self._fewer(values, most))
 
-    def cross(self, one: Stimulation, other: Stimulation, most: int) -> Stimulation:
+    def cross_over(self, one: Stimulation, other: Stimulation, most: int) -> Stimulation:
         """Units of both, thinned to at most `most`."""
         return self._tidy(self._fewer(_as_dict(one) | _as_dict(other), most))
 
-    def favourite(self, ranked: Sequence[Stimulation]) -> Stimulation:
+    def choose_parent(self, ranked: Sequence[Stimulation]) -> Stimulation:
         """One of a list, the earlier ones more often."""
         return ranked[int(self.rng.random() ** 2 * len(ranked))]
 

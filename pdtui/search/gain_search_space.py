@@ -23,10 +23,11 @@ _WITHOUT = 0.5
 """Share of the first points whose controllers have no integral part; and of those that have no derivative."""
 
 
-def sample_gain_box(count: int, seed: int) -> Floats:
+def sample_gain_points(count: int, seed: int) -> Floats:
     """Points spread evenly over the box by a Latin hypercube, shape (count, 4).
 
-    They are logarithms of what `gains_at` describes; a third or fourth that is NaN leaves that part out.
+    A point holds the logarithms that `gains_from_point` describes; NaN as its third or fourth leaves the part
+    out.
     """
     drawn = qmc.LatinHypercube(6, rng=np.random.default_rng(seed)).random(count)
     lows, highs = np.log(np.array([LIMIT, SATURATION, INTEGRAL, DERIVATIVE])).T
@@ -35,7 +36,7 @@ def sample_gain_box(count: int, seed: int) -> Floats:
     return points
 
 
-def gains_at(point: Sequence[float] | Floats, old: PidGains, step: float) -> PidGains:
+def gains_from_point(point: Sequence[float] | Floats, old: PidGains, step: float) -> PidGains:
     """The controller that a point stands for, with the three digits that a map gets.
 
     Args:
@@ -52,7 +53,7 @@ def gains_at(point: Sequence[float] | Floats, old: PidGains, step: float) -> Pid
 
 
 def point_from_gains(pid: PidGains, old: PidGains, step: float) -> Floats | None:
-    """Inverse of `gains_at`, but for rounding; None for a controller without a proportional part."""
+    """Inverse of `gains_from_point`, but for rounding; None for a controller without a proportional part."""
     if pid.kp == 0.0:
         return None
     ti = pid.kp / pid.ki if pid.ki else 0.0

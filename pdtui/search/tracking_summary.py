@@ -11,7 +11,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
 from pdtui.core.intervals import confidence_interval
 from pdtui.search.step_response import StepResponseSummary
-from pdtui.search.target_drives import TargetDrive, TargetDriver, TargetDriveResult
+from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveResult, TrackingDriveRunner
 from pdtui.stimulation.stimulation_map import Behavior
 
 HEADINGS = (0.0, 0.4, 0.9, 1.2, 0.9, 0.4, 0.0, -0.4, -0.9, -1.2, -0.9, -0.4, 0.0)
@@ -28,7 +28,7 @@ _SIZES = (0, 1, 2, 1, 0, -1, -2, -1, 0)
 
 
 @dataclass(frozen=True)
-class TargetError:
+class TargetErrorSummary:
     """Errors at one target, over all seeds: mean of |error| over its steps, and over the last 25 of them."""
 
     target: float
@@ -37,7 +37,7 @@ class TargetError:
 
 
 @dataclass(frozen=True)
-class TargetTracking:
+class TrackingSummary:
     """How well a target is held. A drive counts until its end or its fall.
 
     Attributes:
@@ -56,7 +56,7 @@ class TargetTracking:
     attribute: str
     unit: str
     seeds: tuple[int, ...]
-    targets: tuple[TargetError, ...]
+    targets: tuple[TargetErrorSummary, ...]
     error: float
     low: float
     high: float
@@ -67,20 +67,20 @@ class TargetTracking:
 
 
 def summarise_tracking(
-    followed: Sequence[TargetDriveResult], unit: str, default_error: float | None = None
-) -> TargetTracking:
+    followed: Sequence[TrackingDriveResult], unit: str, default_error: float | None = None
+) -> TrackingSummary:
     """Figures of one behavior's drives, one a seed, all to the same targets."""
     drive = followed[0].drive
     table = np.abs(np.array([one.errors for one in followed]))
     means = seed_errors(followed)
     low, high = confidence_interval(means[np.isfinite(means)])
-    return TargetTracking(
+    return TrackingSummary(
         drive.behavior,
         drive.attribute,
         unit,
         tuple(one.drive.seed for one in followed),
         tuple(
-            TargetError(target, finite_mean(table[:, row]), finite_mean(table[:, row, -SETTLED:]))
+            TargetErrorSummary(target, finite_mean(table[:, row]), finite_mean(table[:, row, -SETTLED:]))
             for row, target in enumerate(drive.targets)
         ),
         finite_mean(means),
@@ -93,7 +93,7 @@ def summarise_tracking(
     )
 
 
-def seed_errors(followed: Sequence[TargetDriveResult]) -> Floats:
+def seed_errors(followed: Sequence[TrackingDriveResult]) -> Floats:
     """Mean |error| of each drive, shape (seeds,); NaN for one that fell before the first target."""
     return np.array([one.error for one in followed])
 
@@ -104,22 +104,24 @@ def finite_mean(values: Floats) -> float:
     return float(known.mean()) if known.size else float("nan")
 
 
-def choose_targets(followers: TargetDriver, behavior: Behavior, seeds: Sequence[int]) -> tuple[float, ...]:
+def choose_tracking_targets(
+    runner: TrackingDriveRunner, behavior: Behavior, seeds: Sequence[int]
+) -> tuple[float, ...]:
     """Targets that fit an attribute: the paper's headings for an angle, else steps about its natural value.
 
     A step is a tenth of what the attribute is when nobody touches the policy, and no less than one press of
     an arrow key.
 
     Args:
-        followers: drive untouched to measure that.
+        runner: drive untouched to measure that.
         behavior: holds the attribute.
         seeds: of these drives.
     """
     assert behavior.pid is not None
     name = behavior.pid.attribute
-    if followers.attribute(name).wraps:
+    if runner.attribute(name).wraps:
         return HEADINGS
-    untouched = followers.run([TargetDrive(name, "", seed, (0.0, 0.0)) for seed in seeds])
+    untouched = runner.run([TrackingDrive(name, "", seed, (0.0, 0.0)) for seed in seeds])
     natural = finite_mean(np.array([one.values for one in untouched]))
     if not np.isfinite(natural):
         raise MapError(f"behavior '{behavior.name}': the robot fell untouched on seeds {list(seeds)}")
