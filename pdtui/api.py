@@ -28,7 +28,7 @@ from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_library import find_map
-from pdtui.stimulation.map_policy import resolve_policy
+from pdtui.stimulation.map_policy_lookup import resolve_map_policy
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stimulation_map import StimulationMap
 
@@ -211,7 +211,7 @@ def drive(
     live = load_policy(policy, robot) if isinstance(policy, nn.Module) else policy
     given = live if isinstance(live, Policy) else None
     named = "" if given is not None or live is None else str(live)
-    stimulation_map = resolve_policy(stimulation_map, named, import_options)
+    stimulation_map = resolve_map_policy(stimulation_map, named, import_options)
     config = DriveConfig(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
     loop = build_loop(config, robot if isinstance(robot, Robot) else None, given)
     presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}

@@ -25,13 +25,13 @@ SMALL = DissectionSettings(
     search_starts=2,
     selection_starts=2,
     held_out_starts=2,
-    walk=20,
-    imprint=ImprintSettings(episodes=2, steps=10, bins=2, units=(3,), factors=(1.0,)),
-    search=BehaviorSearchSettings(
+    walk_steps=20,
+    imprints=ImprintSettings(episodes=2, steps=10, bins=2, units=(3,), factors=(1.0,)),
+    behavior_search=BehaviorSearchSettings(
         random_sets=4, single_units=4, elite=3, children=3, promoted=2, max_units=(3,), generations=1,
         quick_starts=1, quick_steps=12, full_starts=2, full_steps=16, finalists=2, final_steps=18,
     ),
-    hold=ControllerSearchSettings(units=1, finalists=2, steps=12, final_steps=18),
+    controller_search=ControllerSearchSettings(units=1, finalists=2, steps=12, final_steps=18),
 )  # fmt: skip
 
 

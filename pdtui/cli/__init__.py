@@ -9,10 +9,12 @@ import click
 
 from pdtui import __version__
 from pdtui.cli.bench_command import bench
+from pdtui.cli.dissect_command import dissect
 from pdtui.cli.drive_commands import drive, pick_and_drive, replay
 from pdtui.cli.evaluate_command import evaluate
 from pdtui.cli.figure_command import figure
-from pdtui.cli.making_commands import convert, dissect, pursue, train
+from pdtui.cli.policy_commands import convert, train
+from pdtui.cli.pursue_command import pursue
 from pdtui.cli.sessions_commands import sessions
 from pdtui.cli.shared_options import OneLineErrors
 from pdtui.cli.tune_command import tune

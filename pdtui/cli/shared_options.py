@@ -136,7 +136,7 @@ def drive_config(
     from pdtui.drive.drive_config import DriveConfig
     from pdtui.robots import check_robot, file_stem, trust_module
     from pdtui.stimulation.map_library import find_map
-    from pdtui.stimulation.map_policy import resolve_policy
+    from pdtui.stimulation.map_policy_lookup import resolve_map_policy
     from pdtui.stimulation.map_reader import load_map
 
     if map_name is None and robot.endswith(".toml"):
@@ -150,7 +150,7 @@ def drive_config(
             robot, map_name or file_stem(robot), policy if without_map and map_name is None else ""
         )
     return DriveConfig(
-        check_robot(robot), resolve_policy(stimulation_map, policy, import_options), seed, **options
+        check_robot(robot), resolve_map_policy(stimulation_map, policy, import_options), seed, **options
     )
 
 

@@ -110,18 +110,18 @@ def find_attribute_movers(
         progress: called with (directions done, directions).
     """
     found = []
-    half, steps = len(starts) // 2, plan.steer_steps
+    half, steps = len(starts) // 2, plan.mover_steps
     asked = [(column, sign) for column in columns for sign in (1, -1)]
 
     def probe(plans: Sequence[Stimulation], some: Sequence[StartState]) -> PlanEffects:
         return prober.probe(plans, some, steps=steps, measure_from=steps // 3)
 
     for done, (column, sign) in enumerate(asked, start=1):
-        singles = _singles(column, sign, screen, refined, plan.steer_singles)
+        singles = _singles(column, sign, screen, refined, plan.mover_singles)
         lasting = _lasting(probe(singles, starts[:half]), column, sign) if singles else None
         if lasting is not None:
             single = singles[lasting]
-            pairs = _cancelling(single, column, sign, columns, spread, refined)[: plan.steer_pairs]
+            pairs = _cancelling(single, column, sign, columns, spread, refined)[: plan.mover_pairs]
             plans = [single, *pairs]
             best = _choose(probe(plans, starts[:half]), column, sign, columns, spread) if pairs else 0
             chosen = [single] if best == 0 else [plans[best], single]

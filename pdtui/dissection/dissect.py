@@ -15,8 +15,8 @@ from pdtui.dissection.attribute_movers import find_attribute_movers, movable_col
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_searches import DissectionSearches, TimeBudget
 from pdtui.dissection.dissection_settings import DissectionSettings
+from pdtui.dissection.probe_starts import gather_probe_starts
 from pdtui.dissection.sample_episode import pick_sample_episode
-from pdtui.dissection.start_states import gather_start_states
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.confirmation import draw_controls, select_units
@@ -89,7 +89,7 @@ def dissect(
         )
         matching = match_units(recorded, world.attributes, spectrum)
         phase = correlate_phases(recorded, world.attributes, spectrum)
-        starts = gather_start_states(crew, plan, seed + 100)
+        starts = gather_probe_starts(crew, plan, seed + 100)
         plan = starts.plan
         screen = prober.sweep(
             range(network.units),
@@ -109,7 +109,7 @@ def dissect(
         )
         spread = np.concatenate([episode.attributes for episode in recorded]).std(axis=0)
         columns = movable_columns(world.attributes, recorded)
-        steered = find_attribute_movers(
+        movers = find_attribute_movers(
             prober,
             columns,
             spread,
@@ -122,7 +122,7 @@ def dissect(
         searches = DissectionSearches(
             prober, world, plan, seed, TimeBudget(began, budget_minutes), stage, known
         )
-        behaviors, holds = searches.run(screen, refined, starts.searches)
+        behaviors, controllers = searches.run(screen, refined, starts.searches)
         if remembered is not None:
             remembered.remove()
         return Dissection(
@@ -136,15 +136,15 @@ def dissect(
             seed=seed,
             matching=matching,
             phase=phase,
-            excerpt=pick_sample_episode(recorded, world.attributes, matching, spectrum),
+            sample_episode=pick_sample_episode(recorded, world.attributes, matching, spectrum),
             screen=screen,
             refined=refined,
             controls=controls,
             spread=spread,
             movable=tuple(columns),
-            steered=steered,
+            attribute_movers=movers,
             behaviors=behaviors,
-            holds=holds,
+            controllers=controllers,
             rollouts=crew.rollouts,
             control_steps=crew.steps_run,
             minutes=(time.monotonic() - began) / 60,

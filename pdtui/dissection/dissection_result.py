@@ -36,15 +36,15 @@ class Dissection:
         seed: everything random came from it.
         matching: discrepancies.
         phase: correlations.
-        excerpt: one monitored episode, of the units that match: what pictures show.
+        sample_episode: one monitored episode, of the units that match: what pictures show.
         screen: every unit, at a few values.
         refined: the best of them, the first matches and the controls, from other starts.
         controls: units drawn at random.
         spread: standard deviation of every attribute over the monitored steps, shape (J,).
         movable: columns of the attributes that up and down were looked for.
-        steered: up and down for each attribute.
+        attribute_movers: up and down for each attribute.
         behaviors: the best stimulation for each goal.
-        holds: the best controllers.
+        controllers: the best controllers.
         rollouts, control_steps, minutes: what it took.
         import_options: what the weights file leaves open.
         shortened: a sentence on roll-outs shorter than asked for, because the policy falls; or empty.
@@ -60,15 +60,15 @@ class Dissection:
     seed: int
     matching: Discrepancies
     phase: PhaseCorrelations
-    excerpt: SampleEpisode
+    sample_episode: SampleEpisode
     screen: EffectCurves
     refined: EffectCurves
     controls: tuple[int, ...]
     spread: Floats
     movable: tuple[int, ...]
-    steered: tuple[AttributeMover, ...]
+    attribute_movers: tuple[AttributeMover, ...]
     behaviors: tuple[BehaviorSearchResult, ...]
-    holds: tuple[ControllerSearchResult, ...]
+    controllers: tuple[ControllerSearchResult, ...]
     rollouts: int
     control_steps: int
     minutes: float

@@ -82,14 +82,16 @@ class DissectionSearches:
         found = []
         for number, goal in enumerate(goals):
             column = self.world.attribute_index(goal.aim.attribute)
-            search = BehaviorSearch(self.prober, goal, column, starts, self.seed + number, self.plan.search)
+            search = BehaviorSearch(
+                self.prober, goal, column, starts, self.seed + number, self.plan.behavior_search
+            )
             deadline = self.clock.share(len(goals) - number + 2)
             found.append(search.run(sweeps, pool, deadline, self.stage(f"search: {goal.name}")))
         return tuple(found)
 
     def pool(self, starts: SearchStartStates) -> SharedCandidates:
         """Random sets and imprints, probed once for all searches."""
-        crew, sizes, imprint = self.prober.crew, self.plan.search, self.plan.imprint
+        crew, sizes, imprint = self.prober.crew, self.plan.behavior_search, self.plan.imprints
         seeds = range(self.seed + _IMPRINT_SEEDS, self.seed + _IMPRINT_SEEDS + imprint.episodes)
         episodes = monitor_episodes(self.world, crew.policy, seeds, imprint.steps)
         plans = [
@@ -125,8 +127,8 @@ class DissectionSearches:
             column = self.world.attribute_index(target.attribute)
             deadline = self.clock.share(len(targets) - number)
             search, held_out = starts.search[:4], (*starts.selection[:6], *starts.held_out[:6])
-            searcher = ControllerSearch(self.prober, target, self.plan.hold)
-            opposites = pool.opposites(column, self.plan.hold.pairs)
+            searcher = ControllerSearch(self.prober, target, self.plan.controller_search)
+            opposites = pool.opposites(column, self.plan.controller_search.pairs)
             held.append(searcher.run(sweep, column, opposites, search, held_out, deadline))
             progress = self.stage(f"search: hold {target.attribute}")
             if progress is not None:

@@ -44,10 +44,10 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
         ],
         "shortened": dissection.shortened,
         "movable": [dissection.attributes[column].name for column in dissection.movable],
-        "steered": [_steered(dissection, one) for one in dissection.steered],
+        "steered": [_steered(dissection, one) for one in dissection.attribute_movers],
         "side_effects": _side_effects(dissection),
         "behaviors": [_behavior(dissection, number) for number in range(len(dissection.behaviors))],
-        "holds": [_hold(dissection, number) for number in range(len(dissection.holds))],
+        "holds": [_hold(dissection, number) for number in range(len(dissection.controllers))],
         "rollouts": dissection.rollouts,
         "control_steps": dissection.control_steps,
         "minutes": round(dissection.minutes, 2),
@@ -170,7 +170,7 @@ def _behavior(dissection: Dissection, number: int) -> dict[str, Any]:
 
 
 def _hold(dissection: Dissection, number: int) -> dict[str, Any]:
-    held = dissection.holds[number]
+    held = dissection.controllers[number]
     return {
         "attribute": held.pid.attribute,
         "units": held.weights.by_address(dissection.layers),

@@ -16,7 +16,7 @@ _LISTED = 6
 _MATCHES = 3
 
 
-def print_tables(dissection: Dissection) -> RenderableType:
+def render_dissection(dissection: Dissection) -> RenderableType:
     """The tables that `pdtui dissect` prints."""
     summary = summarise_dissection(dissection)
     return Group(*dissection_tables(summary), *(Text(line) for line in dissection_remarks(summary)))

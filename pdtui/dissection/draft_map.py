@@ -14,7 +14,7 @@ from pdtui.dissection.key_allocator import KeyAllocator
 from pdtui.probing.confirmation import PrimitiveConfirmation, best_probed
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
-from pdtui.stimulation.map_text import block_table, inline_table, outputs_table, table_array
+from pdtui.stimulation.map_toml import block_table, inline_table, outputs_table, table_array
 from pdtui.stimulation.map_writer import effect_table
 from pdtui.stimulation.stimulation_map import SCHEMA
 
@@ -61,7 +61,7 @@ def draft_map(dissection: Dissection) -> str:
     if primitives:
         document.add("primitives", table_array(primitives))
     behaviors = [_behavior(found, dissection, names) for found in dissection.behaviors if found.reached]
-    behaviors += [_hold(held, dissection) for held in dissection.holds if held.holds]
+    behaviors += [_hold(held, dissection) for held in dissection.controllers if held.holds]
     behaviors += _steered(dissection, {str(entry["key"]) for entry in behaviors})
     if behaviors:
         document.add("behaviors", table_array(behaviors))
@@ -85,7 +85,7 @@ def _header(dissection: Dissection, steered: set[str]) -> list[str]:
                 f"Not found: {found.goal.name}. The best, {_describe(found.stimulation, dissection.layers)}, "
                 f"gained enough on {found.success:.0%} of the held-out starts and fell on {found.falls:.0%}."
             )
-    for held in dissection.holds:
+    for held in dissection.controllers:
         if not held.holds:
             lines.append(
                 f"Not found: {_HOLDS[held.pid.attribute][0]}. The best controller is off by "
@@ -162,7 +162,7 @@ def _steered(dissection: Dissection, taken: set[str]) -> list[dict[str, Any]]:
     """Up and down for every attribute that no goal moves that way already, as long as there are keys."""
     aimed = {(one.goal.aim.attribute, one.goal.aim.sign) for one in dissection.behaviors if one.reached}
     keys, pairs, entries = KeyAllocator(taken), dict[str, tuple[str, str] | None](), []
-    for one in dissection.steered:
+    for one in dissection.attribute_movers:
         name = dissection.attributes[one.column].name
         if (name, one.sign) in aimed:
             continue

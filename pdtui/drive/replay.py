@@ -28,7 +28,7 @@ from pdtui.sessions.session_comparison import (
     summarise_deviations,
 )
 from pdtui.sessions.session_reader import Session, read_session
-from pdtui.stimulation.map_policy import locate_policy
+from pdtui.stimulation.map_policy_lookup import locate_map_policy
 from pdtui.stimulation.map_reader import parse_map
 
 TOLERANCE = 1e-6
@@ -113,7 +113,7 @@ def config_of(session: Session, source: str, policy: str = "") -> DriveConfig:
     """
     info = session.info
     stimulation_map = parse_map(info.map_text, f"{source} (map)")
-    stimulation_map = locate_policy(stimulation_map, policy)
+    stimulation_map = locate_map_policy(stimulation_map, policy)
     # A drive that was forced had other weights than its map was made for; a replay wants the session's own.
     stimulation_map = replace(stimulation_map, policy_hash=info.policy_hash)
     return DriveConfig(

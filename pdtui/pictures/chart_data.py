@@ -139,7 +139,7 @@ def matched_pair(dissection: Dissection, column: int) -> MatchedPair | None:
     ranked = dissection.matching.ranked(column)
     if not ranked.size:
         return None
-    unit, shown = int(ranked[0]), dissection.excerpt
+    unit, shown = int(ranked[0]), dissection.sample_episode
     series = shown.compared_attributes[:, column], shown.compared_activations[:, shown.column(unit)]
     one, other = (spectrogram_of(values, dissection.preset, dissection.dt) for values in series)
     both = np.concatenate([one.decibels.ravel(), other.decibels.ravel()])

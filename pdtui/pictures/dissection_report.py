@@ -149,7 +149,7 @@ def _write_curve(log: Log, axes: ViewerAxes, curve: EffectCurve, color: RgbColor
 
 
 def _write_episode(recording: rr.RecordingStream, log: Log, dissection: Dissection, column: int) -> None:
-    shown, attribute = dissection.excerpt, dissection.attributes[column]
+    shown, attribute = dissection.sample_episode, dissection.attributes[column]
     series: dict[str, tuple[NDArray[np.floating], str, RgbColor]] = {}
     series["attribute"] = (shown.attributes[:, column], f"{attribute.name} ({attribute.unit})", SKY)
     pair = matched_pair(dissection, column)

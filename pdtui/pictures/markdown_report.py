@@ -29,7 +29,10 @@ def _origin(dissection: Dissection, summary: dict[str, Any]) -> str:
     rows = [
         ("policy", f"{summary['policy']}, SHA-256 `{summary['sha256']}`"),
         ("hidden layers", " · ".join(f"{width} units" for width in dissection.layers)),
-        ("seed", f"{summary['seed']}; episodes of seeds {episodes}, pictured: {dissection.excerpt.seed}"),
+        (
+            "seed",
+            f"{summary['seed']}; episodes of seeds {episodes}, pictured: {dissection.sample_episode.seed}",
+        ),
         (
             "spectrum",
             f"preset `{preset}`: {preset.window.title()} window of {preset.length} steps, hop "

@@ -68,7 +68,7 @@ def _attribute(dissection: Dissection, column: int) -> rrb.Vertical:
         lower.append(axes_view(attribute_entity(dissection, column, "effects"), title))
     if lower:
         rows.append(rrb.Horizontal(*lower))
-    name = f"Episode of seed {dissection.excerpt.seed}: {label} and its best match"
+    name = f"Episode of seed {dissection.sample_episode.seed}: {label} and its best match"
     rows.append(rrb.TimeSeriesView(origin=attribute_entity(dissection, column, "episode"), name=name))
     return rrb.Vertical(*rows, name=attribute.name, row_shares=[3] * (len(rows) - 1) + [2])
 

@@ -20,7 +20,7 @@ def shipped_folder(kind: str) -> Path:
     return installed if installed.is_dir() else package.parent / kind
 
 
-def folders(kind: str) -> tuple[Path, ...]:
+def search_folders(kind: str) -> tuple[Path, ...]:
     """Folders to look in, the user's own first."""
     own, shipped = Path.cwd() / kind, shipped_folder(kind)
     return (own,) if own.resolve() == shipped.resolve() else (own, shipped)
@@ -36,7 +36,7 @@ def find_map(name: str) -> Path:
         if Path(name).is_file():
             return Path(name)
         raise MapError(f"{name}: no such map")
-    for folder in folders("maps"):
+    for folder in search_folders("maps"):
         if (folder / f"{name}.toml").is_file():
             return folder / f"{name}.toml"
     known = ", ".join(sorted({path.stem for path in _all_paths()})) or "none"
@@ -72,5 +72,5 @@ def list_maps() -> list[ListedMap]:
 
 
 def _all_paths() -> Iterator[Path]:
-    for folder in folders("maps"):
+    for folder in search_folders("maps"):
         yield from sorted(folder.glob("*.toml"))

@@ -12,7 +12,7 @@ from pdtui.core.bounded_read import read_at_most
 from pdtui.core.errors import MapError
 from pdtui.core.units import ADDRESS
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions
-from pdtui.stimulation.map_fields import NUMBER, MapTable
+from pdtui.stimulation.map_table_reader import NUMBER, MapTableReader
 from pdtui.stimulation.stimulation_map import (
     RESERVED_KEYS,
     SCHEMA,
@@ -59,11 +59,11 @@ def parse_map(text: str, source: str) -> StimulationMap:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a whole number of too many digits is no TOMLDecodeError
         raise MapError(f"{source}: not a TOML file: {error}") from error
-    top = MapTable(source, text, "top level", data, "", 0)
+    top = MapTableReader(source, text, "top level", data, "", 0)
     if (schema := top.take("schema", int)) != SCHEMA:
         raise top.error("schema", f"expected {SCHEMA}, found {schema}")
     robot = top.text("robot")
-    policy = MapTable(source, text, "policy", top.take("policy", dict), "[policy]", 0)
+    policy = MapTableReader(source, text, "policy", top.take("policy", dict), "[policy]", 0)
     name, sha256 = policy.text("name"), policy.text("sha256")
     import_options = ImportOptions(
         policy.choice("activation", ACTIVATION_NAMES, ""),
@@ -71,12 +71,12 @@ def parse_map(text: str, source: str) -> StimulationMap:
         policy.text("normaliser", ""),
     )
     policy.done()
-    keys = MapTable(source, text, "keys", top.take("keys", dict, {"default": "space"}), "[keys]", 0)
+    keys = MapTableReader(source, text, "keys", top.take("keys", dict, {"default": "space"}), "[keys]", 0)
     default_key = keys.text("default")
     keys.done()
     tables = {
         kind: [
-            MapTable(source, text, f"{kind[:-1]} {number + 1}", entry, f"[[{kind}]]", number)
+            MapTableReader(source, text, f"{kind[:-1]} {number + 1}", entry, f"[[{kind}]]", number)
             for number, entry in enumerate(top.take(kind, list, []))
         ]
         for kind in ("primitives", "behaviors")
@@ -111,7 +111,7 @@ def _has_long_key(text: str) -> bool:
     return False
 
 
-def _primitive(table: MapTable) -> MotorPrimitive:
+def _primitive(table: MapTableReader) -> MotorPrimitive:
     unit = table.text("unit")
     if not ADDRESS.fullmatch(unit):
         raise table.error("unit", f"expected layer:index, such as 0:12, found '{unit}'")
@@ -131,7 +131,7 @@ def _primitive(table: MapTable) -> MotorPrimitive:
     return primitive
 
 
-def _measured(parent: MapTable) -> MeasuredEffect | None:
+def _measured(parent: MapTableReader) -> MeasuredEffect | None:
     table = parent.table("measured", None)
     if table is None:
         return None
@@ -141,7 +141,7 @@ def _measured(parent: MapTable) -> MeasuredEffect | None:
     return measured
 
 
-def _behavior(table: MapTable, primitives: dict[str, MotorPrimitive]) -> Behavior:
+def _behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive]) -> Behavior:
     name = table.text("name")
     magnitudes = table.numbers("magnitudes", {})
     for key in magnitudes:

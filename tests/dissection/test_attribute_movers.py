@@ -31,7 +31,7 @@ def test_the_unit_that_is_wired_to_a_motor_moves_the_body_both_ways(wired_file: 
             screen, match_units(episodes, crew.robot.attributes, find_preset("paper")), everything, 1
         )
         refined = prober.sweep(chosen, (-4.0, 0.0, 4.0), starts[2:4], steps=16)
-        plan = replace(QUICK_DISSECTION, steer_steps=18, steer_singles=3, steer_pairs=3)
+        plan = replace(QUICK_DISSECTION, mover_steps=18, mover_singles=3, mover_pairs=3)
         columns = movable_columns(crew.robot.attributes, episodes)
         found = find_attribute_movers(prober, columns, spread, screen, refined, starts[4:], plan)
         assert found

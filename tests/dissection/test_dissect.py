@@ -17,7 +17,7 @@ from pdtui.dissection.dissect import dissect
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_searches import DissectionSearches, TimeBudget
 from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.dissection.dissection_tables import print_tables
+from pdtui.dissection.dissection_tables import render_dissection
 from pdtui.dissection.draft_map import draft_map
 from pdtui.policies.weights.weights_file import hash_file
 from pdtui.probing.confirmation import rank_correlation
@@ -37,14 +37,14 @@ def test_every_unit_is_screened_and_every_goal_has_a_candidate(dissection: Disse
     assert dissection.screen.units == tuple(range(16))
     assert [found.goal.name for found in dissection.behaviors] == [goal.name for goal in GOALS]
     assert all(1 <= len(found.stimulation.units) <= 3 for found in dissection.behaviors)
-    assert {held.pid.attribute for held in dissection.holds} == {"yaw", "speed"}
+    assert {held.pid.attribute for held in dissection.controllers} == {"yaw", "speed"}
 
 
 def test_the_result_does_not_depend_on_the_workers(dissection: Dissection, policy_file: Path) -> None:
     again = dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL)
     np.testing.assert_array_equal(again.screen.effects, dissection.screen.effects)
     assert again.behaviors == dissection.behaviors
-    assert again.holds == dissection.holds
+    assert again.controllers == dissection.controllers
     assert draft_map(again) == draft_map(dissection)
 
 
@@ -84,7 +84,7 @@ def test_a_silent_unit_and_a_broken_attribute_are_marked_rows(dissection: Dissec
     assert (vx["frequency"], vx["matches"]) == (None, [])
     assert (vy["matches"][0]["unit"], vy["matches"][0]["flaw"]) == ("1:1", "never fires")
     screen = StringIO()
-    Console(file=screen, width=220).print(print_tables(broken))
+    Console(file=screen, width=220).print(render_dissection(broken))
     for text in (
         "Matching (paper hop=8)",
         "1:1 †",
@@ -96,7 +96,7 @@ def test_a_silent_unit_and_a_broken_attribute_are_marked_rows(dissection: Dissec
 
 def test_report_shows_every_attribute_and_behavior(dissection: Dissection) -> None:
     screen = StringIO()
-    Console(file=screen, width=220).print(print_tables(dissection))
+    Console(file=screen, width=220).print(render_dissection(dissection))
     for name in (
         "yaw rate",
         "front left hip torque",
@@ -110,7 +110,7 @@ def test_a_small_trembling_ant_gets_no_behavior_and_the_map_says_so(dissection: 
     text = draft_map(dissection)
     parsed = tomllib.loads(text)
     reached = [found.goal.name for found in dissection.behaviors if found.reached]
-    held = ["hold heading" for held in dissection.holds if held.holds]
+    held = ["hold heading" for held in dissection.controllers if held.holds]
     names = [behavior["name"] for behavior in parsed.get("behaviors", [])]
     assert names[: len(reached) + len(held)] == reached + held
     for found in dissection.behaviors:
@@ -125,7 +125,7 @@ def test_what_was_found_is_in_the_map(dissection: Dissection) -> None:
     held = ControllerSearchResult(
         Stimulation((9,), (-1.0,)), PidGains("yaw", 6.0, 0.0, 0.0, 4.0, 0.2), 0.1, 0.6, 0.0, (-0.4, 0.4), True
     )
-    text = draft_map(replace(dissection, behaviors=(up,), holds=(held,)))
+    text = draft_map(replace(dissection, behaviors=(up,), controllers=(held,)))
     parsed = tomllib.loads(text)
     parse_map(text, "proposed").check("ant", dissection.layers, dissection.policy_hash)
     assert parsed["schema"] == 1
@@ -155,7 +155,7 @@ def test_a_budget_that_is_over_still_screens(policy_file: Path) -> None:
     quick = dissect("ant", policy_file, episodes=1, workers=1, effort=SMALL, budget_minutes=0.0)
     assert len(quick.screen.units) == 16
     assert len(quick.behaviors) == len(GOALS)
-    assert quick.holds == ()
+    assert quick.controllers == ()
 
 
 def effects(means: list[list[float]], falls: list[list[bool]], unperturbed: list[float]) -> PlanEffects:
@@ -204,7 +204,10 @@ magnitudes = {{ "0:3" = 9.5, "1:7" = -9.5 }}
 """
     known = Stimulation((3, 15), (9.5, -9.5))
     effort = replace(
-        SMALL, search=replace(SMALL.search, random_sets=1, single_units=0, children=8, promoted=8, elite=8)
+        SMALL,
+        behavior_search=replace(
+            SMALL.behavior_search, random_sets=1, single_units=0, children=8, promoted=8, elite=8
+        ),
     )
     with RolloutPool("ant", policy_file, 1) as crew:
         starts = collect_start_states(crew.robot, crew.policy, 1200, 1, at=5, survive=20)

@@ -98,13 +98,13 @@ def read_session_file(path: Path) -> None:
 def _reads(map_path: Path) -> dict[str, Callable[[Path], object]]:
     from pdtui.drive.keystrokes import read_keystrokes
     from pdtui.policies.weights.policy_loading import load_policy
-    from pdtui.stimulation.map_policy import resolve_policy
+    from pdtui.stimulation.map_policy_lookup import resolve_map_policy
     from pdtui.stimulation.map_reader import load_map
 
     known = load_map(map_path)
     return {
         "session": read_session_file,
-        "map": lambda path: resolve_policy(load_map(path)),
+        "map": lambda path: resolve_map_policy(load_map(path)),
         "keys": lambda path: read_keystrokes(path, known),
         "weights": load_policy,
     }

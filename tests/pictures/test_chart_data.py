@@ -19,8 +19,8 @@ from pdtui.spectra.monitor import monitor_episodes
 def test_the_pictured_spectrograms_are_those_that_were_compared(
     dissection: Dissection, policy_file: Path
 ) -> None:
-    robot, steps = make_robot("ant"), len(dissection.excerpt.attributes)
-    episodes = monitor_episodes(robot, load_policy(policy_file), [dissection.excerpt.seed], steps)
+    robot, steps = make_robot("ant"), len(dissection.sample_episode.attributes)
+    episodes = monitor_episodes(robot, load_policy(policy_file), [dissection.sample_episode.seed], steps)
     alone = match_units(episodes, robot.attributes, dissection.preset)
     for name in ("vx", "yaw", "height"):
         column = dissection.column(name)

@@ -125,9 +125,11 @@ def test_the_episode_is_the_monitored_one(dissection: Dissection, entities: Enti
     column = dissection.column("pitch")
     unit = int(dissection.matching.ranked(column)[0])
     shown = entities["/attributes/pitch/episode/unit"]["Scalars:scalars"]
-    np.testing.assert_allclose(shown, dissection.excerpt.activations[:, dissection.excerpt.column(unit)])
+    np.testing.assert_allclose(
+        shown, dissection.sample_episode.activations[:, dissection.sample_episode.column(unit)]
+    )
     shown = entities["/attributes/pitch/episode/attribute"]["Scalars:scalars"]
-    np.testing.assert_array_equal(shown, dissection.excerpt.attributes[:, column])
+    np.testing.assert_array_equal(shown, dissection.sample_episode.attributes[:, column])
 
 
 def test_text_and_properties_say_what_it_was_made_from(dissection: Dissection, entities: Entities) -> None:

@@ -28,9 +28,9 @@ def test_main_attributes_come_with_the_units_that_match_them(
         assert [pair.unit] == dissection.matches(pair.attribute.name, 1)
         unit = int(dissection.matching.ranked(column)[0])
         assert pair.discrepancy == dissection.matching.discrepancy[column, unit]
-        np.testing.assert_array_equal(pair.values, dissection.excerpt.attributes[:, column])
+        np.testing.assert_array_equal(pair.values, dissection.sample_episode.attributes[:, column])
         np.testing.assert_array_equal(
-            pair.activation, dissection.excerpt.activations[:, dissection.excerpt.column(unit)]
+            pair.activation, dissection.sample_episode.activations[:, dissection.sample_episode.column(unit)]
         )
     assert curves.times[[0, -1]] == pytest.approx([0.05, 6.5])
 

@@ -33,7 +33,7 @@ def test_an_interrupted_dissection_goes_on_without_loss(policy_file: Path, tmp_p
     resumed = dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL, journal=journal)
     straight = dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL)
     assert resumed.behaviors == straight.behaviors
-    assert resumed.holds == straight.holds
+    assert resumed.controllers == straight.controllers
     assert (resumed.rollouts, resumed.control_steps) == (straight.rollouts, straight.control_steps)
     np.testing.assert_array_equal(resumed.refined.effects, straight.refined.effects)
     assert not journal.exists()

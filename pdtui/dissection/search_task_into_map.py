@@ -22,7 +22,7 @@ from pdtui.robots.tasks.task_lookup import find_task
 from pdtui.search.task_rollout import TimedStimulation
 from pdtui.search.task_search import TaskSearch, TaskSearchResult, TaskSearchSettings
 from pdtui.stimulation.map_reader import load_map
-from pdtui.stimulation.map_text import outputs_table
+from pdtui.stimulation.map_toml import outputs_table
 from pdtui.stimulation.map_writer import add_behavior, rewrite_map
 from pdtui.stimulation.stimulation_map import StimulationMap
 

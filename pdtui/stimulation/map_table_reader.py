@@ -16,7 +16,7 @@ MAX_ENTRIES = 4096
 _MAX_WHOLE = 2**53  # larger ones are no longer what they say once they are floating point
 
 
-class MapTable:
+class MapTableReader:
     """One table of the file, read field by field; what is left over at the end is an error."""
 
     def __init__(self, source: str, text: str, where: str, data: Any, header: str, number: int) -> None:
@@ -57,12 +57,14 @@ class MapTable:
             raise self.error(name, f"expected one of {', '.join(choices)}, found '{value}'")
         return value
 
-    def table(self, name: str, default: Any = ...) -> MapTable | None:
+    def table(self, name: str, default: Any = ...) -> MapTableReader | None:
         """A field that is a table itself; None where the default is."""
         value = self.take(name, dict, default)
         if value is None:
             return None
-        return MapTable(self._source, self._text, f"{self._where}, {name}", value, self._header, self._number)
+        return MapTableReader(
+            self._source, self._text, f"{self._where}, {name}", value, self._header, self._number
+        )
 
     def numbers(self, name: str, default: Any = ...) -> dict[str, float]:
         """A field that is a table of finite numbers."""

@@ -15,7 +15,7 @@ from pdtui.policies.weights.import_options import NO_NORMALISER, NO_OPTIONS, Imp
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 
-def resolve_policy(
+def resolve_map_policy(
     stimulation_map: StimulationMap, policy: str = "", import_options: ImportOptions = NO_OPTIONS
 ) -> StimulationMap:
     """Put policy and choices of this drive into the map, and into its text, which the session keeps.
@@ -32,7 +32,7 @@ def resolve_policy(
         PolicyError: the map names a file outside of its own folder and the working directory.
         MapError: its text cannot be changed.
     """
-    found = locate_policy(stimulation_map, policy, import_options)
+    found = locate_map_policy(stimulation_map, policy, import_options)
     if (found.policy, found.import_options) == (stimulation_map.policy, stimulation_map.import_options):
         return stimulation_map
     try:
@@ -45,10 +45,10 @@ def resolve_policy(
     return replace(found, text=tomlkit.dumps(document))
 
 
-def locate_policy(
+def locate_map_policy(
     stimulation_map: StimulationMap, policy: str = "", import_options: ImportOptions = NO_OPTIONS
 ) -> StimulationMap:
-    """As `resolve_policy`, but the map's text stays as it is.
+    """As `resolve_map_policy`, but the map's text stays as it is.
 
     Raises:
         PolicyError: the map names a file outside of its own folder and the working directory.

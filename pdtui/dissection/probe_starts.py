@@ -31,7 +31,7 @@ class ProbeStarts(NamedTuple):
     shortened: str
 
 
-def gather_start_states(crew: RolloutPool, plan: DissectionSettings, first_seed: int) -> ProbeStarts:
+def gather_probe_starts(crew: RolloutPool, plan: DissectionSettings, first_seed: int) -> ProbeStarts:
     """One snapshot a walk, from walks that go on for as long as the longest roll-out from there.
 
     Where too few of them do (a hopper that falls after two seconds), starts and roll-outs become as short as
@@ -47,13 +47,13 @@ def gather_start_states(crew: RolloutPool, plan: DissectionSettings, first_seed:
         plan.selection_starts,
         plan.held_out_starts,
     )
-    total, wanted, shortened = sum(counts), plan.walk + plan.longest, ""
+    total, wanted, shortened = sum(counts), plan.walk_steps + plan.longest_rollout, ""
     seeds = range(first_seed, first_seed + _MORE * total)
     lengths = walk_lengths(crew.robot, crew.policy, seeds, wanted, enough=total)
     lasting = sorted(lengths, reverse=True)[total - 1]
     if lasting < wanted:
-        plan = plan.within(lasting)
-        if plan.longest < _SHORTEST:
+        plan = plan.shortened_to(lasting)
+        if plan.longest_rollout < _SHORTEST:
             raise RobotError(
                 f"{crew.robot.name}: expected {total} walks of at least {wanted} steps without a fall among "
                 f"{len(seeds)} seeds, or shorter ones to make do with, but that many last {lasting} steps "
@@ -61,11 +61,11 @@ def gather_start_states(crew: RolloutPool, plan: DissectionSettings, first_seed:
             )
         shortened = (
             f"Of {len(seeds)} walks, {sum(length >= wanted for length in lengths)} lasted the {wanted} steps "
-            f"that were asked for and {total} lasted {lasting}: stimulated from step {plan.walk} on, for "
-            f"{plan.longest} steps at most. What a behavior does after that was not measured."
+            f"asked for and {total} lasted {lasting}, so stimulation began at step {plan.walk_steps} and "
+            f"lasted at most {plan.longest_rollout} steps. Effects beyond that were not measured."
         )
     everything = collect_start_states(
-        crew.robot, crew.policy, first_seed, total, at=plan.walk, survive=plan.longest
+        crew.robot, crew.policy, first_seed, total, at=plan.walk_steps, survive=plan.longest_rollout
     )
     pools, taken = [], 0
     for count in counts:

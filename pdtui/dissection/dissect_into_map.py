@@ -16,7 +16,7 @@ from pdtui.dissection.dissect import dissect
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_settings import DissectionSettings
 from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.dissection.dissection_tables import print_tables
+from pdtui.dissection.dissection_tables import render_dissection
 from pdtui.dissection.draft_map import draft_map
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.stimulation.map_library import find_map
@@ -38,10 +38,10 @@ class WrittenDissection:
     def table(self) -> RenderableType:
         """What the command prints."""
         names = ", ".join(self.behaviors) or "no behavior: none reached what was asked of it"
-        return Group(print_tables(self.dissection), Text(f"wrote {self.output}: {names}"))
+        return Group(render_dissection(self.dissection), Text(f"wrote {self.output}: {names}"))
 
 
-def dissect_to_map(
+def dissect_into_map(
     robot: str,
     policy: str,
     output: Path,

@@ -15,7 +15,7 @@ from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.sessions.session_reader import read_session
-from pdtui.stimulation.map_policy import resolve_policy
+from pdtui.stimulation.map_policy_lookup import resolve_map_policy
 from pdtui.stimulation.map_reader import load_map, parse_map
 
 MAP = """\
@@ -50,8 +50,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     import_options = ImportOptions("relu", "none", "stats.npz")
     sha256 = load_policy(maps / "agent.pt", import_options=import_options).sha256
     unclipped = CHOICES.replace("clip", "none")
-    (maps / "none.toml").write_text(MAP.format(sha256=sha256, import_options=unclipped))
-    (maps / "open.toml").write_text(MAP.format(sha256=sha256, import_options=""))
+    (maps / "none.toml").write_text(MAP.format(sha256=sha256, choices=unclipped))
+    (maps / "open.toml").write_text(MAP.format(sha256=sha256, choices=""))
     return tmp_path
 
 
@@ -121,9 +121,9 @@ def test_a_converted_policy_needs_no_choices(folder: Path) -> None:
 
 def test_a_map_that_needs_nothing_stays_as_it_is(folder: Path) -> None:
     shipped = load_map(folder / "maps" / "none.toml")
-    settled = resolve_policy(shipped)
+    settled = resolve_map_policy(shipped)
     assert settled.text != shipped.text
-    assert resolve_policy(settled) is settled
+    assert resolve_map_policy(settled) is settled
 
 
 @pytest.mark.parametrize(
@@ -136,4 +136,4 @@ def test_a_map_that_needs_nothing_stays_as_it_is(folder: Path) -> None:
 )
 def test_mistakes_in_the_choices_name_line_and_field(old: str, new: str, message: str) -> None:
     with pytest.raises(MapError, match=message):
-        parse_map(MAP.format(sha256="0", import_options=CHOICES).replace(old, new), "m.toml")
+        parse_map(MAP.format(sha256="0", choices=CHOICES).replace(old, new), "m.toml")

@@ -1,0 +1,123 @@
+"""`pdtui dissect`: from a policy to a map and a report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pdtui.cli.shared_options import (
+    core_count,
+    import_option_flags,
+    json_option,
+    progress_bar_or_none,
+    show_result,
+    workers_option,
+)
+from pdtui.policies.weights.import_options import ImportOptions
+
+
+@click.command()
+@click.argument("robot", required=False)
+@click.option(
+    "--env",
+    metavar="ID",
+    help="Instead of ROBOT: an environment registered with Gymnasium, such as Hopper-v5. With a module in "
+    "front (package.module:Thing-v0), that is imported first.",
+)
+@click.option("--policy", default="", help="Weights to dissect; default: the robot's shipped policy.")
+@import_option_flags
+@click.option("--preset", type=click.Choice(["paper", "authors"]), default="paper", show_default=True)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Change a choice of the preset, such as window=hann or length=32; a wrong name lists all.",
+)
+@click.option("--episodes", type=click.IntRange(1, 1000), default=5, show_default=True)
+@click.option("--seed", type=click.IntRange(1000, 2**31 - 1), default=1000, show_default=True)
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="The map; default: maps/ROBOT-dissected.toml."
+)
+@click.option(
+    "--quick", is_flag=True, help="A first look, for about a minute: fewer probes, and hardly a search."
+)
+@click.option(
+    "--report",
+    type=click.Path(path_type=Path),
+    metavar="FILE.rrd",
+    help="The report for the Rerun viewer; default: beside the map, under its name.",
+)
+@click.option(
+    "--figures", type=click.Path(path_type=Path), metavar="FOLDER", help="Draw figures as PNGs, too."
+)
+@click.option("--overwrite", is_flag=True, help="Replace map, report and figures that exist already.")
+@click.option(
+    "--start-from", metavar="MAP", help="Searches begin from this map's behaviors, too: a name or a file."
+)
+@click.option(
+    "--budget",
+    type=click.FloatRange(0, min_open=True),
+    metavar="MINUTES",
+    help="Searches end, with the best so far, when this is over; every unit is screened all the same.",
+)
+@workers_option
+@json_option
+def dissect(
+    robot: str | None,
+    env: str | None,
+    policy: str,
+    import_options: ImportOptions,
+    preset: str,
+    settings: tuple[str, ...],
+    episodes: int,
+    seed: int,
+    output: Path | None,
+    quick: bool,
+    report: Path | None,
+    figures: Path | None,
+    overwrite: bool,
+    budget: float | None,
+    start_from: str | None,
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """Find the units that steer ROBOT: match, then probe, then write a map and a report.
+
+    Interrupted, the same line goes on where it was.
+    """
+    from pdtui.dissection.dissect_into_map import dissect_into_map
+    from pdtui.dissection.dissection_settings import QUICK_DISSECTION
+    from pdtui.pictures.picture_outputs import PictureOutputs
+    from pdtui.robots import check_robot, file_stem, trust_module
+
+    if (robot is None) == (env is None):
+        raise click.UsageError("expected either ROBOT or --env ID")
+    name = str(robot or env)
+    trust_module(name)
+    check_robot(name)
+    output = output or Path("maps") / f"{file_stem(name)}-dissected.toml"
+    wanted = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite)
+    wanted.check()
+    with progress_bar_or_none("dissecting", quiet=as_json) as advance:
+        result = dissect_into_map(
+            name,
+            policy or name,
+            output,
+            import_options=import_options,
+            overwrite=overwrite,
+            preset=preset,
+            settings=settings,
+            episodes=episodes,
+            seed=seed,
+            workers=core_count(workers),
+            budget_minutes=budget,
+            start_from=start_from,
+            effort=QUICK_DISSECTION if quick else None,
+            progress=advance,
+        )
+    written = [str(path) for path in wanted.draw(result.dissection)]
+    show_result({**result.as_dict(), "pictures": written}, as_json, result.table)
+    if not as_json:
+        click.echo(f"wrote {', '.join(written)}")

@@ -1,0 +1,72 @@
+"""`pdtui pursue`: search for a stimulation that does a task."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pdtui.cli.shared_options import (
+    core_count,
+    import_option_flags,
+    json_option,
+    progress_bar_or_none,
+    show_result,
+    workers_option,
+)
+from pdtui.policies.weights.import_options import ImportOptions
+
+
+@click.command()
+@click.argument("robot")
+@click.argument("task")
+@click.option("--policy", default="", help="Weights; default: the robot's shipped policy.")
+@import_option_flags
+@click.option("--seed", type=click.IntRange(1000, 2**31 - 1), default=1000, show_default=True)
+@click.option(
+    "--minutes",
+    type=click.FloatRange(0, min_open=True),
+    default=10.0,
+    show_default=True,
+    help="The search ends, with the best so far, when these are over; every unit is tried all the same.",
+)
+@click.option("--quick", is_flag=True, help="A first look: few units, and hardly a search.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="The map that gets the behavior, new or of the same policy; default: maps/ROBOT-dissected.toml.",
+)
+@workers_option
+@json_option
+def pursue(
+    robot: str,
+    task: str,
+    policy: str,
+    import_options: ImportOptions,
+    seed: int,
+    minutes: float,
+    quick: bool,
+    output: Path | None,
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """Search for units that do a TASK of ROBOT, such as 'walker hop', and write the behavior into a map."""
+    from pdtui.dissection.search_task_into_map import search_task_into_map
+    from pdtui.robots import file_stem
+    from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearchSettings
+
+    with progress_bar_or_none("pursuing", quiet=as_json) as advance:
+        found = search_task_into_map(
+            robot,
+            task,
+            policy or robot,
+            output or Path("maps") / f"{file_stem(robot)}-dissected.toml",
+            import_options=import_options,
+            seed=seed,
+            workers=core_count(workers),
+            minutes=minutes,
+            settings=QUICK_TASK_SEARCH if quick else TaskSearchSettings(),
+            progress=advance,
+        )
+    show_result(found.as_dict(), as_json, found.text)
