@@ -63,8 +63,8 @@ def test_show_tells_the_drive_key_by_key(folder: Path, map_text: str) -> None:
     shown = run("sessions", "show", folder / "a.rrd")
     assert shown.exit_code == 0, shown.output
     lines = [line.split() for line in shown.output.splitlines()]
-    assert ["0.50", "s", "10", "w", "push"] in lines
-    assert ["2.50", "s", "50", "r", "next", "episode"] in lines
+    assert ["0.50", "s", "10", "w", "behavior", "'push'", "latched"] in lines
+    assert ["2.50", "s", "50", "r", "next", "episode", "started"] in lines
     assert all(len(line) <= 80 for line in shown.output.splitlines())
     data = json.loads(run("sessions", "show", folder / "a.rrd", "--json").output)
     session = read_session(folder / "a.rrd")
@@ -157,7 +157,7 @@ def test_compare_names_the_first_step_and_how_far_it_goes(
     data = json.loads(result.output)
     one, two = read_session(folder / "a.rrd"), read_session(other)
     assert (data["first_difference"], data["steps"], data["lengths"]) == (20, 60, [80, 60])
-    assert data["first_event"].startswith("event 1: behavior twitch 0 before step 20 in the first")
+    assert data["first_event"].startswith("event 1: behavior 'twitch' latched before step 20 in the first")
     found = {row["attribute"]: row for row in data["deviations"]}
     change = abs(one.attributes[20:60, 0] - two.attributes[20:60, 0])
     assert found["vx"]["first"] == pytest.approx(change[0])

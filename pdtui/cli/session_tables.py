@@ -10,7 +10,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from pdtui.core.events import Event
+from pdtui.core.events import describe_event
 from pdtui.core.plain_text import file_size, printable
 from pdtui.sessions.session_comparison import AttributeDeviation, SessionComparison
 from pdtui.sessions.session_reader import Session
@@ -113,22 +113,11 @@ def _episodes(summary: SessionSummary) -> list[Table]:
 def _happened(session: Session) -> Table:
     """Events and endings in the order of their steps."""
     table = _table("time", "step", "key", "what", left=("key", "what"))
-    rows = [(event.step, 0, event.key, _told(event)) for event in session.events]
+    rows = [(event.step, 0, event.key, describe_event(event)) for event in session.events]
     rows += [(step, 1, "", f"episode ended: {reason}") for step, reason in session.endings.items()]
     for step, _, key, what in sorted(rows, key=lambda row: row[:2]):
         table.add_row(f"{step * session.info.dt:.2f} s", str(step), _cell(key), _cell(what))
     return table
-
-
-def _told(event: Event) -> str:
-    return {
-        "behavior": event.name,
-        "default": "default",
-        "target": f"{event.name}: target {event.value:g}",
-        "factor": f"{event.name}: magnitudes × {event.value:g}",
-        "reset": "next episode",
-        "rewind": f"rewind to step {event.value:.0f}",
-    }[event.kind]
 
 
 def deviation_table(deviations: Sequence[AttributeDeviation]) -> Table:

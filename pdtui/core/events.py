@@ -1,4 +1,4 @@
-"""Everything that changes a run: events, each stamped with the control step before which it applies."""
+"""Events: everything that changes a run, each stamped with the control step before which it applies."""
 
 from __future__ import annotations
 
@@ -28,6 +28,18 @@ class Event:
     name: str = ""
     value: float = 0.0
     key: str = ""
+
+
+def describe_event(event: Event) -> str:
+    """Say what an event does: the wording of the screen, the session's log and ``pdtui sessions``."""
+    return {
+        "behavior": f"behavior '{event.name}' latched",
+        "default": "all behaviors cleared",
+        "target": f"target of '{event.name}' set to {event.value:.4g}",
+        "factor": f"magnitudes of '{event.name}' set to {event.value:.4g} times the map's",
+        "reset": "next episode started",
+        "rewind": f"rewound to step {event.value:.0f}",
+    }[event.kind]
 
 
 def events_by_step(events: Iterable[Event]) -> dict[int, list[Event]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.core.events import describe_event
 from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.core.step_record import ActiveBehavior, StepRecord
 from pdtui.drive.control_loop import ControlLoop
@@ -49,10 +50,8 @@ class SnapshotBuilder:
         self._involvement += keyed
         self._tallies.add(record.episode, keyed=keyed, cost=record.cost, attributes=record.attributes)
         for event in record.events:
-            if event.kind == "rewind":
-                self.notice = f"rewound to step {int(event.value)}"
-            elif event.kind == "reset":
-                self.notice = f"started over: episode {record.episode}"
+            if event.kind in ("reset", "rewind"):
+                self.notice = describe_event(event)
         if record.ended:
             self.notice = record.ended
         self._last = record

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import SessionError
-from pdtui.core.events import Event
+from pdtui.core.events import Event, describe_event
 from pdtui.sessions.session_reader import Session
 
 
@@ -147,10 +147,7 @@ def _first_event(a: tuple[Event, ...], b: tuple[Event, ...], steps: int) -> str:
 
 
 def _told(event: Event | None) -> str:
-    if event is None:
-        return "none"
-    what = " ".join(part for part in (event.kind, event.name) if part)
-    return f"{what} {event.value:g} before step {event.step}"
+    return "none" if event is None else f"{describe_event(event)} before step {event.step}"
 
 
 def _circumstances(a: Session, b: Session) -> tuple[str, ...]:

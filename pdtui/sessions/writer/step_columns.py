@@ -11,7 +11,7 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
-from pdtui.core.events import Event
+from pdtui.core.events import Event, describe_event
 from pdtui.core.step_record import ActiveBehavior, StepRecord
 from pdtui.sessions.schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION, ActivationsKept
 from pdtui.sessions.writer.component_columns import (
@@ -69,7 +69,7 @@ def event_columns(events: Sequence[Event], first: int) -> list[ComponentColumn]:
     """
     numbers = np.arange(first, first + len(events), dtype=np.int64)
     return [
-        texts(rr.TextLog.descriptor_text(), [describe_event(event) for event in events]),
+        texts(rr.TextLog.descriptor_text(), [_log_line(event) for event in events]),
         texts(rr.TextLog.descriptor_level(), ["INFO"] * len(events)),
         number_lists("number", numbers),
         texts("kind", [event.kind for event in events]),
@@ -88,17 +88,8 @@ def ending_columns(records: Sequence[StepRecord]) -> list[ComponentColumn]:
     ]
 
 
-def describe_event(event: Event) -> str:
-    """The event in words, as the viewer's log shows it."""
-    said = {
-        "behavior": f"behavior '{event.name}'",
-        "default": "nothing is overwritten any more",
-        "target": f"target of '{event.name}' is {event.value:.4g}",
-        "factor": f"magnitudes of '{event.name}' times {event.value:.4g}",
-        "reset": "next episode",
-        "rewind": f"rewinds to step {event.value:.0f}",
-    }[event.kind]
-    return f"[{event.key}] {said}" if event.key else said
+def _log_line(event: Event) -> str:
+    return f"[{event.key}] {describe_event(event)}" if event.key else describe_event(event)
 
 
 def _overwrites(record: StepRecord) -> list[float]:
