@@ -13,6 +13,7 @@ from pdtui.core.errors import PolicyError
 from pdtui.core.units import Stimulation, format_unit, parse_unit
 from pdtui.policies.runtime.action_decoders import decoder_for
 from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.policies.weights.weights_file import load_network
 
 
@@ -162,3 +163,14 @@ def test_errors_name_what_is_there(call: object, message: str) -> None:
     assert callable(call)
     with pytest.raises(PolicyError, match=message):
         call()
+
+
+def test_loading_and_acting_leave_the_callers_threads_alone(weights: Path) -> None:
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    try:
+        policy = load_policy(weights)
+        policy.act(np.zeros(policy.shape))
+        assert torch.get_num_threads() == 3
+    finally:
+        torch.set_num_threads(before)

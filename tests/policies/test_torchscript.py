@@ -141,6 +141,65 @@ def test_code_that_does_more_than_mathematics_is_refused_by_name(
         pdtui.load_policy(path, observations=2)
 
 
+class _MakesZeros(nn.Module):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return torch.tanh(x) + torch.zeros([3_000_000_000])
+
+
+class _MakesFull(nn.Module):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return torch.tanh(x) + torch.full([100_000, 100_000], 1.0)
+
+
+class _MakesRange(nn.Module):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return torch.tanh(x) + torch.arange(10_000_000_000)
+
+
+class _Repeats(nn.Module):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return torch.tanh(x).repeat([100_000, 100_000])
+
+
+class _Broadcasts(nn.Module):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        line = torch.ones([1_000_000])
+        return torch.tanh(x) + (line.unsqueeze(0) * line.unsqueeze(1)).sum()
+
+
+class _GrowsAnInteger(nn.Module):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        number = x.size(0) + 1_000_000_007
+        number = number * number
+        number = number * number
+        return torch.tanh(x) * number
+
+
+class _DividesByZero(nn.Module):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return torch.tanh(x) * (7 // (x.size(0) - 2))
+
+
+@pytest.mark.parametrize(
+    ("module", "message"),
+    [
+        (_MakesZeros(), "torch.zeros would create 3000000000 elements, expected at most 67108864"),
+        (_MakesFull(), "torch.full would create 10000000000 elements"),
+        (_MakesRange(), "torch.arange would create 10000000000 elements"),
+        (_Repeats(), "torch.repeat would create 20000000000 elements"),
+        (_Broadcasts(), "torch.mul would create 1000000000000 elements"),
+        (_GrowsAnInteger(), "torch.mul gives an integer of more than 64 bits"),
+        (_DividesByZero(), "cannot compute torch.floordiv: integer division or modulo by zero"),
+    ],
+)
+def test_code_that_takes_too_much_is_refused_before_it_does(
+    module: nn.Module, message: str, tmp_path: Path
+) -> None:
+    path = _script(module, tmp_path / "large.pt")
+    with pytest.raises(PolicyError, match=message):
+        pdtui.load_policy(path, observations=2)
+
+
 def _rewrite(path: Path, change: Callable[[str, bytes], bytes]) -> Path:
     other = path.with_name("other.pt")
     with zipfile.ZipFile(path) as source, zipfile.ZipFile(other, "w") as target:

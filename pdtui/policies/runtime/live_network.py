@@ -40,8 +40,6 @@ def policy_from_network(
 ) -> Policy:
     """A policy that acts with the network as it is now; later changes of the weights do not reach it.
 
-    PyTorch is set to one thread: at this size more threads only cost, and sums keep their order.
-
     Args:
         module: the network, on the CPU; what it has to be like is said at `Policy`.
         observation_space: of the world, for the shape of the observation.
@@ -62,7 +60,6 @@ def policy_from_network(
         raise PolicyError(f"{owner}: expected the shape of the observation, or the robot that gives it")
     if decode is None:
         decode = categorical if isinstance(action_space, spaces.Discrete) else mean_action
-    torch.set_num_threads(1)
     return Policy(
         module,
         shape,

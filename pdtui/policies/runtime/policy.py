@@ -17,6 +17,7 @@ from pdtui.policies.runtime import recurrent_state
 from pdtui.policies.runtime.action_decoders import Decoder, mean_action
 from pdtui.policies.runtime.fast_mlp import fast_mlp_of
 from pdtui.policies.runtime.recurrent_state import PolicyState
+from pdtui.policies.runtime.torch_threads import one_thread
 from pdtui.policies.runtime.unit_hooks import UnitHooks
 from pdtui.policies.runtime.unit_layers import hidden_modules, name_layers
 
@@ -81,15 +82,16 @@ class Policy:
         self._decode, self._batched = decode, batched
         self._initial = None if initial_state is None else recurrent_state.clone_state(initial_state)
         self._state = self._initial
-        self._taps = UnitHooks()
+        self._hooks = UnitHooks()
         plain = hidden is None and initial_state is None and not batched and len(self.shape) == 1
-        self._chain = fast_mlp_of(self.module, self.shape[0]) if plain else None
-        if self._chain is not None:
-            self.layers = LayerWidths(self._chain.layers, [])
-        else:
-            names = self._watch(hidden)
-            self._try()
-            self.layers = LayerWidths((output.size for output in self._taps.outputs), names)
+        with one_thread():
+            self._fast_mlp = fast_mlp_of(self.module, self.shape[0]) if plain else None
+            if self._fast_mlp is not None:
+                self.layers = LayerWidths(self._fast_mlp.layers, [])
+            else:
+                names = self._watch_units(hidden)
+                self._try_network()
+                self.layers = LayerWidths((output.size for output in self._hooks.outputs), names)
         if not self.layers:
             raise PolicyError(
                 f"{name}: the network has no hidden layer to stimulate: no submodule is an activation "
@@ -131,17 +133,17 @@ class Policy:
             self._initial, (torch.from_numpy(array.copy()) for array in state)
         )
 
-    def _watch(self, hidden: Sequence[str] | None) -> list[list[str]]:
+    def _watch_units(self, hidden: Sequence[str] | None) -> list[list[str]]:
         chosen = hidden_modules(self.module, hidden, self.name)
-        names = name_layers(self.module, chosen, self._try)
+        names = name_layers(self.module, chosen, self._try_network)
         for child in chosen:
-            child.register_forward_hook(lambda _module, _inputs, output: self._taps.replace(output))
+            child.register_forward_hook(lambda _module, _inputs, output: self._hooks.replace(output))
         return names
 
-    def _try(self) -> None:
-        self._taps.begin()
+    def _try_network(self) -> None:
+        self._hooks.begin()
         try:
-            self._call(np.zeros(self.shape))
+            self._run_network(np.zeros(self.shape))
             recurrent_state.check_state(self._initial, self._state)
         except PolicyError as error:
             raise PolicyError(f"{self.name}: {error}") from error
@@ -153,7 +155,7 @@ class Policy:
                 f"{'with' if self.recurrent else 'without'} a hidden state): {reason}"
             ) from error
 
-    def _call(self, observation: NDArray[Any]) -> torch.Tensor:
+    def _run_network(self, observation: NDArray[Any]) -> torch.Tensor:
         x = torch.from_numpy(observation.astype(np.float32))
         if self._batched:
             x = x.unsqueeze(0)
@@ -163,7 +165,7 @@ class Policy:
                 return output
             output, state = self.module(x, self._state)
         self._state = recurrent_state.rebuild_state(
-            state, iter(self._taps.natural_of(recurrent_state.flatten_state(state)))
+            state, iter(self._hooks.natural_of(recurrent_state.flatten_state(state)))
         )
         return output
 
@@ -187,13 +189,14 @@ class Policy:
             raise PolicyError(
                 f"{self.name}: expected an observation of shape {self.shape}, got {observation.shape}"
             )
-        if self._chain is not None:
-            output, activations, found = self._chain.run(observation, stimulation)
-        else:
-            self._taps.begin(stimulation)
-            output = self._call(observation)
-            activations, found = np.concatenate(self._taps.outputs), self._taps.natural
-        action = self._decode(output, rng)
+        with one_thread():
+            if self._fast_mlp is not None:
+                output, activations, found = self._fast_mlp.run(observation, stimulation)
+            else:
+                self._hooks.begin(stimulation)
+                output = self._run_network(observation)
+                activations, found = np.concatenate(self._hooks.outputs), self._hooks.natural
+            action = self._decode(output, rng)
         try:
             natural = tuple([found[unit] for unit in stimulation.units])
         except KeyError as error:

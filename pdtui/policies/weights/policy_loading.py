@@ -7,8 +7,6 @@ from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
-import torch
-
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers import import_network
 from pdtui.policies.runtime.action_decoders import decoder_for
@@ -38,8 +36,7 @@ def load_policy(
     """Load a weights file, or a shipped policy by its name.
 
     A file that pdtui did not write is imported (`pdtui.policies.importers`); its policy belongs to no robot
-    and fits every world with its shapes. PyTorch is set to one thread: at this size more threads only cost,
-    and sums keep their order.
+    and fits every world with its shapes.
 
     Args:
         name: file or shipped name.
@@ -62,7 +59,6 @@ def load_policy(
     if spaces is not None:
         discrete = spec.head == "categorical"
         spaces.check(str(path), spec.observations, spec.action_size, spec.actions if discrete else 0)
-    torch.set_num_threads(1)
     return Policy(network, spec.observations, decode=decoder_for(network), name=path.stem, sha256=digest)
 
 

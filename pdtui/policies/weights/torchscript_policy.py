@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.runtime.action_decoders import categorical
@@ -32,7 +31,6 @@ def load_torchscript_policy(
     if import_options != NO_OPTIONS:
         raise PolicyError(f"{path}: TorchScript states its whole computation; expected no choices")
     module, digest = read_torchscript(path), hash_file(path)
-    torch.set_num_threads(1)
     shape = spaces.shape or (spaces.observations,)
     problems: list[str] = []
     for batched in (False, True):
