@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
 
-EventKind = Literal["behavior", "default", "target", "factor", "reset", "rewind"]
+from pdtui.core.key_table import EVENT_WORDINGS, EventKind
 
 
 @dataclass(frozen=True)
@@ -29,17 +28,15 @@ class Event:
     value: float = 0.0
     key: str = ""
 
+    @property
+    def jumps(self) -> bool:
+        """Whether the robot is put into another state than the one it was in."""
+        return EVENT_WORDINGS[self.kind].jumps
+
 
 def describe_event(event: Event) -> str:
     """Say what an event does: the wording of the screen, the session's log and ``pdtui sessions``."""
-    return {
-        "behavior": f"behavior '{event.name}' latched",
-        "default": "all behaviors cleared",
-        "target": f"target of '{event.name}' set to {event.value:.4g}",
-        "factor": f"magnitudes of '{event.name}' set to {event.value:.4g} times the map's",
-        "reset": "next episode started",
-        "rewind": f"rewound to step {event.value:.0f}",
-    }[event.kind]
+    return EVENT_WORDINGS[event.kind].sentence.format(name=event.name, value=event.value)
 
 
 def events_by_step(events: Iterable[Event]) -> dict[int, list[Event]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import string
 
-from pdtui.stimulation.stimulation_map import RESERVED_KEYS
+from pdtui.core.key_table import RESERVED_KEYS
 
 
 class KeyAllocator:

@@ -7,6 +7,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -117,6 +118,8 @@ class ControlLoop:
         if self.step % SNAPSHOT_EVERY == 0:
             self._remember()
         for event in events:
+            if event.step != self.step:
+                raise KeystrokeError(f"event for step {event.step} given to step {self.step}")
             self._apply(event)
         stimulation = self.latch.stimulate(self.attributes)
         if self.robot.set_commands({**self.robot.commands, **self.latch.commands}):
@@ -157,18 +160,8 @@ class ControlLoop:
         self._ended = bool(ended)
         return record
 
-    def _apply(self, event: Event) -> None:
-        if event.step != self.step:
-            raise KeystrokeError(f"event for step {event.step} given to step {self.step}")
-        match event.kind:
-            case "reset":
-                self._start_episode()
-            case "rewind":
-                self._rewind(event.value)
-            case _:
-                self._latch_event(event)
-
-    def _latch_event(self, event: Event) -> None:
+    def _apply(self, event: Event, *, rehearsing: bool = False) -> None:
+        """Do what the event says; in a rehearsal, only to the latch."""
         match event.kind:
             case "behavior":
                 self.latch.press(event.name, self.attributes)
@@ -178,6 +171,14 @@ class ControlLoop:
                 self.latch.set_target(event.name, event.value)
             case "factor":
                 self.latch.set_factor(event.name, event.value)
+            case "reset" if rehearsing:
+                self.latch.clear()
+            case "reset":
+                self._start_episode()
+            case "rewind" if rehearsing:
+                self.latch.load(self._moments[int(event.value)].latch)
+            case "rewind":
+                self._rewind(event.value)
             case _:
                 raise KeystrokeError(f"step {event.step}: unknown event '{event.kind}'")
 
@@ -189,18 +190,10 @@ class ControlLoop:
         """
         kept = self.latch.save()
 
-        def rehearse(event: Event) -> None:
-            if event.kind == "reset":
-                self.latch.clear()
-            elif event.kind == "rewind":
-                self.latch.load(self._moments[int(event.value)].latch)
-            else:
-                self._latch_event(event)
-
         if self._ended:
             self.latch.clear()  # the next step begins an episode
         try:
-            yield rehearse
+            yield partial(self._apply, rehearsing=True)
         finally:
             self.latch.load(kept)
 

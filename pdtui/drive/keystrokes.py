@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pdtui.core.errors import KeystrokeError
 from pdtui.core.events import Event
+from pdtui.core.key_table import RUN_KEYS, FixedKey
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -17,45 +18,34 @@ MAX_BYTES = 10_000_000
 FACTOR_STEP = 1.25
 REWIND_SECONDS = 3.0
 _LINE = re.compile(r"(\d{1,9})\s+(\S+)")
-_ARROWS = {"up": 1, "left": 1, "down": -1, "right": -1}
 
 
 def run_keys(stimulation_map: StimulationMap) -> tuple[str, ...]:
-    """Every key that can change a run driven with this map."""
-    fixed = ("up", "down", "left", "right", "plus", "minus", "r", "backspace")
-    return (
-        stimulation_map.default_key,
-        *(behavior.key for behavior in stimulation_map.behaviors.values()),
-        *fixed,
-    )
+    """Return every key that can change a run driven with this map."""
+    behaviors = (behavior.key for behavior in stimulation_map.behaviors.values())
+    return stimulation_map.default_key, *behaviors, *RUN_KEYS
 
 
 def key_event(key: str, loop: ControlLoop) -> Event | str:
-    """The event that a key means in the loop's present state, or a sentence why it means nothing."""
-    step = loop.step
+    """Return the event that a key means in the loop's present state, or a sentence why it means nothing."""
     if key == loop.map.default_key:
-        return Event(step, "default", key=key)
+        return Event(loop.step, "default", key=key)
     behavior = loop.map.behavior_of_key(key)
     if behavior is not None:
-        return Event(step, "behavior", behavior.name, key=key)
-    active = loop.latch.active
-    if key in _ARROWS:
-        return _move_target(key, loop, active)
-    if key in ("plus", "minus"):
-        if not active:
-            return "no behavior is latched whose strength could change"
-        latest = active[-1]
-        change = FACTOR_STEP if key == "plus" else 1.0 / FACTOR_STEP
-        return Event(step, "factor", latest.name, latest.factor * change, key)
-    if key == "r":
-        return Event(step, "reset", key=key)
-    if key == "backspace":
-        wanted = step - round(REWIND_SECONDS / loop.robot.control_dt)
-        earlier = [kept for kept in loop.rewindable if kept <= wanted]
-        if not earlier:
-            return "nothing to rewind to yet"
-        return Event(step, "rewind", value=float(earlier[-1]), key=key)
-    return f"no behavior has key '{key}'"
+        return Event(loop.step, "behavior", behavior.name, key=key)
+    if key not in RUN_KEYS:
+        return f"no behavior has key '{key}'"
+    row = RUN_KEYS[key]
+    match row.event:
+        case "target":
+            return _target_event(row, loop)
+        case "factor":
+            return _factor_event(row, loop)
+        case "rewind":
+            return _rewind_event(row, loop)
+        case kind:
+            assert kind is not None
+            return Event(loop.step, kind, key=key)
 
 
 def key_meanings(keys: Iterable[str], loop: ControlLoop) -> list[Event | str]:
@@ -69,9 +59,24 @@ def key_meanings(keys: Iterable[str], loop: ControlLoop) -> list[Event | str]:
     return meanings
 
 
-def _move_target(key: str, loop: ControlLoop, active: tuple[ActiveBehavior, ...]) -> Event | str:
-    """Left and right prefer a heading, up and down anything else, where both are held."""
-    held = [view for view in active if view.target is not None]
+def _factor_event(row: FixedKey, loop: ControlLoop) -> Event | str:
+    if not loop.latch.active:
+        return "no behavior is latched whose strength could change"
+    latest = loop.latch.active[-1]
+    return Event(loop.step, "factor", latest.name, latest.factor * FACTOR_STEP**row.direction, row.key)
+
+
+def _rewind_event(row: FixedKey, loop: ControlLoop) -> Event | str:
+    wanted = loop.step - round(REWIND_SECONDS / loop.robot.control_dt)
+    earlier = [kept for kept in loop.rewindable if kept <= wanted]
+    if not earlier:
+        return "nothing to rewind to yet"
+    return Event(loop.step, "rewind", value=float(earlier[-1]), key=row.key)
+
+
+def _target_event(row: FixedKey, loop: ControlLoop) -> Event | str:
+    """Where several targets are held, left and right prefer a heading, up and down anything else."""
+    held = [view for view in loop.latch.active if view.target is not None]
     if not held:
         return "no target is held; a behavior of mode pid holds one"
 
@@ -80,11 +85,12 @@ def _move_target(key: str, loop: ControlLoop, active: tuple[ActiveBehavior, ...]
         assert pid is not None
         return loop.robot.attributes[loop.robot.attribute_index(pid.attribute)].wraps
 
-    chosen = next((view for view in held if turns(view) == (key in ("left", "right"))), held[-1])
+    sideways = row.key in ("left", "right")
+    chosen = next((view for view in held if turns(view) == sideways), held[-1])
     pid = loop.map.behaviors[chosen.name].pid
     assert pid is not None
     assert chosen.target is not None
-    return Event(loop.step, "target", chosen.name, chosen.target + _ARROWS[key] * pid.step, key)
+    return Event(loop.step, "target", chosen.name, chosen.target + row.direction * pid.step, row.key)
 
 
 def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, list[str]]:

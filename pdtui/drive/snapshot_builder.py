@@ -37,7 +37,7 @@ class SnapshotBuilder:
 
     def see(self, record: StepRecord) -> None:
         """Take in one control step."""
-        began = record.episode != self._episode or any(event.kind == "rewind" for event in record.events)
+        began = record.episode != self._episode or any(event.jumps for event in record.events)
         if began:
             self._restarted, self._path = True, []
             self._episode = record.episode
@@ -50,7 +50,7 @@ class SnapshotBuilder:
         self._involvement += keyed
         self._tallies.add(record.episode, keyed=keyed, cost=record.cost, attributes=record.attributes)
         for event in record.events:
-            if event.kind in ("reset", "rewind"):
+            if event.jumps:
                 self.notice = describe_event(event)
         if record.ended:
             self.notice = record.ended

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 
 from pdtui.core.errors import SessionError
-from pdtui.core.events import Event, EventKind
+from pdtui.core.events import Event
+from pdtui.core.key_table import EVENT_WORDINGS
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.drive_properties import info_from_properties
 from pdtui.sessions.rrd.entity_rows import EntityRows
@@ -109,8 +109,8 @@ def _events(found: EntityRows) -> tuple[Event, ...]:
     events = []
     for row in order:
         kind = kinds[row]
-        if kind not in get_args(EventKind):
-            raise SessionError(f"unknown event '{kind[:40]}'; there are {', '.join(get_args(EventKind))}")
+        if kind not in EVENT_WORDINGS:
+            raise SessionError(f"unknown event '{kind[:40]}'; there are {', '.join(EVENT_WORDINGS)}")
         events.append(Event(int(found.steps[row]), kind, names[row], float(values[row]), keys[row]))
     return tuple(events)
 

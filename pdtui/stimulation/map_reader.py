@@ -10,11 +10,11 @@ from typing import cast, get_args
 from pdtui.core.attributes import AimDirection, BehaviorAim
 from pdtui.core.bounded_read import read_at_most
 from pdtui.core.errors import MapError
+from pdtui.core.key_table import RESERVED_KEYS
 from pdtui.core.units import ADDRESS
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions
 from pdtui.stimulation.map_table_reader import NUMBER, MapTableReader
 from pdtui.stimulation.stimulation_map import (
-    RESERVED_KEYS,
     SCHEMA,
     Behavior,
     BehaviorMode,

@@ -11,24 +11,6 @@ from pdtui.core.units import parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 
 SCHEMA = 1
-RESERVED_KEYS: dict[str, str] = {
-    "up": "raises the target",
-    "down": "lowers the target",
-    "left": "turns the target left",
-    "right": "turns the target right",
-    "plus": "strengthens the behavior",
-    "minus": "weakens the behavior",
-    "r": "starts over",
-    "backspace": "rewinds",
-    "p": "pauses",
-    "n": "steps once",
-    "comma": "slower",
-    "full_stop": "faster",
-    "question_mark": "help",
-    "v": "changes the view",
-    "q": "quits",
-}
-
 BehaviorMode = Literal["fixed", "pid"]
 
 

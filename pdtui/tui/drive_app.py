@@ -20,7 +20,7 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import key_name
 from pdtui.tui.help_screen import HelpScreen
 from pdtui.tui.panel import Panel
-from pdtui.tui.screen_keys import BINDINGS, SHORT, drive_keys
+from pdtui.tui.screen_keys import BINDINGS, HINTS, map_keys
 from pdtui.tui.size_notice import SizeNotice, is_too_small
 from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
 from pdtui.tui.theme import THEME
@@ -65,7 +65,7 @@ class DriveApp(App[str]):
     ) -> None:
         super().__init__()
         self.link, self.map, self.fps, self.watching = link, stimulation_map, fps, watching
-        self._drive_keys = drive_keys(stimulation_map)
+        self._map_keys = map_keys(stimulation_map)
         self._notice_until = 0.0
         self._help: HelpScreen | None = None
         self.register_theme(THEME)
@@ -132,13 +132,13 @@ class DriveApp(App[str]):
         found: dict[str, tuple[str, str]] = {}
         for key, active in self.screen_stack[0].active_bindings.items():
             binding = active.binding
-            if active.node is self and binding.id and (binding.priority or key not in self._drive_keys):
+            if active.node is self and binding.id and (binding.priority or key not in self._map_keys):
                 found.setdefault(binding.id, (key, binding.description))
         return {name: found[name] for binding in BINDINGS if (name := binding.id) in found}
 
     def _show_keys(self) -> None:
         now = self.keys_now
-        shown = tuple((key_name(now[name][0]), says) for name, says in SHORT.items() if name in now)
+        shown = tuple((key_name(now[name][0]), says) for name, says in HINTS.items() if name in now)
         self.query_one(KeyLine).keys = shown
         leave = now.get("quit", now["quit_always"])[0]
         self.query_one(NoticeLine).hints = f"{key_name(leave)} quits"
@@ -165,7 +165,7 @@ class DriveApp(App[str]):
 
     def on_key(self, event: events.Key) -> None:
         """Keys of the map come before all bindings; a key that nobody has is named."""
-        if event.key in self._drive_keys:
+        if event.key in self._map_keys:
             event.prevent_default()
             self.action_run_key(event.key)
         elif not self.screen.is_modal and event.key not in self.screen.active_bindings:

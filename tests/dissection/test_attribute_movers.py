@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.core.attributes import Attribute
+from pdtui.core.key_table import RESERVED_KEYS
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
 from pdtui.dissection.dissection_settings import QUICK_DISSECTION
 from pdtui.dissection.key_allocator import KeyAllocator
@@ -15,7 +16,6 @@ from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_preset
 from pdtui.spectra.monitor import MonitoredEpisode, collect_start_states, monitor_episodes
-from pdtui.stimulation.stimulation_map import RESERVED_KEYS
 from tests.wired_policy import WIRED_MOTOR, WIRED_UNIT
 
 

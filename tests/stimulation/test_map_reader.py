@@ -44,7 +44,7 @@ def test_a_map_is_read_whole(small_map: StimulationMap, map_text: str) -> None:
         ("period = 0.5", "perod = 0.5", r"m\.toml:31: behavior 2: field 'perod' is not a field"),
         ('key = "t"', 'key = "w"', "key 'w' is bound to both behavior 'push' and behavior 'twitch'"),
         ('key = "t"', 'key = "space"', "key 'space' is bound to both the default key and behavior 'twitch'"),
-        ('key = "t"', 'key = "q"', "behavior 'twitch': key 'q' is taken: it quits"),
+        ('key = "t"', 'key = "q"', "behavior 'twitch': key 'q' is taken: it ends the drive and quits"),
         ('name = "twitch"', 'name = "push"', r"m\.toml:27: .*'push' is taken by another behavior"),
         ('together = ["push"]', 'together = ["gone"]', "together names 'gone', which does not exist"),
         ('mode = "pid"', 'mode = "magic"', r"m\.toml:38: .*'mode' expected one of fixed, pid, found 'magic'"),

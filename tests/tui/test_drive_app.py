@@ -11,12 +11,13 @@ import pytest
 
 from pdtui.core.errors import PdtuiError
 from pdtui.core.events import Event
+from pdtui.core.key_table import RESERVED_KEYS
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.drive.snapshot_builder import SnapshotBuilder
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
-from pdtui.stimulation.stimulation_map import RESERVED_KEYS, Behavior, StimulationMap
+from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 from pdtui.tui.help_screen import HelpScreen
 from pdtui.tui.panel import Panel
 from pdtui.tui.screen_keys import BINDINGS

@@ -92,9 +92,7 @@ class ViewerData:
                     self._states[state] = tuple(behavior.name for behavior in behaviors)
                     self._new_state = True
             # The path does not run through the air to where an episode starts or a rewind leads.
-            self._jumped |= record.episode != self._episode or any(
-                event.kind in ("reset", "rewind") for event in record.events
-            )
+            self._jumped |= record.episode != self._episode or any(event.jumps for event in record.events)
             self._episode = record.episode
             if record.step % self._draw_every == 0:
                 self._drawn.append((record.step, record.poses, state, self._jumped))

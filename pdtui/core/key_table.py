@@ -1,0 +1,89 @@
+"""The one table of keys and of the events that they cause; a new key is a new row here.
+
+The screen's bindings, key line and help, the keys that maps may not use, the keys that keystroke files may
+name, and the wording of events in sessions are all derived from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+EventKind = Literal["behavior", "default", "target", "factor", "reset", "rewind"]
+
+
+@dataclass(frozen=True)
+class EventWording:
+    """How the events of one kind are described.
+
+    Attributes:
+        sentence: may contain ``{name}`` and ``{value}`` of the event.
+        jumps: whether the robot is put into another state, so that paths end there and the screen says so.
+    """
+
+    sentence: str
+    jumps: bool = False
+
+
+EVENT_WORDINGS: dict[EventKind, EventWording] = {
+    "behavior": EventWording("behavior '{name}' latched"),
+    "default": EventWording("all behaviors cleared"),
+    "target": EventWording("target of '{name}' set to {value:.4g}"),
+    "factor": EventWording("magnitudes of '{name}' set to {value:.4g} times the map's"),
+    "reset": EventWording("next episode started", jumps=True),
+    "rewind": EventWording("rewound to step {value:.0f}", jumps=True),
+}
+
+
+@dataclass(frozen=True)
+class FixedKey:
+    """A key with the same meaning for every map, which therefore no map may use.
+
+    Attributes:
+        id: name of its binding, under which users can choose another key.
+        key: Textual's name of the key.
+        says: what it does, as the end of a sentence that starts with "it".
+        event: kind of the event by which it changes the run; None if it changes only what is seen.
+        direction: 1 for up, left and more; −1 for down, right and less.
+        action: Textual action of a key that changes only what is seen.
+        hint: its word in the key line; empty to leave it out.
+        hint_rank: place in the key line, which a narrow terminal cuts short.
+    """
+
+    id: str
+    key: str
+    says: str
+    event: EventKind | None = None
+    direction: int = 0
+    action: str = ""
+    hint: str = ""
+    hint_rank: int = 0
+
+
+FIXED_KEYS = (
+    FixedKey("target_up", "up", "raises the target", "target", 1),
+    FixedKey("target_down", "down", "lowers the target", "target", -1),
+    FixedKey("target_left", "left", "turns the target left", "target", 1),
+    FixedKey("target_right", "right", "turns the target right", "target", -1),
+    FixedKey(
+        "stronger", "plus", "strengthens the latched behavior", "factor", 1, hint="stronger", hint_rank=6
+    ),
+    FixedKey("weaker", "minus", "weakens the latched behavior", "factor", -1, hint="weaker", hint_rank=7),
+    FixedKey("reset", "r", "starts the next episode", "reset", hint="reset", hint_rank=4),
+    FixedKey("rewind", "backspace", "rewinds by three seconds", "rewind", hint="rewind", hint_rank=5),
+    FixedKey("pause", "p", "pauses or resumes", action="pace('pause')", hint="pause", hint_rank=2),
+    FixedKey("step", "n", "runs a single control step", action="pace('step')", hint="step", hint_rank=8),
+    FixedKey("slower", "comma", "halves the speed", action="pace('slower')", hint="slower", hint_rank=9),
+    FixedKey(
+        "faster", "full_stop", "doubles the speed", action="pace('faster')", hint="faster", hint_rank=10
+    ),
+    FixedKey(
+        "view", "v", "switches between side view and top view", action="toggle_view", hint="view", hint_rank=3
+    ),
+    FixedKey("help", "question_mark", "shows all keys", action="help", hint="help", hint_rank=0),
+    FixedKey("quit", "q", "ends the drive and quits", action="leave", hint="quit", hint_rank=1),
+)
+RUN_KEYS = {row.key: row for row in FIXED_KEYS if row.event is not None}
+"""Keys that change a run, by Textual's name."""
+RESERVED_KEYS = {row.key: row.says for row in FIXED_KEYS}
+"""What each key that no map may use does, by Textual's name."""

@@ -1,0 +1,63 @@
+"""Everything that follows from a row of the key table does follow from it."""
+
+from __future__ import annotations
+
+import pytest
+
+from pdtui.core.errors import MapError
+from pdtui.core.events import Event, describe_event
+from pdtui.core.key_table import EVENT_WORDINGS, FIXED_KEYS, RUN_KEYS, FixedKey
+from pdtui.drive.control_loop import ControlLoop
+from pdtui.drive.keystrokes import key_event, run_keys
+from pdtui.policies.runtime.policy import Policy
+from pdtui.robots import make_robot
+from pdtui.stimulation.map_reader import parse_map
+from pdtui.stimulation.stimulation_map import StimulationMap
+from pdtui.tui.cell_text import key_name
+from pdtui.tui.help_screen import HelpScreen
+from tests.tui.conftest import MakeApp
+from tests.tui.screens import played
+
+
+@pytest.fixture(scope="module")
+def driven(policy: Policy, small_map: StimulationMap) -> ControlLoop:
+    """A loop in a state in which every key means something."""
+    loop = ControlLoop(make_robot("ant"), policy, small_map, 3)
+    while loop.step < 75:
+        loop.advance()
+    loop.advance([Event(75, "behavior", "hold heading", key="h")])
+    return loop
+
+
+@pytest.mark.parametrize("row", FIXED_KEYS, ids=lambda row: row.id)
+def test_a_map_may_not_use_the_key(row: FixedKey, map_text: str) -> None:
+    with pytest.raises(MapError, match=f"behavior 'twitch': key '{row.key}' is taken: it {row.says}"):
+        parse_map(map_text.replace('key = "t"', f'key = "{row.key}"'), "small.toml")
+
+
+@pytest.mark.parametrize("row", RUN_KEYS.values(), ids=lambda row: row.id)
+def test_a_key_that_changes_a_run_makes_its_event(
+    row: FixedKey, driven: ControlLoop, small_map: StimulationMap
+) -> None:
+    event = key_event(row.key, driven)
+    assert isinstance(event, Event)
+    assert (event.kind, event.key, event.step) == (row.event, row.key, driven.step)
+    assert row.key in run_keys(small_map)
+
+
+def test_every_event_is_worded() -> None:
+    said = {kind: describe_event(Event(7, kind, "spin", 40.0)) for kind in EVENT_WORDINGS}
+    assert all(said.values())
+    assert said["rewind"] == "rewound to step 40"
+    assert said["factor"] == "magnitudes of 'spin' set to 40 times the map's"
+
+
+async def test_the_help_lists_every_key_with_its_sentence(make_app: MakeApp) -> None:
+    app, link = make_app()
+    async with app.run_test(size=(120, 60)) as pilot:
+        await played(pilot, link)
+        await pilot.press("question_mark")
+        assert isinstance(app.screen, HelpScreen)
+        lines = [strip.text for strip in app.screen._compositor.render_strips()]
+    for row in FIXED_KEYS:
+        assert any(f" {key_name(row.key)} " in line and row.says in line for line in lines), row.id
