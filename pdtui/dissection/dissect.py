@@ -131,6 +131,7 @@ def dissect(
             policy_hash=network.sha256,
             layers=network.layers,
             attributes=world.attributes,
+            goals=world.goals,
             dt=world.control_dt,
             preset=spectrum,
             seed=seed,

@@ -12,6 +12,7 @@ from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.sample_episode import SampleEpisode
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.effect_probe import EffectCurves
+from pdtui.robots.robot_goals import RobotGoals
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.spectra.matching import Discrepancies
@@ -31,6 +32,7 @@ class Dissection:
         policy_hash: SHA-256 of the weights.
         layers: widths of the hidden layers.
         attributes: of the robot.
+        goals: of the robot: what was looked for.
         dt: s per control step.
         preset: of the spectra.
         seed: everything random came from it.
@@ -55,6 +57,7 @@ class Dissection:
     policy_hash: str
     layers: tuple[int, ...]
     attributes: tuple[Attribute, ...]
+    goals: RobotGoals
     dt: float
     preset: MatchingPreset
     seed: int

@@ -12,7 +12,8 @@ from pdtui.core.units import Stimulation
 from pdtui.dissection.dissection_settings import DissectionSettings
 from pdtui.probing.effect_probe import EffectCurves, EffectProber
 from pdtui.robots.robot import Robot
-from pdtui.search.behavior_goals import STANDING, BehaviorGoal, goals_for
+from pdtui.robots.robot_goals import BehaviorGoal
+from pdtui.search.behavior_goals import STANDING, reachable_goals
 from pdtui.search.behavior_search import BehaviorSearch, BehaviorSearchResult, SearchStartStates
 from pdtui.search.controller_search import ControllerGoal, ControllerSearch, ControllerSearchResult
 from pdtui.search.imprint_candidates import build_imprint_candidates
@@ -64,7 +65,7 @@ class DissectionSearches:
         self, screen: EffectCurves, refined: EffectCurves, starts: SearchStartStates
     ) -> tuple[tuple[BehaviorSearchResult, ...], tuple[ControllerSearchResult, ...]]:
         """A behavior for each goal, and a controller for each attribute, that means anything here."""
-        goals, targets = goals_for(self.world.attributes, refined.unperturbed), self._targets(refined)
+        goals, targets = reachable_goals(self.world, refined.unperturbed), self._targets(refined)
         if not goals and not targets:
             return (), ()
         pool = self.pool(starts)
@@ -105,13 +106,19 @@ class DissectionSearches:
         return SharedCandidates(self.prober, plans, few, sizes.quick_steps, self.stage("sets of units"))
 
     def _targets(self, sweep: EffectCurves) -> list[ControllerGoal]:
-        """Heading and speed, where the robot has them; a robot that stands has no speed to hold."""
+        """What the robot's goals hold; a robot that stands has no share of its speed to hold."""
         names = [attribute.name for attribute in self.world.attributes]
-        wanted = [ControllerGoal("yaw", (-0.8, -0.4, 0.4, 0.8), True)] if "yaw" in names else []
-        if "speed" in names:
-            usual = float(np.mean(sweep.unperturbed[:, names.index("speed")]))
+        wanted = []
+        for goal in self.world.goals.holds:
+            if goal.attribute not in names:
+                continue
+            if goal.relative_to == "start":
+                wanted.append(ControllerGoal(goal.attribute, goal.targets, True))
+                continue
+            usual = float(np.mean(sweep.unperturbed[:, names.index(goal.attribute)]))
             if usual > STANDING:
-                wanted.append(ControllerGoal("speed", (0.4 * usual, 0.7 * usual), False))
+                targets = tuple(share * usual for share in goal.targets)
+                wanted.append(ControllerGoal(goal.attribute, targets, False))
         return wanted
 
     def _holds(

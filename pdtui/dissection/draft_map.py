@@ -12,24 +12,13 @@ from pdtui.core.units import NO_STIMULATION, Stimulation, format_unit
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.key_allocator import KeyAllocator
 from pdtui.probing.confirmation import PrimitiveConfirmation, best_probed
+from pdtui.robots.robot_goals import HoldGoal
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.stimulation.map_toml import block_table, inline_table, outputs_table, table_array
 from pdtui.stimulation.map_writer import effect_table
 from pdtui.stimulation.stimulation_map import SCHEMA
 
-_PRIMITIVES = {
-    "vx": "forward",
-    "vy": "sidestep",
-    "speed": "pace",
-    "yaw": "heading",
-    "yaw rate": "turn",
-    "height": "height",
-}
-_HOLDS = {
-    "yaw": ("hold heading", "h", "keeps the heading that the arrow keys set"),
-    "speed": ("hold speed", "g", "keeps the speed that the arrow keys set"),
-}
 # Below, v = c ρ would need a magnitude that says nothing: such a behavior names the unit instead.
 _USEFUL_RHO = 0.1
 _LISTED = 6
@@ -88,7 +77,7 @@ def _header(dissection: Dissection, steered: set[str]) -> list[str]:
     for held in dissection.controllers:
         if not held.holds:
             lines.append(
-                f"Not found: {_HOLDS[held.pid.attribute][0]}. The best controller is off by "
+                f"Not found: {_hold_goal(held, dissection).name}. The best controller is off by "
                 f"{held.error:.2f}, without {held.uncontrolled:.2f}; it fell on {held.falls:.0%}."
             )
     return lines
@@ -117,7 +106,7 @@ def _primitives(dissection: Dissection) -> list[dict[str, Any]]:
 def _nameable(dissection: Dissection) -> dict[str, str]:
     """Attributes that get a primitive, and its name."""
     names = [attribute.name for attribute in dissection.attributes]
-    usual = {attribute: name for attribute, name in _PRIMITIVES.items() if attribute in names}
+    usual = {attribute: name for attribute, name in dissection.goals.primitives.items() if attribute in names}
     return usual or {names[column]: names[column] for column in dissection.movable}
 
 
@@ -188,18 +177,22 @@ def _steered(dissection: Dissection, taken: set[str]) -> list[dict[str, Any]]:
 
 
 def _hold(held: ControllerSearchResult, dissection: Dissection) -> dict[str, Any]:
-    name, key, says = _HOLDS[held.pid.attribute]
+    goal = _hold_goal(held, dissection)
     pid, layers = held.pid, dissection.layers
     gains = {"kp": pid.kp, "ki": pid.ki, "kd": pid.kd, "limit": pid.limit, "step": pid.step}
     base = Stimulation(held.weights.units, held.base) if held.base else NO_STIMULATION
     # By address even where a primitive has the unit: the controller was measured with these very weights.
     entry = {
-        "name": name,
-        "key": key,
-        "says": says,
+        "name": goal.name,
+        "key": goal.key,
+        "says": goal.says,
         "mode": "pid",
         "magnitudes": outputs_table(held.weights.by_address(layers)),
         "base": outputs_table(base.by_address(layers)),
         "pid": inline_table({"attribute": pid.attribute} | {k: float(f"{v:.4g}") for k, v in gains.items()}),
     }
     return {field: value for field, value in entry.items() if field != "base" or held.base}
+
+
+def _hold_goal(held: ControllerSearchResult, dissection: Dissection) -> HoldGoal:
+    return next(goal for goal in dissection.goals.holds if goal.attribute == held.pid.attribute)

@@ -17,8 +17,7 @@ from pdtui.core.errors import MapError
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
-from pdtui.robots.tasks.task import mean_figures
-from pdtui.robots.tasks.task_lookup import find_task
+from pdtui.robots.task import mean_figures
 from pdtui.search.task_rollout import TimedStimulation
 from pdtui.search.task_search import TaskSearch, TaskSearchResult, TaskSearchSettings
 from pdtui.stimulation.map_reader import load_map
@@ -87,9 +86,9 @@ def search_task_into_map(
         MapError: no such task, or the map is of another policy or cannot be written.
         PdtuiError: the robot or the policy cannot be had.
     """
-    wanted = find_task(task, robot)
     known = load_map(output) if output.exists() else None
     with RolloutPool(robot, policy, workers, import_options) as pool:
+        wanted = pool.robot.find_task(task)
         if known is not None:
             known.check(robot, pool.policy.layers, pool.policy.sha256)
         begin = [] if known is None else _known(known, task, pool)

@@ -132,7 +132,7 @@ def evaluate_map(
         tuple(
             summarise_task(
                 behavior,
-                config.robot,
+                loop.robot.find_task(behavior.task),
                 [runs[behavior.name, seed, "task"] for seed in seeds],
                 [runs[behavior.name, seed, "untouched"] for seed in seeds],
             )

@@ -10,8 +10,7 @@ import numpy as np
 from pdtui.core.attributes import Floats, unwrap_angles
 from pdtui.core.events import Event
 from pdtui.drive.control_loop import ControlLoop
-from pdtui.robots.tasks.task import RunTrace, Task, TaskVerdict, mean_figures
-from pdtui.robots.tasks.task_lookup import find_task
+from pdtui.robots.task import RunTrace, Task, TaskVerdict, mean_figures
 from pdtui.search.task_rollout import walk_steps
 from pdtui.stimulation.stimulation_map import Behavior
 
@@ -55,7 +54,7 @@ def run_task(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bo
     Raises:
         MapError: the robot has no such task.
     """
-    task = find_task(behavior.task, built.robot.name)
+    task = built.robot.find_task(behavior.task)
     loop = ControlLoop(built.robot, built.policy, built.map, seed, start=task.start)
     walk = walk_steps(task, seed)
     rows: list[Floats] = [loop.attributes]
@@ -80,10 +79,9 @@ def _judge(task: Task, loop: ControlLoop, rows: Floats, walk: int, fell: bool) -
 
 
 def summarise_task(
-    behavior: Behavior, robot: str, runs: Sequence[TaskRun], untouched: Sequence[TaskRun]
+    behavior: Behavior, task: Task, runs: Sequence[TaskRun], untouched: Sequence[TaskRun]
 ) -> TaskEvaluation:
     """The figures of one behavior."""
-    task = find_task(behavior.task, robot)
     return TaskEvaluation(
         behavior.name,
         task.name,

@@ -1,7 +1,7 @@
-"""The robots that pdtui knows, by name. Importing this room loads no simulator."""
+"""Robots by name. Importing this room loads no simulator."""
 
 from __future__ import annotations
 
-from pdtui.robots.registry import ROBOTS, check_robot, file_stem, make_robot, trust_module
+from pdtui.robots.registry import check_robot, file_stem, make_robot, robot_names, trust_module
 
-__all__ = ["ROBOTS", "check_robot", "file_stem", "make_robot", "trust_module"]
+__all__ = ["check_robot", "file_stem", "make_robot", "robot_names", "trust_module"]

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.robots.geometry import roll_pitch_yaw
+from pdtui.robots.robot_goals import WALKING_GOALS
 from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, model_links
+from pdtui.robots.training_recipe import TrainingRecipe
 
 _LEGS = {"1": "front left", "2": "back left", "3": "back right", "4": "front right"}
 
@@ -30,6 +32,8 @@ class Ant(MujocoRobot, AntEnv):
 
     name = "ant"
     title = "Ant (MuJoCo)"
+    goals = WALKING_GOALS
+    training_recipe = TrainingRecipe(options={"forward": "x"})
 
     def __init__(self, forward: str = "either") -> None:
         super().__init__(include_cfrc_ext_in_observation=False)

@@ -24,7 +24,9 @@ from pdtui.robots.legged.legged_rewards import (
     legged_observations,
     legged_rewards,
 )
+from pdtui.robots.robot_goals import WALKING_GOALS
 from pdtui.robots.simulators.mujoco_robot import MujocoRobot, model_links
+from pdtui.robots.training_recipe import TrainingRecipe
 
 MODEL = Path(__file__).parent / "models" / "anymal_c.xml"
 LEGS = ("LF", "LH", "RF", "RH")
@@ -61,6 +63,20 @@ class Anymal(MujocoRobot):
 
     name = "anymal"
     title = "ANYmal-C (MuJoCo)"
+    goals = WALKING_GOALS
+    training_recipe = TrainingRecipe(
+        options={"random_commands": True},
+        settings={
+            "worlds": 256,
+            "minibatch": 2048,
+            "layers": (128, 64, 32),
+            "reward_scale": 2.0,
+            "entropy": 0.004,
+            "evaluate_every": 1_000_000,
+            "evaluate_steps": 500,
+        },
+        world_batch="pdtui.training.anymal_worlds:AnymalWorldBatch",
+    )
     commands: Mapping[str, float] = MappingProxyType({"forward": 1.0, "lateral": 0.0, "yaw rate": 0.0})
     command_ranges = MappingProxyType(
         {
@@ -190,11 +206,3 @@ class Anymal(MujocoRobot):
     def _set_extras(self, extras: tuple[Floats, ...]) -> None:
         self._command, self._action, self._last_action, self._air_time = (one.copy() for one in extras[:4])
         self.data.sensordata[:], self.data.actuator_force[:] = extras[4], extras[5]
-
-
-class AnymalForward(Anymal):
-    """ANYmal-C whose policy sees the forward command alone: it was never asked to turn."""
-
-    name = "anymal-forward"
-    title = "ANYmal-C, forward only (MuJoCo)"
-    commands = MappingProxyType({"forward": 1.0})

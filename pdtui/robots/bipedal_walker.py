@@ -14,7 +14,10 @@ from numpy.typing import NDArray
 from pdtui.core.angles import wrap_angle
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.robot_data import Link
+from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
+from pdtui.robots.robot_goals import WALKING_GOALS
+from pdtui.robots.training_recipe import TrainingRecipe
 
 FINISH = (stock.TERRAIN_LENGTH - stock.TERRAIN_GRASS) * stock.TERRAIN_STEP
 _GROUND = 2000.0
@@ -114,12 +117,18 @@ class BipedalWalker(GymnasiumRobot):
         torque: of the strongest motor command, N m. Gymnasium's is 80, too weak for flips.
     """
 
+    name = "bipedal_walker"
+    title = "BipedalWalker (Box2D)"
+    goals = WALKING_GOALS
+    tasks = BIPEDAL_WALKER_TASKS
+    # A fall costs 100, as much as a third of the way earns: rewards are scaled up from PPO's usual 0.02.
+    training_recipe = TrainingRecipe(settings={"reward_scale": 0.1, "evaluate_steps": 1600})
     episode_steps = 1600
     starts = ("split",)
 
     def __init__(self, torque: float = 300.0) -> None:
         self._torque = torque
-        super().__init__("bipedal_walker", "BipedalWalker (Box2D)")
+        super().__init__(self.name, self.title)
         self.links = _links()
         self.attributes = (
             Attribute("vx", "m/s", scale=0.3 * stock.VIEWPORT_W / stock.SCALE / stock.FPS),

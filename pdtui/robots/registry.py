@@ -14,6 +14,7 @@ import sys
 from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pdtui.core.errors import RobotError
@@ -23,15 +24,27 @@ if TYPE_CHECKING:
 
 GROUP = "pdtui.robots"
 TRUSTED = "PDTUI_ENVIRONMENT_MODULES"
-ROBOTS: dict[str, str] = {
-    "a1": "pdtui.robots.a1:A1",
-    "a1-vision": "pdtui.robots.a1:A1Vision",
-    "ant": "pdtui.robots.ant:Ant",
-    "anymal": "pdtui.robots.anymal:Anymal",
-    "anymal-forward": "pdtui.robots.anymal:AnymalForward",
-    "bipedal_walker": "pdtui.robots.bipedal_walker:BipedalWalker",
-    "walker": "pdtui.robots.walker:Walker",
-}
+
+
+def own_robots() -> dict[str, str]:
+    """Return the modules of pdtui's own robots by name. None of them is imported.
+
+    The robot ``some-name`` is the class in ``some_name.py``, here, that assigns ``"some-name"`` to `name`.
+    """
+    package, robots = __package__ or "", {}
+    for path in sorted(
+        file for folder in sys.modules[package].__path__ for file in Path(folder).glob("*.py")
+    ):
+        source = path.read_text(encoding="utf-8")
+        for name in (path.stem, path.stem.replace("_", "-")):
+            if f'    name = "{name}"\n' in source:
+                robots[name] = f"{package}.{path.stem}"
+    return robots
+
+
+def robot_names() -> list[str]:
+    """Return the names of pdtui's own robots, then of those of other packages."""
+    return [*own_robots(), *(entry.name for entry in entry_points(group=GROUP))]
 
 
 def trust_module(robot: str) -> None:
@@ -50,7 +63,7 @@ def check_robot(name: str) -> str:
     Raises:
         RobotError: there is none of that name; the message has close matches.
     """
-    if name not in ROBOTS and _entry_of(name) is None:
+    if name not in own_robots() and _entry_of(name) is None:
         _registered(name)
     return name
 
@@ -59,14 +72,14 @@ def make_robot(name: str, **options: Any) -> Robot:
     """Build a robot in its own simulator.
 
     Args:
-        name: one of `ROBOTS`, of the entry points of group `GROUP`, or a registered environment's id; the
-            first that has it.
+        name: of one of pdtui's own robots, of an entry point of group `GROUP`, or of an environment that is
+            registered with Gymnasium; the first that has it.
         options: for the robot's class; environments have none.
 
     Raises:
         RobotError: no robot has that name, or what it needs is not installed.
     """
-    if name in ROBOTS:
+    if name in own_robots():
         return _own(name, options)
     entry = _entry_of(name)
     if entry is not None:
@@ -80,11 +93,12 @@ def file_stem(name: str) -> str:
 
 
 def _own(name: str, options: dict[str, Any]) -> Robot:
-    module, _, attribute = ROBOTS[name].partition(":")
     try:
-        robot: Robot = getattr(import_module(module), attribute)(**options)
+        module = import_module(own_robots()[name])
     except ImportError as error:
         raise RobotError(f"robot '{name}' needs a package that is not installed: {error}") from error
+    classes = (one for one in vars(module).values() if isinstance(one, type))
+    robot: Robot = next(one for one in classes if vars(one).get("name") == name)(**options)
     return robot
 
 
@@ -95,19 +109,18 @@ def _entry_of(name: str) -> EntryPoint | None:
 def _from_entry(entry: EntryPoint, options: dict[str, Any]) -> Robot:
     from pdtui.robots.robot import Robot
 
-    where = f"robot '{entry.name}' (entry point {entry.value}" + (
-        f" of {entry.dist.name})" if entry.dist is not None else ")"
-    )
+    package = f" of {entry.dist.name}" if entry.dist is not None else ""
+    label = f"robot '{entry.name}' (entry point {entry.value}{package})"
     try:
         robot = entry.load()(**options)
     except RobotError:
         raise
     except Exception as error:  # whatever a third party's module raises
-        raise RobotError(f"{where}: cannot be built: {type(error).__name__}: {error}") from error
+        raise RobotError(f"{label}: cannot be built: {type(error).__name__}: {error}") from error
     if not isinstance(robot, Robot):
-        raise RobotError(f"{where}: expected a pdtui.robots.Robot, found {type(robot).__name__}")
+        raise RobotError(f"{label}: expected a pdtui.robots.Robot, found {type(robot).__name__}")
     if robot.name != entry.name:
-        raise RobotError(f"{where}: expected the class to have that name, found '{robot.name}'")
+        raise RobotError(f"{label}: expected the class to have that name, found '{robot.name}'")
     return robot
 
 
@@ -137,7 +150,7 @@ def _registered(name: str) -> str:
         _import(module, name)
     if environment in gymnasium.registry:
         return environment
-    robots = [*ROBOTS, *(entry.name for entry in entry_points(group=GROUP))]
+    robots = robot_names()
     known = {one.lower(): one for one in [*robots, *gymnasium.registry]}
     close = [known[one] for one in get_close_matches(environment.lower(), known, 4, 0.5)]
     hint = f"close are {', '.join(close)}" if close else f"there are {', '.join(sorted(robots))}"

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats, column_of
 from pdtui.core.errors import RobotError
 from pdtui.core.robot_data import NO_OBSTACLES, CommandRange, Link, RobotState
+from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
+from pdtui.robots.task import Task, find_task
+from pdtui.robots.training_recipe import TrainingRecipe
 
 
 class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
@@ -31,6 +34,9 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         commands: what a policy can be asked for and what it is asked for by default, by name; most robots
             have none.
         command_ranges: in which the policy was trained to follow them.
+        goals: what a dissection looks for.
+        tasks: what `pdtui pursue` can look for, and how to tell whether it was done.
+        training_recipe: how `pdtui train` trains a policy for it.
         episode_steps: control steps after which training and scores end an episode.
         obstacles: upright cylinders in its way, shape (N, 3): x, y and radius, m. They stay where they are
             until the next `reset` or `restore`; other obstacles are another array.
@@ -43,6 +49,9 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     starts: tuple[str, ...] = ()
     commands: Mapping[str, float] = MappingProxyType({})
     command_ranges: Mapping[str, CommandRange] = MappingProxyType({})
+    goals: RobotGoals = WALKING_GOALS
+    tasks: tuple[Task, ...] = ()
+    training_recipe: TrainingRecipe = TrainingRecipe()
     episode_steps: int = 1000
     obstacles: Floats = NO_OBSTACLES
 
@@ -98,6 +107,14 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
             known = f"there are {', '.join(self.starts)}" if self.starts else "it has only the usual one"
             raise RobotError(f"{self.name}: no start '{start}'; {known}")
         return start
+
+    def find_task(self, name: str) -> Task:
+        """Return the task of a name.
+
+        Raises:
+            MapError: the robot has no such task.
+        """
+        return find_task(name, self.tasks, self.name)
 
     def attribute_index(self, name: str) -> int:
         """Column of an attribute in `read_attributes`.

@@ -3,46 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from pdtui.core.attributes import Attribute, BehaviorAim, Floats
+from pdtui.core.attributes import Floats
 from pdtui.probing.effect_probe import PlanEffects
+from pdtui.robots.robot import Robot
+from pdtui.robots.robot_goals import BehaviorGoal
 
-
-@dataclass(frozen=True)
-class BehaviorGoal:
-    """One behavior to look for.
-
-    Attributes:
-        name: of the behavior.
-        key: that latches it.
-        says: one sentence on what one sees.
-        aim: the attribute and where it is to go.
-        enough: effect that counts as reached: in the attribute's unit, or for a stop the share of its mean
-            that goes.
-    """
-
-    name: str
-    key: str
-    says: str
-    aim: BehaviorAim
-    enough: float
-
-
-# Targets for a walker of the Ant's speed; a robot without an attribute goes without its behaviors.
-GOALS: tuple[BehaviorGoal, ...] = (
-    BehaviorGoal("stop", "x", "stops and stands", BehaviorAim("speed", "stop"), 0.8),
-    BehaviorGoal("up", "w", "walks on and drifts to +y", BehaviorAim("vy", "increase"), 0.7),
-    BehaviorGoal("down", "s", "walks on and drifts to −y", BehaviorAim("vy", "decrease"), 0.7),
-    BehaviorGoal(
-        "spin left", "a", "turns left on the spot, or nearly", BehaviorAim("yaw rate", "increase"), 0.5
-    ),
-    BehaviorGoal(
-        "spin right", "d", "turns right on the spot, or nearly", BehaviorAim("yaw rate", "decrease"), 0.5
-    ),
-)
 STANDING = 0.1
 """m/s; whoever is slower stands already."""
 _QUANTILE = 0.2
@@ -50,17 +18,17 @@ _FALL = 2.0
 _DOUBLING = 0.02
 
 
-def goals_for(attributes: Sequence[Attribute], unperturbed: Floats) -> tuple[BehaviorGoal, ...]:
-    """The goals whose attributes a robot has; no stop for one that stands.
+def reachable_goals(robot: Robot, unperturbed: Floats) -> tuple[BehaviorGoal, ...]:
+    """The behaviors of a robot's goals whose attributes it has; no stop for one that stands.
 
     Args:
-        attributes: of the robot.
-        unperturbed: their means without stimulation, shape (K, J).
+        robot: declares its goals.
+        unperturbed: means of its attributes without stimulation, shape (K, J).
     """
-    means = dict(zip((one.name for one in attributes), unperturbed.mean(axis=0).tolist(), strict=True))
+    means = dict(zip((one.name for one in robot.attributes), unperturbed.mean(axis=0).tolist(), strict=True))
     return tuple(
         goal
-        for goal in GOALS
+        for goal in robot.goals.behaviors
         if goal.aim.attribute in means
         and (goal.aim.direction != "stop" or means[goal.aim.attribute] > STANDING)
     )

@@ -10,7 +10,8 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.units import Stimulation
 from pdtui.probing.effect_probe import EffectCurves, EffectProber, PlanEffects, bootstrap_interval
-from pdtui.search.behavior_goals import BehaviorGoal, goal_gains, goal_scores
+from pdtui.robots.robot_goals import BehaviorGoal
+from pdtui.search.behavior_goals import goal_gains, goal_scores
 from pdtui.search.behavior_search_settings import BehaviorSearchSettings
 from pdtui.search.shared_candidates import SharedCandidates
 from pdtui.search.stimulation_sampler import StimulationSampler

@@ -8,7 +8,8 @@ import numpy as np
 
 from pdtui.core.units import Stimulation
 from pdtui.probing.effect_probe import EffectProber
-from pdtui.search.behavior_goals import BehaviorGoal, goal_scores
+from pdtui.robots.robot_goals import BehaviorGoal
+from pdtui.search.behavior_goals import goal_scores
 from pdtui.search.behavior_search_settings import BehaviorSearchSettings
 from pdtui.search.stimulation_sampler import StimulationSampler
 from pdtui.spectra.monitor import StartState, StepProgress

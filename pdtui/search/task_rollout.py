@@ -12,7 +12,7 @@ from pdtui.core.errors import SimulationDiverged
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot
-from pdtui.robots.tasks.task import RunTrace, Task, TaskVerdict
+from pdtui.robots.task import RunTrace, Task, TaskVerdict
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from pdtui.core.units import Stimulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.robot import Robot
-from pdtui.robots.tasks.task import Task, TaskVerdict
+from pdtui.robots.task import Task, TaskVerdict
 from pdtui.search.stimulation_sampler import OutputBounds, StimulationSampler
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
 from pdtui.spectra.monitor import StepProgress
@@ -244,7 +244,5 @@ def judge_task_job(
     robot: Robot, policy: Policy, job: tuple[str, tuple[TimedStimulation, ...], int]
 ) -> list[TaskVerdict]:
     """What a worker does; tasks hold functions, so they travel by name."""
-    from pdtui.robots.tasks.task_lookup import find_task
-
     name, plans, seed = job
-    return judge_stimulations(robot, policy, find_task(name, robot.name), plans, seed)
+    return judge_stimulations(robot, policy, robot.find_task(name), plans, seed)

@@ -5,6 +5,7 @@ Where a simulator does not, each thread waits for a process of worlds.
 
 from __future__ import annotations
 
+import pkgutil
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, ClassVar
@@ -18,7 +19,6 @@ from pdtui.training.jax_mlp import MlpParameters
 from pdtui.training.policy_graft import actor_of, graft_policy
 from pdtui.training.ppo import PpoConfig, PpoLearner, PpoRollout, PpoState, act
 from pdtui.training.remote_worlds import RemoteWorldBatch
-from pdtui.training.training_recipes import RECIPES
 from pdtui.training.training_run import TrainingRun, numpy_actor
 from pdtui.training.world_batch import WorldBatch
 
@@ -38,10 +38,11 @@ class PpoTrainingRun(TrainingRun):
         super().__init__(robot, seed, folder, config, command, **robot_options)
 
     def build(self) -> None:
-        share, build = self.config.worlds // THREADS, RECIPES[self.robot].worlds
+        share, recipe = self.config.worlds // THREADS, self.sample.training_recipe
         seeds = [self.seed * 10 + 1 + n for n in range(THREADS)]
-        if build is not None:
-            self.worlds = [build(self.config.worlds, seeds[0], self.make().episode_steps)]
+        if recipe.world_batch:
+            batch = pkgutil.resolve_name(recipe.world_batch)
+            self.worlds = [batch(self.sample, self.config.worlds, seeds[0])]
         elif self.config.processes:
             self.worlds = [RemoteWorldBatch(self.robot, self._options, share, seed) for seed in seeds]
         else:
@@ -49,8 +50,8 @@ class PpoTrainingRun(TrainingRun):
         self.learner = PpoLearner(self.config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self._threads = ThreadPoolExecutor(THREADS)
-        if RECIPES[self.robot].begin and not self.checkpoint.exists():
-            self._begin_from(find_weights_file(RECIPES[self.robot].begin))
+        if recipe.initial_policy and not self.checkpoint.exists():
+            self._begin_from(find_weights_file(recipe.initial_policy))
 
     def advance(self) -> int:
         on_host: PpoState = jax.tree.map(np.asarray, self.state)

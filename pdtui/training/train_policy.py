@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pdtui.core.errors import TrainingError
-from pdtui.robots import ROBOTS
+from pdtui.robots import make_robot, robot_names
 
 
 def train_policy(
@@ -23,26 +23,28 @@ def train_policy(
     """Train, or go on training, in a folder; returns the best weights.
 
     Raises:
-        TrainingError: the extra ``train`` is not installed, the robot is none of pdtui's own or has no such
-            reward, or the folder holds something else.
+        TrainingError: the extra ``train`` is not installed, the robot is an
+            environment of Gymnasium or has no such reward, or the folder holds something else.
     """
-    if robot not in ROBOTS:
-        raise TrainingError(f"expected one of pdtui's own robots ({', '.join(ROBOTS)}), found '{robot}'")
-    if forward is not None and robot != "ant":
+    if robot not in robot_names():
+        raise TrainingError(
+            f"expected one of pdtui's own robots ({', '.join(robot_names())}) or another package's, "
+            f"found '{robot}'"
+        )
+    recipe = make_robot(robot).training_recipe
+    if forward is not None and "forward" not in recipe.options:
         raise TrainingError(f"--forward chooses the Ant's reward; '{robot}' has only one")
     try:
         from pdtui.training.ppo import PpoConfig
         from pdtui.training.ppo_run import PpoTrainingRun
         from pdtui.training.sac import SacConfig
         from pdtui.training.sac_run import SacTrainingRun
-        from pdtui.training.training_recipes import RECIPES
         from pdtui.training.training_run import TrainingReport, TrainingRun
     except ImportError as error:
         raise TrainingError(f"training needs the extra: pip install 'pdtui[train]' ({error})") from error
-    recipe = RECIPES[robot]
     options = dict(recipe.options) | ({"forward": forward} if forward else {})
     known = PpoConfig if algorithm == "ppo" else SacConfig
-    changes = {name: value for name, value in recipe.changes.items() if name in known.__dataclass_fields__}
+    changes = {name: value for name, value in recipe.settings.items() if name in known.__dataclass_fields__}
     if steps is not None:
         changes["total_steps"] = steps
     if learning_rate is not None:

@@ -102,9 +102,9 @@ class TrainingRun(ABC):
     ) -> None:
         self.seed, self.folder, self._config, self.command, self.robot = seed, folder, config, command, robot
         self.make: Callable[[], Robot] = lambda: make_robot(robot, **robot_options)
-        sample = self.make()
-        bounds = sample.action_space
-        self.observations = int(np.prod(sample.observation_space.shape or ()))
+        self.sample = self.make()
+        bounds = self.sample.action_space
+        self.observations = int(np.prod(self.sample.observation_space.shape or ()))
         self.actions = int(np.prod(bounds.shape or ()))
         self._low, self._high = (np.asarray(getattr(bounds, side), np.float64) for side in ("low", "high"))
         self.rng = np.random.default_rng(seed)

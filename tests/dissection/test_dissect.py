@@ -23,7 +23,8 @@ from pdtui.policies.weights.weights_file import hash_file
 from pdtui.probing.confirmation import rank_correlation
 from pdtui.probing.effect_probe import EffectProber, PlanEffects
 from pdtui.probing.rollout_pool import RolloutPool
-from pdtui.search.behavior_goals import GOALS, goal_gains, goal_scores
+from pdtui.robots.robot_goals import WALKING_GOALS
+from pdtui.search.behavior_goals import goal_gains, goal_scores
 from pdtui.search.behavior_search import BehaviorSearchResult, SearchStartStates
 from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.spectra.matching_presets import PRESETS, find_preset, preset_values
@@ -31,6 +32,8 @@ from pdtui.spectra.monitor import collect_start_states
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains
 from tests.small_dissection import SMALL
+
+GOALS = WALKING_GOALS.behaviors
 
 
 def test_every_unit_is_screened_and_every_goal_has_a_candidate(dissection: Dissection) -> None:

@@ -12,7 +12,8 @@ from pdtui.core.errors import MapError
 from pdtui.core.events import Event
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.robots import make_robot
-from pdtui.robots.anymal import DEFAULT, Anymal, AnymalForward
+from pdtui.robots.anymal import DEFAULT, Anymal
+from pdtui.robots.anymal_forward import AnymalForward
 from pdtui.robots.legged.legged_rewards import COMMAND_SCALES
 from pdtui.stimulation.map_reader import parse_map
 

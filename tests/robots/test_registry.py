@@ -24,7 +24,7 @@ gymnasium.register("Thing-v0", "gymnasium.envs.classic_control.pendulum:Pendulum
 
 def run_python(code: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run code in a fresh process that finds what is installed in a folder."""
-    path = os.pathsep.join([str(folder), str(GUIDE.parents[1])])
+    path = os.pathsep.join([str(folder), str(GUIDE.parents[2])])
     return subprocess.run(
         [sys.executable, "-c", code],
         cwd=folder,
@@ -149,3 +149,125 @@ def test_a_broken_entry_point_is_named_with_its_package(
 def test_a_name_becomes_part_of_a_file_name() -> None:
     assert file_stem("Hopper-v5") == "Hopper-v5"
     assert file_stem("a.b:ALE/Pong-v5") == "a.b-ALE-Pong-v5"
+
+
+ROBOT = '''
+import math
+
+import gymnasium
+import numpy as np
+
+from pdtui.core.attributes import Attribute, BehaviorAim
+from pdtui.core.robot_data import Link, RobotState
+from pdtui.robots.robot import Robot
+from pdtui.robots.robot_goals import BehaviorGoal, RobotGoals
+from pdtui.robots.task import Task, TaskVerdict
+from pdtui.robots.training_recipe import TrainingRecipe
+
+
+def runs_away(trace):
+    """It is ten metres from where it was."""
+    way = float(trace["place"][-1] - trace.before("place")[-1])
+    return TaskVerdict(way > 10.0, way / 10.0, {"way (m)": way})
+
+
+class Cart(Robot):
+    name = "iron-cart"
+    title = "Cart"
+    attributes = (Attribute("place", "m"), Attribute("speed", "m/s"))
+    links = (Link("cart", 0, "box", (0.2, 0.1, 0.1), (0.0, 0.0, 0.1), (1.0, 0.0, 0.0, 0.0)),)
+    starts = ("moving",)
+    goals = RobotGoals(
+        behaviors=(BehaviorGoal("rush", "r", "rushes on", BehaviorAim("speed", "raise"), 0.25),),
+        primitives={"speed": "pace"},
+    )
+    tasks = (Task("run", "n", "runs away", "10 m", (1, 3), 50, runs_away, start="moving"),)
+    training_recipe = TrainingRecipe(settings={"total_steps": 64, "worlds": 2, "chunk": 16, "minibatch": 16,
+        "layers": (4, 4), "evaluate_every": 64, "evaluate_episodes": 1, "evaluate_steps": 5})
+    control_dt = 0.1
+    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (2,))
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,))
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        start = self.check_start((options or {}).get("start", ""))
+        self.state = np.array([0.0, 1.0 if start else 0.0])
+        return self.observe(), {}
+
+    def step(self, action):
+        speed = self.state[1] + self.control_dt * (float(action[0]) - self.state[1])
+        self.state = np.array([self.state[0] + self.control_dt * speed, speed])
+        return self.observe(), speed, False, False, {"cost": 0.0}
+
+    def observe(self):
+        return self.state.copy()
+
+    def read_attributes(self):
+        return self.state.copy()
+
+    def read_poses(self):
+        return np.array([[self.state[0], 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
+
+    def snapshot(self):
+        return RobotState(self.name, self.state.copy(), (), self.np_random.bit_generator.state)
+
+    def restore(self, snapshot):
+        self.state = snapshot.state.copy()
+
+    def digest(self):
+        return int.from_bytes(self.state.tobytes(), "little") % 2**63
+'''
+USES = """
+import sys
+from pathlib import Path
+{prepare}
+from pdtui.robots import check_robot, make_robot, robot_names
+assert check_robot("iron-cart") in robot_names()
+assert not {{"gymnasium", "mujoco"}} & set(sys.modules)
+import numpy as np
+from pdtui.core.units import NO_STIMULATION
+from pdtui.dissection.dissect import dissect
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless import build_loop, drive_headless
+from pdtui.policies.weights.policy_loading import load_policy
+from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
+from pdtui.stimulation.map_library import bare_map
+from tests.small_dissection import SMALL
+{train}
+robot, policy = make_robot("iron-cart"), load_policy(weights, "iron-cart")
+assert robot.training_recipe.settings["total_steps"] == 64
+assert policy.layers == (4, 4)
+loop = build_loop(DriveConfig("iron-cart", bare_map("iron-cart", str(weights)), 3, start="moving"))
+assert drive_headless(loop, {{}}, 40, None).steps == 40
+(verdict,) = judge_stimulations(robot, policy, robot.find_task("run"), [TimedStimulation()], 0)
+assert list(verdict.figures) == ["way (m)"]
+found = dissect(robot, policy, episodes=1, effort=SMALL, budget_minutes=0.0)
+assert [one.goal.name for one in found.behaviors] == ["rush"] and not found.controllers
+print("whole")
+"""
+
+
+TRAIN = """
+from pdtui.training.train_policy import train_policy
+weights = train_policy("iron-cart", "ppo", 1, None, None, None, Path("run"), None)
+"""
+SAVE = """
+from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
+from pdtui.policies.weights.weights_file import save_network
+weights = Path("cart.safetensors")
+save_network(weights, PolicyNetwork(NetworkSpec("iron-cart", 2, (4, 4), "tanh", 1, "mean", (-1.0,), (1.0,))))
+"""
+
+
+@pytest.mark.parametrize("own", [True, False], ids=["in the package", "by entry point"])
+def test_one_file_adds_a_robot_with_its_goals_tasks_and_training(own: bool, tmp_path: Path) -> None:
+    if own:
+        (tmp_path / "more").mkdir()
+        (tmp_path / "more" / "iron_cart.py").write_text(ROBOT)
+        prepare, train = "import pdtui.robots; pdtui.robots.__path__.append('more')", SAVE
+    else:
+        pytest.importorskip("jax", reason="the extra 'train' is not installed")
+        install(tmp_path, "iron-cart", "cart_module:Cart", ROBOT)
+        prepare, train = "", TRAIN
+    result = run_python(USES.format(prepare=prepare, train=train), tmp_path)
+    assert result.stdout == "whole\n", result.stderr

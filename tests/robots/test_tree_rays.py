@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("pybullet", reason="PyBullet is not installed (it has no wheels for this Python)")
 
 from pdtui.robots import make_robot
-from pdtui.robots.a1 import A1Vision
+from pdtui.robots.a1_vision import A1Vision
 from pdtui.robots.legged.tree_rays import tree_nearness
 
 FAN = np.radians(np.linspace(60.0, -60.0, 32))

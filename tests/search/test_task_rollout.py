@@ -10,8 +10,10 @@ from pdtui.core.errors import MapError
 from pdtui.core.units import Stimulation
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
-from pdtui.robots.tasks.task import RunTrace, TaskVerdict
-from pdtui.robots.tasks.task_lookup import find_task, tasks_of
+from pdtui.robots.a1_tasks import A1_TASKS
+from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
+from pdtui.robots.task import RunTrace, TaskVerdict, find_task
+from pdtui.robots.walker import WALKER_TASKS
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
 
 WALKER = ("vx", "right foot clearance", "left foot clearance")
@@ -30,7 +32,8 @@ def _walker(vx: Floats, right: Floats, left: Floats, *, fell: bool = False) -> R
 
 def _slow(after: float, *, steps: int = 300, fell: bool = False) -> TaskVerdict:
     vx = np.concatenate((np.full(90, 4.0), np.full(steps - 90, after)))
-    return find_task("slow down", "walker").judge(_walker(vx, np.zeros(steps), np.zeros(steps), fell=fell))
+    trace = _walker(vx, np.zeros(steps), np.zeros(steps), fell=fell)
+    return find_task("slow down", WALKER_TASKS, "walker").judge(trace)
 
 
 def test_slow_is_under_a_quarter_of_the_speed_and_still_up() -> None:
@@ -43,7 +46,7 @@ def test_slow_is_under_a_quarter_of_the_speed_and_still_up() -> None:
 
 
 def _hop(right: Floats, left: Floats, vx: float = 2.0) -> TaskVerdict:
-    return find_task("hop", "walker").judge(_walker(np.full(200, vx), right, left))
+    return find_task("hop", WALKER_TASKS, "walker").judge(_walker(np.full(200, vx), right, left))
 
 
 def test_a_hop_keeps_one_foot_up_in_one_stretch() -> None:
@@ -62,7 +65,7 @@ def test_a_hop_keeps_one_foot_up_in_one_stretch() -> None:
 
 def _biped(task: str, height: Floats, pitch: Floats, vx: Floats, *, fell: bool = False) -> TaskVerdict:
     trace = _trace(BIPED, [[5.0, 2.0, 0.0]] * 80, np.stack((vx, height, pitch), axis=1), fell=fell)
-    return find_task(task, "bipedal_walker").judge(trace)
+    return find_task(task, BIPEDAL_WALKER_TASKS, "bipedal_walker").judge(trace)
 
 
 def test_a_jump_rises_half_a_metre_and_walks_on() -> None:
@@ -91,7 +94,8 @@ def _a1(task: str, rate: float, speed: Floats, *, fell: bool = False) -> TaskVer
     steps = len(speed)
     yaw = rate * 0.016 * np.arange(steps)
     values = np.stack((speed, np.abs(speed), yaw, np.zeros(steps)), axis=1)
-    return find_task(task, "a1").judge(_trace(names, [[2.0, 2.0, 0.0, 0.0]] * 90, values, fell=fell))
+    trace = _trace(names, [[2.0, 2.0, 0.0, 0.0]] * 90, values, fell=fell)
+    return find_task(task, A1_TASKS, "a1").judge(trace)
 
 
 def test_the_a1_turns_while_it_walks() -> None:
@@ -125,16 +129,17 @@ def test_standing_up_is_walking_at_the_end() -> None:
 
 def test_an_unknown_task_lists_the_robots_own() -> None:
     with pytest.raises(MapError, match="walker: no task 'fly'; there are slow down, hop"):
-        find_task("fly", "walker")
+        make_robot("walker").find_task("fly")
     with pytest.raises(MapError, match="ant: no task 'fly'; it has none"):
-        find_task("fly", "ant")
-    assert tasks_of("ant") == ()
+        make_robot("ant").find_task("fly")
+    assert make_robot("ant").tasks == ()
 
 
 @pytest.mark.parametrize("robot", ["walker", "bipedal_walker"])
 def test_bursts_of_one_seed_begin_from_the_same_walk(robot: str) -> None:
     """Judged together or alone, a plan does the same; an empty one is the untouched policy."""
-    world, policy, task = make_robot(robot), load_policy(robot, robot), tasks_of(robot)[0]
+    world, policy = make_robot(robot), load_policy(robot, robot)
+    task = world.tasks[0]
     plan = TimedStimulation(Stimulation.of({3: 5.0}), 20)
     together = judge_stimulations(world, policy, task, [TimedStimulation(), plan, TimedStimulation()], 5)
     assert together[0] == together[2]

@@ -10,7 +10,6 @@ from click.testing import CliRunner
 
 from pdtui.cli import main
 from pdtui.probing.rollout_pool import RolloutPool
-from pdtui.robots.tasks.task_lookup import find_task
 from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearch
 from pdtui.stimulation.map_reader import load_map
 
@@ -20,14 +19,13 @@ def _never() -> bool:
 
 
 def test_what_is_found_scores_above_the_untouched_policy_and_is_found_again() -> None:
-    task = find_task("jump", "bipedal_walker")
     settings = QUICK_TASK_SEARCH.__class__(
         **{**vars(QUICK_TASK_SEARCH), "values": (6.0,), "held_out_seeds": 3}
     )
     results = []
     for _ in range(2):
         with RolloutPool("bipedal_walker", "bipedal_walker", workers=1) as pool:
-            results.append(TaskSearch(pool, task, 1000, settings).run([], _never))
+            results.append(TaskSearch(pool, pool.robot.find_task("jump"), 1000, settings).run([], _never))
     first, again = results
     assert first.plan == again.plan
     assert first.verdicts == again.verdicts

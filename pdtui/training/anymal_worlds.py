@@ -52,19 +52,20 @@ class DomainRandomisation:
     noise: tuple[float, ...] = (0.01, 0.05, 0.1, 0.03, 0.01, 0.5)
 
 
-class LeggedWorldBatch:
+class AnymalWorldBatch:
     """A batch of ANYmals that start over by themselves; offers what `worlds.Worlds` does.
 
     Args:
-        name: of the robot.
-        commands: how many of `COMMANDS` the policy sees; the others are asked to stay 0.
+        robot: one of them; of `COMMANDS`, its policy sees as many as it has, and the others stay 0.
         count: worlds.
         seed: of everything random.
-        episode: control steps after which a world starts over.
+        episode: control steps after which a world starts over; the robot's unless given.
     """
 
-    def __init__(self, name: str, commands: int, count: int, seed: int, episode: int) -> None:
-        self._name, self._count, self._episode, self._commands = name, count, episode, commands
+    def __init__(self, robot: Anymal, count: int, seed: int, episode: int | None = None) -> None:
+        episode = episode or robot.episode_steps
+        self._name, self._count, self._episode = robot.name, count, episode
+        self._commands = len(robot.commands)
         self._random, self._weights = DomainRandomisation(), RewardWeights()
         low, high, number = self._random.frictions
         shared = [mujoco.MjModel.from_xml_path(str(MODEL)) for _ in range(number)]

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pdtui.robots.tasks.task import RunTrace, Task, TaskVerdict
+from pdtui.robots.task import RunTrace, Task, TaskVerdict
 
 _RISE = 0.5
 _FLIP = 300.0
@@ -56,10 +56,9 @@ def stands_up(trace: RunTrace) -> TaskVerdict:
 
 
 _JUMP_STEPS, _FLIP_STEPS, _STAND_STEPS = 200, 200, 300
-TASKS = (
+BIPEDAL_WALKER_TASKS = (
     Task(
         name="jump",
-        robot="bipedal_walker",
         key="j",
         says="jumps, lands and walks on",
         wanted="hull 0.5 m over its usual height, then walks on",
@@ -70,7 +69,6 @@ TASKS = (
     ),
     Task(
         name="front flip",
-        robot="bipedal_walker",
         key="f",
         says="turns over forward in the air",
         wanted="turns forward by 300° or more",
@@ -81,7 +79,6 @@ TASKS = (
     ),
     Task(
         name="stand up",
-        robot="bipedal_walker",
         key="u",
         says="gets up from a split and walks again",
         wanted="walks at half its speed at the end of 300 steps",

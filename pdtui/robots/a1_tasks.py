@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pdtui.robots.tasks.task import RunTrace, Task, TaskVerdict
+from pdtui.robots.task import RunTrace, Task, TaskVerdict
 
 _STEP = 0.016
 _FROM, _STEPS = 25, 150
@@ -67,10 +67,10 @@ def speeds_up(trace: RunTrace) -> TaskVerdict:
 
 
 def _task(name: str, key: str, says: str, wanted: str, judge: Callable[[RunTrace], TaskVerdict]) -> Task:
-    return Task(name, "a1", key, says, wanted, (90, 150), _STEPS, judge, start="rough")
+    return Task(name, key, says, wanted, (90, 150), _STEPS, judge, start="rough")
 
 
-TASKS = (
+A1_TASKS: tuple[Task, ...] = (
     _task("left", "a", "turns left while it walks", "0.15 rad/s to the left, on its feet", turns_left),
     _task("right", "d", "turns right while it walks", "0.15 rad/s to the right, on its feet", turns_right),
     _task("stop", "s", "stops and stands", "under 0.3 m/s after 1.2 s, on its feet", stops),

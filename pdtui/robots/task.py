@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats, column_of
+from pdtui.core.errors import MapError
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,6 @@ class Task:
 
     Attributes:
         name: as maps name it.
-        robot: whose it is.
         key: that a map binds it to.
         says: one sentence on what one sees.
         wanted: what counts as done, for tables.
@@ -83,7 +83,6 @@ class Task:
     """
 
     name: str
-    robot: str
     key: str
     says: str
     wanted: str
@@ -92,3 +91,16 @@ class Task:
     judge: Callable[[RunTrace], TaskVerdict]
     start: str = ""
     period: int | None = None
+
+
+def find_task(name: str, tasks: Sequence[Task], owner: str) -> Task:
+    """Return the task of a name; `owner` is named where there is none.
+
+    Raises:
+        MapError: there is no such task.
+    """
+    for task in tasks:
+        if task.name == name:
+            return task
+    known = f"there are {', '.join(task.name for task in tasks)}" if tasks else "it has none"
+    raise MapError(f"{owner}: no task '{name}'; {known}")
