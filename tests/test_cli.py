@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner, Result
 
-from pdtui.cli import main
+import pdtui
+from pdtui.cli import COMMANDS, main
+from pdtui.cli.command_group import OPTIONAL_ROOMS, LazyCommandGroup
 from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.real_viewer import RealViewer, free_port, is_blank
 
@@ -200,6 +205,60 @@ def test_importing_the_commands_pulls_in_nothing_heavy() -> None:
     code = f"import sys, pdtui.cli; print([m for m in {heavy!r} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
+
+
+def test_the_list_of_commands_loads_none_of_them() -> None:
+    code = (
+        "import sys; from pdtui.cli import main; main(['--help'], standalone_mode=False);"
+        "print([m for m in sys.modules if m.endswith(('_command', '_commands', 'shared_options'))])"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip().endswith("\n[]")
+    assert isinstance(main, LazyCommandGroup)
+    for name in COMMANDS:
+        command = main.get_command(click.Context(main), name)
+        assert command is not None
+        assert command.name == name
+
+
+def test_optional_rooms_can_be_deleted(map_path: Path, tmp_path: Path) -> None:
+    names = [room.removeprefix("pdtui.") for room in OPTIONAL_ROOMS]
+    shutil.copytree(
+        Path(pdtui.__file__).parent, tmp_path / "pdtui", ignore=shutil.ignore_patterns("__pycache__", *names)
+    )
+
+    def run_copy(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "pdtui", *map(str, arguments)],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    session = tmp_path / "sessions" / "a.rrd"
+    working: list[tuple[str | Path, ...]] = [
+        ("--help",),
+        ("drive", "ant", "--map", map_path, "--headless", "--steps", "5", "--record", session),
+        ("sessions", "list"),
+        ("evaluate", "ant", "--help"),
+    ]
+    for line in working:
+        done = run_copy(*line)
+        assert done.returncode == 0, done.stderr
+    assert "a.rrd" in run_copy("sessions", "list").stdout
+    refused: list[tuple[str, tuple[str | Path, ...]]] = [
+        ("paper", ("evaluate", "ant", "--map", map_path, "--experiment", "forest")),
+        ("training", ("train", "ant")),
+        ("benchmarks", ("bench", "loop", "ant", "--map", map_path)),
+    ]
+    for room, line in refused:
+        done = run_copy(*line)
+        assert done.returncode == 1
+        assert done.stderr == (
+            f"pdtui: pdtui.{room} is not part of this installation, and the command needs it\n"
+        )
 
 
 @pytest.mark.viewer

@@ -1,6 +1,6 @@
-"""The commands; each calls a room and prints what it says.
+"""The command line: each command calls a room and prints the result.
 
-Heavy libraries load only where a command needs them.
+Commands, and the heavy libraries that they need, are loaded only when they are used.
 """
 
 from __future__ import annotations
@@ -8,29 +8,33 @@ from __future__ import annotations
 import click
 
 from pdtui import __version__
-from pdtui.cli.bench_command import bench
-from pdtui.cli.dissect_command import dissect
-from pdtui.cli.drive_commands import drive, pick_and_drive, replay
-from pdtui.cli.evaluate_command import evaluate
-from pdtui.cli.figure_command import figure
-from pdtui.cli.policy_commands import convert, train
-from pdtui.cli.pursue_command import pursue
-from pdtui.cli.sessions_commands import sessions
-from pdtui.cli.shared_options import OneLineErrors
-from pdtui.cli.tune_command import tune
+from pdtui.cli.command_group import LazyCommandGroup
+
+COMMANDS = {
+    "drive": ("pdtui.cli.drive_commands:drive", "Drive a robot with the keys of its map."),
+    "replay": ("pdtui.cli.drive_commands:replay", "Repeat a session and compare every step."),
+    "sessions": ("pdtui.cli.sessions_command:sessions", "List, inspect, verify, repair and export sessions."),
+    "evaluate": ("pdtui.cli.evaluate_command:evaluate", "Measure what the behaviors of a map do."),
+    "dissect": ("pdtui.cli.dissect_command:dissect", "Find the units that steer a robot; write a map."),
+    "pursue": ("pdtui.cli.pursue_command:pursue", "Search for units that accomplish a task."),
+    "tune": ("pdtui.cli.tune_command:tune", "Tune the PID gains of a map."),
+    "figure": ("pdtui.cli.figure_command:figure", "Draw figures as PNG files."),
+    "convert": ("pdtui.cli.policy_commands:convert", "Convert a policy to safetensors."),
+    "train": ("pdtui.cli.policy_commands:train", "Train a policy."),
+    "bench": ("pdtui.cli.bench_command:bench", "Measure speed and memory."),
+}
+"""Where each command is, and its summary in `pdtui --help`."""
 
 
-@click.group(cls=OneLineErrors, invoke_without_command=True)
+@click.group(cls=LazyCommandGroup, lazy_commands=COMMANDS, invoke_without_command=True)
 @click.version_option(__version__)
 @click.pass_context
 def main(ctx: click.Context) -> None:
     """Drive a trained neural controller by stimulating its hidden units.
 
-    Without a command, pick a robot and a map and drive.
+    Without a command, choose a robot and a map and drive.
     """
     if ctx.invoked_subcommand is None:
+        from pdtui.cli.drive_commands import pick_and_drive
+
         pick_and_drive()
-
-
-for command in (drive, replay, sessions, evaluate, dissect, pursue, tune, figure, convert, train, bench):
-    main.add_command(command)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from pdtui.cli.experiment_commands import EXPERIMENTS, ExperimentRequest
-from pdtui.cli.forest_options import forest_options
 from pdtui.cli.shared_options import (
     SeedList,
     core_count,
@@ -17,51 +16,84 @@ from pdtui.cli.shared_options import (
     force_option,
     json_option,
     map_option,
+    overwrite_option,
     policy_options,
     progress_bar_or_none,
     show_result,
     start_option,
     workers_option,
 )
-from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
 
+if TYPE_CHECKING:
+    from pdtui.drive.drive_config import DriveConfig
+    from pdtui.paper.experiment import Experiment
 
+
+def find_experiments() -> dict[str, Experiment]:
+    """Return the paper's experiments by name; none where `pdtui.paper` is not installed."""
+    try:
+        from pdtui.paper.experiment import list_experiments
+    except ModuleNotFoundError as error:
+        if error.name != "pdtui.paper":
+            raise
+        return {}
+    return list_experiments()
+
+
+EXPERIMENTS = find_experiments()
+
+
+def experiment_options(command: click.Command) -> click.Command:
+    """Add the options of the experiments to a command."""
+    for name, experiment in EXPERIMENTS.items():
+        for option in experiment.options:
+            option.help = f"With --experiment {name}: {option.help}"
+            command.params.append(option)
+    return command
+
+
+@experiment_options
 @click.command()
 @click.argument("robot")
 @click.argument("others", nargs=-1, metavar="[MAP.toml]...")
 @map_option
 @policy_options
 @force_option
-@click.option("--seeds", type=SeedList(), default="100-119", show_default=True)
 @click.option(
-    "--experiment",
-    type=click.Choice(list(EXPERIMENTS)),
-    help="One of the paper's experiments; it may compare several maps.",
+    "--seeds",
+    type=SeedList(),
+    default="100-119",
+    show_default=True,
+    help="A seed, or a range of seeds.",
 )
 @click.option(
-    "-o",
-    "--output",
-    "outputs",
-    type=click.Path(path_type=Path),
-    multiple=True,
-    metavar="FILE.png|.rrd",
-    help="Draw the experiment; may be given again.",
+    "--target",
+    metavar="ATTRIBUTE",
+    help="Measure how precisely targets of this attribute are held.",
 )
-@click.option("--overwrite", is_flag=True, help="Replace a picture that exists already.")
-@forest_options
-@click.option(
-    "--target", metavar="ATTRIBUTE", help="Measure how precisely a target of this attribute is held."
-)
-@click.option(
-    "--policy-only", is_flag=True, help="Measure the policy without any behavior, an episode a seed."
-)
+@click.option("--policy-only", is_flag=True, help="Measure the policy alone, one episode per seed.")
 @start_option
 @click.option(
     "--update",
     is_flag=True,
-    help="Write what was measured of the behaviors into the map; its comments stay.",
+    help="Write the measured effects of the behaviors into the map; its comments are kept.",
 )
+@click.option(
+    "--experiment",
+    type=click.Choice(list(EXPERIMENTS)) if EXPERIMENTS else str,
+    help="Run an experiment of the paper; some compare several maps.",
+)
+@click.option(
+    "-o",
+    "--output",
+    "pictures",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    metavar="FILE.png|.rrd",
+    help="Draw the result of the experiment; may be repeated.",
+)
+@overwrite_option
 @workers_option
 @json_option
 def evaluate(
@@ -72,57 +104,105 @@ def evaluate(
     import_options: ImportOptions,
     force: bool,
     seeds: range,
-    experiment: str | None,
-    outputs: tuple[Path, ...],
-    overwrite: bool,
-    forest: dict[str, Any],
     target: str | None,
     policy_only: bool,
     start: str,
     update: bool,
+    experiment: str | None,
+    pictures: tuple[Path, ...],
+    overwrite: bool,
     workers: int | None,
     as_json: bool,
+    **own_options: Any,
 ) -> None:
-    """Measure what every behavior of ROBOT's map does, against the default.
+    """Measure what each behavior of ROBOT's map does, compared with the policy alone.
 
-    ROBOT may be the file of a map.
+    ROBOT is a robot's name or a map file.
     """
-    from pdtui.evaluation import behavior_evaluation as behaviors
-    from pdtui.evaluation import evaluation_tables, policy_evaluation, target_tracking, tracking_tables
-    from pdtui.stimulation.map_writer import write_effects
-
-    if update and (policy_only or target is not None):
-        raise MapError(
-            "--update writes what was measured of behaviors; --target and --policy-only measure none"
-        )
-    if experiment is None and (others or outputs):
+    own_options = {name: value for name, value in own_options.items() if value not in (None, ())}
+    if experiment is None and (others or pictures):
         raise click.UsageError(f"{'more than one map' if others else '-o'} needs --experiment")
-    if experiment is not None and (policy_only or target is not None or update):
-        raise click.UsageError("--experiment goes with neither --target, --policy-only nor --update")
-    if forest and experiment != "forest":
-        raise click.UsageError(f"--{next(iter(forest)).removesuffix('s')} needs --experiment forest")
+    if sum([policy_only, target is not None, update, experiment is not None]) > 1:
+        raise click.UsageError("--target, --policy-only, --update and --experiment exclude each other")
     if start and not policy_only:
-        raise click.UsageError("--start needs --policy-only; tasks and experiments choose theirs")
+        raise click.UsageError("--start needs --policy-only; tasks and experiments have their own starts")
     if others and (map_name or policy):
-        raise click.UsageError("maps that are compared name their policies: --map and --policy are for one")
+        raise click.UsageError("--map and --policy go with one map; compared maps name their policies")
+    if experiment is None and own_options:
+        raise click.UsageError(f"{_flag(own_options)} needs --experiment")
+    if experiment is not None:
+        _check_experiment(EXPERIMENTS.get(experiment), others, pictures, own_options)
     config = drive_config(robot, map_name, policy, import_options, force=force, start=start)
     if experiment is not None:
         rest = [drive_config(other, None, "", import_options, force=force) for other in others]
-        asked = ExperimentRequest((config, *rest), seeds, workers, as_json, outputs, overwrite, forest)
-        EXPERIMENTS[experiment](asked)
+        _run_experiment(
+            experiment,
+            as_json,
+            configs=(config, *rest),
+            seeds=seeds,
+            workers=core_count(workers),
+            pictures=pictures,
+            overwrite=overwrite,
+            options=own_options,
+        )
     elif target is not None:
+        from pdtui.evaluation.target_tracking import evaluate_tracking
+        from pdtui.evaluation.tracking_tables import tracking_table
+
         with progress_bar_or_none("holding targets", quiet=as_json) as advance:
-            tracked = target_tracking.evaluate_tracking(
-                config, target, seeds, workers=core_count(workers), progress=advance
-            )
-        show_result(asdict(tracked), as_json, lambda: tracking_tables.tracking_table(tracked))
+            tracking = evaluate_tracking(config, target, seeds, workers=core_count(workers), progress=advance)
+        show_result(asdict(tracking), as_json, lambda: tracking_table(tracking))
     elif policy_only:
-        with progress_bar_or_none("walking", quiet=as_json) as advance:
-            walked = policy_evaluation.evaluate_policy(config, seeds, progress=advance)
-        show_result(asdict(walked), as_json, lambda: evaluation_tables.walking_table(walked))
-    else:
+        from pdtui.evaluation.evaluation_tables import policy_table
+        from pdtui.evaluation.policy_evaluation import evaluate_policy
+
         with progress_bar_or_none("evaluating", quiet=as_json) as advance:
-            result = behaviors.evaluate_map(config, seeds, workers=core_count(workers), progress=advance)
-        if update:
-            write_effects(Path(config.stimulation_map.source), result.measured())
-        show_result(result.as_dict(), as_json, lambda: evaluation_tables.behavior_table(result))
+            alone = evaluate_policy(config, seeds, progress=advance)
+        show_result(asdict(alone), as_json, lambda: policy_table(alone))
+    else:
+        _evaluate_behaviors(config, seeds, core_count(workers), update, as_json)
+
+
+def _evaluate_behaviors(config: DriveConfig, seeds: range, workers: int, update: bool, as_json: bool) -> None:
+    from pdtui.evaluation.behavior_evaluation import evaluate_map
+    from pdtui.evaluation.evaluation_tables import behavior_tables
+    from pdtui.stimulation.map_writer import write_effects
+
+    with progress_bar_or_none("evaluating", quiet=as_json) as advance:
+        result = evaluate_map(config, seeds, workers=workers, progress=advance)
+    if update:
+        write_effects(Path(config.stimulation_map.source), result.measured())
+    show_result(result.as_dict(), as_json, lambda: behavior_tables(result))
+
+
+def _check_experiment(
+    experiment: Experiment | None, others: Sequence[str], pictures: Sequence[Path], options: Mapping[str, Any]
+) -> None:
+    """Refuse what the experiment would otherwise silently ignore."""
+    if experiment is None:
+        return  # `pdtui.paper` is not installed, which running it will say
+    name, own = experiment.name, {option.name for option in experiment.options}
+    if foreign := {option: value for option, value in options.items() if option not in own}:
+        raise click.UsageError(f"--experiment {name} has no option {_flag(foreign)}")
+    if others and not experiment.takes_several_maps:
+        raise click.UsageError(f"--experiment {name} takes one map")
+    if pictures and not experiment.draws_pictures:
+        raise click.UsageError(f"--experiment {name} draws no pictures; leave -o out")
+
+
+def _flag(options: Mapping[str, Any]) -> str:
+    """The first of these options as it is typed."""
+    name = next(iter(options))
+    flags = (one.opts[0] for e in EXPERIMENTS.values() for one in e.options if one.name == name)
+    return next(flags)
+
+
+def _run_experiment(name: str, as_json: bool, **request: Any) -> None:
+    from pdtui.paper.experiment import ExperimentRequest
+
+    experiment = EXPERIMENTS[name]
+    with progress_bar_or_none(experiment.progress_label, quiet=as_json) as advance:
+        report = experiment.run(ExperimentRequest(**request, progress=advance))
+    show_result(report.data, as_json, lambda: report.table)
+    if report.pictures and not as_json:
+        click.echo(f"wrote {', '.join(map(str, report.pictures))}")

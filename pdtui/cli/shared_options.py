@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Callable
@@ -12,24 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pdtui.core.errors import MapError, PdtuiError
+from pdtui.core.errors import MapError
+from pdtui.core.json_text import to_json
 from pdtui.core.plain_text import printable
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, NO_OPTIONS, SQUASH_NAMES, ImportOptions
 
 if TYPE_CHECKING:
     from pdtui.drive.drive_config import DriveConfig
     from pdtui.stimulation.stimulation_map import StimulationMap
-
-
-class OneLineErrors(click.Group):
-    """Prints a `PdtuiError` as one line and exits with 1; a traceback is for bugs."""
-
-    def invoke(self, ctx: click.Context) -> Any:
-        try:
-            return super().invoke(ctx)
-        except PdtuiError as error:
-            click.echo(f"pdtui: {printable(str(error))}", err=True)  # it may quote a file
-            ctx.exit(1)
 
 
 class SeedList(click.ParamType[range]):
@@ -51,6 +40,7 @@ force_option = click.option(
     "--force", is_flag=True, help="Use the map although it was made for another policy."
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+overwrite_option = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 workers_option = click.option(
     "--workers", type=click.IntRange(1, 256), default=None, help="Processes; default: one a core."
 )
@@ -173,9 +163,10 @@ def core_count(workers: int | None) -> int:
     return workers or os.cpu_count() or 1
 
 
-def show_result(data: dict[str, Any], as_json: bool, table: Callable[[], Any]) -> None:
+def show_result(data: dict[str, Any] | list[dict[str, Any]], as_json: bool, table: Callable[[], Any]) -> None:
+    """Print the data as JSON, or the table."""
     if as_json:
-        click.echo(json.dumps(data, indent=2))
+        click.echo(to_json(data))
         return
     from rich.console import Console
 

@@ -10,7 +10,7 @@ from pdtui.evaluation.behavior_evaluation import MapEvaluation
 from pdtui.evaluation.policy_evaluation import PolicyEvaluation
 
 
-def behavior_table(result: MapEvaluation) -> Group:
+def behavior_tables(result: MapEvaluation) -> Group:
     """One row a behavior: those that move an attribute, then those that accomplish something."""
     tables = [_aim_table(result)] if result.behaviors else []
     return Group(*tables, *([_task_table(result)] if result.tasks else []))
@@ -57,7 +57,7 @@ def _aim_table(result: MapEvaluation) -> Table:
     return table
 
 
-def walking_table(result: PolicyEvaluation) -> Table:
+def policy_table(result: PolicyEvaluation) -> Table:
     """The policy alone."""
     table = new_table(
         f"the policy alone, {seed_range(result.seeds)}, {result.steps} steps each", "measure", "value"

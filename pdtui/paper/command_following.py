@@ -21,7 +21,7 @@ _ASKED = "asked"
 
 
 @dataclass(frozen=True)
-class FollowedCommand:
+class CommandTracking:
     """One command over all seeds.
 
     Attributes:
@@ -41,7 +41,7 @@ class FollowedCommand:
 
 
 @dataclass(frozen=True)
-class CommandFollowing:
+class CommandFollowingResult:
     """How closely commands are followed.
 
     Attributes:
@@ -56,7 +56,7 @@ class CommandFollowing:
     policy: str
     seeds: tuple[int, ...]
     steps: int
-    commands: tuple[FollowedCommand, ...]
+    commands: tuple[CommandTracking, ...]
     finished: int
 
     def as_dict(self) -> dict[str, Any]:
@@ -64,9 +64,9 @@ class CommandFollowing:
         return asdict(self)
 
 
-def evaluate_commands(
+def evaluate_command_following(
     config: DriveConfig, seeds: Sequence[int], *, progress: Callable[[int, int], None] | None = None
-) -> CommandFollowing:
+) -> CommandFollowingResult:
     """Ask for commands drawn from the ranges of training, one set a seed, for a whole episode.
 
     Raises:
@@ -102,7 +102,7 @@ def evaluate_commands(
     for index, (name, column) in enumerate(zip(ranges, columns, strict=True)):
         error = np.array(errors)[:, index]
         rows.append(
-            FollowedCommand(
+            CommandTracking(
                 name,
                 robot.attributes[column].unit,
                 tuple(np.array(asked)[:, index].tolist()),
@@ -111,7 +111,9 @@ def evaluate_commands(
                 float(np.array(biases)[:, index].mean()),
             )
         )
-    return CommandFollowing(robot.name, policy.name, tuple(seeds), robot.episode_steps, tuple(rows), finished)
+    return CommandFollowingResult(
+        robot.name, policy.name, tuple(seeds), robot.episode_steps, tuple(rows), finished
+    )
 
 
 def _asking(shipped: StimulationMap, commands: dict[str, float]) -> StimulationMap:

@@ -1,201 +1,96 @@
-"""`pdtui evaluate a1 --experiment forest`: how far it gets alone, with an operator, and with eyes.
-
-The paper's task transfer (section 4): a policy that feels only its own body is driven through trees that it
-cannot sense. All conditions meet the same forests for the same time.
-"""
+"""`pdtui evaluate --experiment forest`: how far a robot gets through trees that it cannot sense."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+import math
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING
 
-from pdtui.core.errors import PdtuiError, PolicyError, SessionError
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless import build_loop
-from pdtui.drive.loop_cache import cached_loop, drive_worker_pool
-from pdtui.paper.forest_episode import (
-    FOREST,
-    ROUGH,
-    ForestEpisode,
-    drive_forest_episode,
-    operator_for,
-    read_forest_episode,
-    record_forest_episode,
-    try_keys,
-)
-from pdtui.paper.forest_results import ForestResult, summarise_condition
-from pdtui.paper.key_dynamics import KeyDynamics, ObservedDrive
-from pdtui.paper.key_dynamics_fit import fit_key_dynamics
-from pdtui.paper.scripted_operator import operator_keys
-from pdtui.policies.weights.weights_file import find_weights_file
-from pdtui.robots import check_robot, file_stem
-from pdtui.stimulation.stimulation_map import StimulationMap
+import click
 
-ForestCondition = Literal["alone", "operator", "vision"]
-CONDITIONS: dict[ForestCondition, str] = {
-    "alone": "state alone",
-    "operator": "state with an operator",
-    "vision": "state + vision",
-}
-PERSON = "state with a person"
-STEPS, REPEATS = 2400, 5
-"""The A1 needs some 1300 steps to the far end without a detour."""
-TRIED_SEEDS, TRIED_STEPS = tuple(range(900, 908)), 900
-"""Of the drives on rough ground from which the operator learns what its keys do."""
+from pdtui.paper.experiment import Experiment, ExperimentReport, ExperimentRequest
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+    from pdtui.paper.forest.forest_results import ForestExperimentResult, RepeatStatistics
 
 
-def evaluate_forest(
-    config: DriveConfig,
-    seeds: Sequence[int],
-    *,
-    conditions: Sequence[ForestCondition] = tuple(CONDITIONS),
-    sessions: Sequence[Path] = (),
-    repeats: int = REPEATS,
-    steps: int = STEPS,
-    record: Path | None = None,
-    tried: tuple[Sequence[int], int] = (TRIED_SEEDS, TRIED_STEPS),
-    workers: int = 2,
-    progress: Callable[[int, int], None] | None = None,
-) -> ForestResult:
-    """Measure conditions on the same forests, and score recorded drives.
-
-    An episode ends at a fall or at the forest's far end; what it gathered up to then counts.
-
-    Args:
-        config: robot, map and policy; its seed and start are not used.
-        seeds: of the forests; consecutive ones make a repeat.
-        conditions: to be measured. Vision is left out where its robot or its policy is not there.
-        sessions: a person's drives, each a repeat of one episode.
-        repeats: into which the seeds are divided.
-        steps: control steps an episode lasts at most.
-        record: folder into which the operator's drives are recorded, each a session and a keystroke file.
-        tried: seeds and steps of the drives from which the operator learns what its keys do.
-        workers: processes.
-        progress: called with episodes done and episodes in all.
+def run_forest_experiment(request: ExperimentRequest) -> ExperimentReport:
+    """Measure the conditions asked for; only sessions are scored where just those are given.
 
     Raises:
-        PdtuiError: robot, policy or map cannot be had or lack what is needed, the seeds cannot be divided, or
-            a session cannot be scored.
+        PdtuiError: as `evaluate_forest`.
     """
-    if conditions and (not seeds or len(seeds) % repeats):
-        raise PdtuiError(f"{len(seeds)} seeds cannot be divided into {repeats} equal repeats")
-    config = replace(config, seed=0, start=FOREST)
-    loop = build_loop(config)
-    name, dt, policy = config.robot, loop.robot.control_dt, loop.policy.name
-    people = [(path, *read_forest_episode(path, name, steps)) for path in sessions]
-    configs, left_out = _configs(config, conditions)
-    learning = tuple(tried[0]) if "operator" in configs else ()
-    keys = list(operator_keys(config.stimulation_map)) if learning else []
-    if taken := sorted(set(learning) & set(seeds)):
-        raise PdtuiError(f"seed {taken[0]}: on that one the operator learns what its keys do")
-    if record is not None and (present := sorted(record.glob("*.rrd"))):
-        raise SessionError(f"{present[0]}: exists already; drives are recorded into a new folder")
-    total, done = len(learning) + len(configs) * len(seeds), 0
-    responses: dict[str, KeyDynamics] = {}
-    runs: dict[ForestCondition, list[ForestEpisode]] = {}
-    with _pool(workers if total else 0) as run_all:
-        drives = []
-        for drive in run_all(
-            _try_keys, [(replace(config, start=ROUGH), seed, tried[1]) for seed in learning]
-        ):
-            drives.append(drive)
-            done = _tell(progress, done, total)
-        if drives:
-            responses = fit_key_dynamics(drives, keys, dt)
-        for condition, its_order in configs.items():
-            with_it = responses if condition == "operator" else {}
-            folder = record if with_it else None
-            jobs = [(its_order, seed, steps, with_it, folder) for seed in seeds]
-            runs[condition] = []
-            for run in run_all(_run_episode, jobs):
-                runs[condition].append(run)
-                done = _tell(progress, done, total)
-    measured = [
-        summarise_condition(CONDITIONS[one], configs[one].policy or policy, runs[one], repeats)
-        for one in runs
-    ]
-    if people:
-        driven = ", ".join(sorted({session_policy for _, _, session_policy in people}))
-        measured.append(summarise_condition(PERSON, driven, [run for _, run, _ in people], len(people)))
-    return ForestResult(
-        name,
-        tuple(seeds) if conditions else (),
-        repeats,
-        steps,
-        steps * dt,
-        tuple(measured),
-        left_out,
-        responses,
-        learning,
-        tuple(map(str, sessions)),
+    from pdtui.paper.forest.forest_conditions import CONDITIONS, evaluate_forest
+
+    options = dict(request.options)
+    options.setdefault("conditions", () if "sessions" in options else tuple(CONDITIONS))
+    result = evaluate_forest(
+        request.configs[0], request.seeds, workers=request.workers, progress=request.progress, **options
     )
+    return ExperimentReport(result.as_dict(), forest_table(result))
 
 
-_Episode = tuple[DriveConfig, int, int, dict[str, KeyDynamics], Path | None]
+def forest_table(result: ForestExperimentResult) -> Group:
+    """Return a table with one column per condition and figures per episode, and notes below it."""
+    from rich.console import Group
+
+    from pdtui.core.text_tables import new_table, seed_range
+
+    measured = f", {seed_range(result.seeds)} in {result.repeats} repeats" if result.seeds else ""
+    rows = result.conditions
+    table = new_table(
+        f"{result.robot} in the forest, at most {result.steps} steps ({result.seconds:g} s){measured}",
+        *("per episode", *(row.condition for row in rows)),
+    )
+    table.add_row("policy", *(row.policy for row in rows))
+    table.add_row("reward", *(_mean_and_spread(row.reward, 0) for row in rows))
+    table.add_row("distance along x (m)", *(_mean_and_spread(row.distance, 2) for row in rows))
+    table.add_row("collisions", *(_mean_and_spread(row.collisions, 2) for row in rows))
+    table.add_row("key presses", *(_mean_and_spread(row.presses, 1) for row in rows))
+    table.add_row("steps with a key press", *(_mean_and_spread(row.involvement, 1) for row in rows))
+    table.add_row("falls", *(f"{row.falls}/{row.episodes}" for row in rows))
+    table.add_row("crossed the forest", *(f"{row.crossed}/{row.episodes}" for row in rows))
+    notes = ["Mean ± standard deviation over repeats. An episode ends at a fall or at the far end."]
+    if result.sessions:
+        notes.append("The first episode of each scored session counts as a repeat.")
+    notes += [f"Not measured: {condition}: {reason}" for condition, reason in result.left_out.items()]
+    return Group(table, *notes)
 
 
-def _try_keys(job: tuple[DriveConfig, int, int]) -> ObservedDrive:
-    config, seed, steps = job
-    return try_keys(_loop(config, seed), steps)
+def _mean_and_spread(figure: RepeatStatistics, digits: int) -> str:
+    spread = "" if math.isnan(figure.std) else f" ± {figure.std:.{digits}f}"
+    return f"{figure.mean:.{digits}f}{spread}"
 
 
-def _run_episode(job: _Episode) -> ForestEpisode:
-    config, seed, steps, responses, folder = job
-    loop = _loop(config, seed)
-    operator = operator_for(loop, responses) if responses else None
-    if operator is None or folder is None:
-        return drive_forest_episode(loop, steps, operator)[0]
-    path = folder / f"{file_stem(config.robot)}-forest-seed{seed}.rrd"
-    return record_forest_episode(loop, steps, operator, path, config.activations)
-
-
-def _loop(config: DriveConfig, seed: int) -> ControlLoop:
-    built = cached_loop(replace(config, start=""))
-    return ControlLoop(built.robot, built.policy, built.map, seed, start=config.start)
-
-
-def _configs(
-    config: DriveConfig, conditions: Sequence[ForestCondition]
-) -> tuple[dict[ForestCondition, DriveConfig], dict[str, str]]:
-    """How each condition is driven, and why some are not."""
-    configs: dict[ForestCondition, DriveConfig] = {}
-    left_out = {}
-    for condition in conditions:
-        if condition != "vision":
-            configs[condition] = config
-            continue
-        try:
-            configs[condition] = _with_vision(config)
-        except PdtuiError as error:
-            left_out[CONDITIONS[condition]] = str(error)
-    return configs, left_out
-
-
-def _with_vision(config: DriveConfig) -> DriveConfig:
-    """The robot that sees, with its shipped policy and no behaviors."""
-    name = check_robot(f"{config.robot}-vision")
-    try:
-        find_weights_file(name)
-    except PolicyError as error:
-        raise PolicyError(f"'{name}' has no policy yet: {error}") from error
-    nothing = StimulationMap(name, name, "", config.stimulation_map.default_key, {}, {})
-    return DriveConfig(name, nothing, 0, name, start=FOREST, force=True)
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator[Callable[..., Any]]:
-    if not workers:
-        yield lambda _, jobs: iter(jobs)
-        return
-    with drive_worker_pool(workers) as pool:
-        yield pool.imap
-
-
-def _tell(progress: Callable[[int, int], None] | None, done: int, total: int) -> int:
-    if progress is not None:
-        progress(done + 1, total)
-    return done + 1
+EXPERIMENT = Experiment(
+    "forest",
+    "crossing the forest",
+    run_forest_experiment,
+    (
+        click.Option(
+            ["--steps"], type=click.IntRange(1), help="Longest episode, in control steps.  [default: 2400]"
+        ),
+        click.Option(["--repeats"], type=click.IntRange(1), help="Number of groups of seeds.  [default: 5]"),
+        click.Option(
+            ["--condition", "conditions"],
+            multiple=True,
+            type=click.Choice(["alone", "operator", "vision"]),
+            help="Measure only this condition; may be repeated.  [default: all]",
+        ),
+        click.Option(
+            ["--session", "sessions"],
+            multiple=True,
+            type=click.Path(path_type=Path),
+            help="Score a recorded drive; may be repeated. Conditions are then measured only where "
+            "--condition names them.",
+        ),
+        click.Option(
+            ["--record"],
+            type=click.Path(path_type=Path, file_okay=False),
+            metavar="FOLDER",
+            help="Record the operator's drives, each as a session and a keystroke file.",
+        ),
+    ),
+)

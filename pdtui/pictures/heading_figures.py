@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from rich.table import Table
 from pdtui.core.angles import wrap_angles
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import PictureError
+from pdtui.core.json_text import to_json
 from pdtui.pictures.markdown_report import table_to_markdown
 from pdtui.pictures.matplotlib_page import check_matplotlib, figure_page
 from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, to_hex
@@ -171,7 +171,7 @@ def write_heading_recording(path: Path, shown: HeadingFigure) -> None:
             rr.send_columns(entity, [moments], columns, recording=recording, strict=True)
 
         recording.send_recording_name(shown.title)
-        recording.send_property(PROPERTY, rr.AnyValues(summary=json.dumps(shown.summary)))
+        recording.send_property(PROPERTY, rr.AnyValues(summary=to_json(shown.summary, indent=None)))
         table = rr.TextDocument(table_to_markdown(shown.figures), media_type=rr.MediaType.MARKDOWN)
         rr.log(_FIGURES, table, static=True, recording=recording, strict=True)
         curve(f"{_HEADINGS}/target", shown.target, "target", GREY, 1.5)

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from pdtui.cli import main
 from pdtui.core.errors import RobotError
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.paper.command_following import evaluate_commands
+from pdtui.paper.command_following import evaluate_command_following
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map
 
@@ -31,6 +31,15 @@ def test_anymal_follows_what_a_seed_draws() -> None:
     np.testing.assert_allclose([row["asked"][0] for row in data["commands"]], asked)
 
 
+def test_several_maps_make_one_json_document() -> None:
+    line = ["evaluate", "anymal", "anymal", "--experiment", "commands", "--seeds", "7", "--json"]
+    result = CliRunner().invoke(main, line)
+    assert result.exit_code == 0, result.output
+    first, second = json.loads(result.output)
+    assert first == second
+    assert first["robot"] == "anymal"
+
+
 def test_a_robot_without_commands_is_refused() -> None:
     with pytest.raises(RobotError, match="walker: it takes no commands"):
-        evaluate_commands(DriveConfig("walker", load_map(find_map("walker")), 0), [1])
+        evaluate_command_following(DriveConfig("walker", load_map(find_map("walker")), 0), [1])

@@ -17,15 +17,15 @@ from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.headless import build_loop, drive_headless
 from pdtui.drive.keystrokes import read_keystrokes
 from pdtui.drive.replay import replay_session
-from pdtui.paper.forest_episode import (
+from pdtui.paper.forest.forest_conditions import PERSON, REPEATS, evaluate_forest
+from pdtui.paper.forest.forest_episode import (
+    build_operator,
     drive_forest_episode,
-    operator_for,
     read_forest_episode,
     record_forest_episode,
 )
-from pdtui.paper.forest_experiment import PERSON, REPEATS, evaluate_forest
-from pdtui.paper.key_dynamics import KeyDynamics
-from pdtui.paper.scripted_operator import DEFAULT
+from pdtui.paper.forest.key_motion_model import KeyMotionModel
+from pdtui.paper.forest.scripted_operator import DEFAULT
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import hash_file, save_network
 from pdtui.sessions.session_reader import read_session
@@ -48,12 +48,12 @@ says = "does something"
 magnitudes = {{ "0:3" = {value} }}
 """
 QUICK = ((7,), 450)
-SWAY = KeyDynamics(0.5, 1.0, 0.1, 6.0, 0.8, 0.0, 0.2, 0.0)
+SWAY = KeyMotionModel(0.5, 1.0, 0.1, 6.0, 0.8, 0.0, 0.2, 0.0)
 RESPONSES = {
-    DEFAULT: KeyDynamics(0.0, 1.4, 0.1, 6.0, 0.8, 0.0, 0.2, 0.0),
+    DEFAULT: KeyMotionModel(0.0, 1.4, 0.1, 6.0, 0.8, 0.0, 0.2, 0.0),
     "left": SWAY,
-    "right": KeyDynamics(-0.5, 1.0, 0.1, 6.0, 0.8, 0.0, 0.2, 0.0),
-    "stop": KeyDynamics(0.0, 1.0, 0.1, 0.1, 0.8, 0.0, 0.2, 0.0),
+    "right": KeyMotionModel(-0.5, 1.0, 0.1, 6.0, 0.8, 0.0, 0.2, 0.0),
+    "stop": KeyMotionModel(0.0, 1.0, 0.1, 0.1, 0.8, 0.0, 0.2, 0.0),
 }
 """What the operator is told, though this robot only stands: so it has reason to press keys."""
 
@@ -104,7 +104,7 @@ def recorded(built: ControlLoop, tmp_path_factory: pytest.TempPathFactory) -> Pa
     """A drive of the operator, of 120 steps."""
     path = tmp_path_factory.mktemp("drives") / "driven.rrd"
     loop = _loop(built, 505)
-    record_forest_episode(loop, 120, operator_for(loop, RESPONSES), path, "all")
+    record_forest_episode(loop, 120, build_operator(loop, RESPONSES), path, "all")
     return path
 
 
@@ -120,12 +120,12 @@ def test_the_operators_drive_is_saved_like_a_persons(
     drive_headless(loop, presses, 120, SessionRecorder(again, loop.info))
     np.testing.assert_array_equal(read_session(again).digests, session.digests)
     with pytest.raises(SessionError, match=r"driven\.rrd: exists already"):
-        record_forest_episode(loop, 10, operator_for(loop, RESPONSES), recorded, "all")
+        record_forest_episode(loop, 10, build_operator(loop, RESPONSES), recorded, "all")
 
 
 def test_a_recorded_drive_scores_what_it_did(recorded: Path, built: ControlLoop) -> None:
     loop = _loop(built, 505)
-    driven, events = drive_forest_episode(loop, 120, operator_for(loop, RESPONSES))
+    driven, events = drive_forest_episode(loop, 120, build_operator(loop, RESPONSES))
     assert read_forest_episode(recorded, "a1", 1000) == (driven, "stands")
     assert driven.presses == len(events) == driven.pressed_steps > 0
     assert (driven.seed, driven.steps, driven.fell, driven.crossed) == (505, 120, False, False)

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from pdtui.paper.forest_episode import ForestEpisode
-from pdtui.paper.key_dynamics import KeyDynamics
+from pdtui.paper.forest.forest_episode import ForestEpisode
+from pdtui.paper.forest.key_motion_model import KeyMotionModel
 
 
 @dataclass(frozen=True)
-class RepeatSpread:
+class RepeatStatistics:
     """Mean over repeats, and their standard deviation (n − 1); NaN for a single repeat."""
 
     mean: float
@@ -21,7 +21,7 @@ class RepeatSpread:
 
 
 @dataclass(frozen=True)
-class ForestConditionResult:
+class ForestConditionSummary:
     """One condition over all repeats; figures are per episode.
 
     Attributes:
@@ -40,11 +40,11 @@ class ForestConditionResult:
 
     condition: str
     policy: str
-    reward: RepeatSpread
-    distance: RepeatSpread
-    collisions: RepeatSpread
-    presses: RepeatSpread
-    involvement: RepeatSpread
+    reward: RepeatStatistics
+    distance: RepeatStatistics
+    collisions: RepeatStatistics
+    presses: RepeatStatistics
+    involvement: RepeatStatistics
     falls: int
     crossed: int
     episodes: int
@@ -52,7 +52,7 @@ class ForestConditionResult:
 
 
 @dataclass(frozen=True)
-class ForestResult:
+class ForestExperimentResult:
     """All conditions that were measured.
 
     Attributes:
@@ -73,9 +73,9 @@ class ForestResult:
     repeats: int
     steps: int
     seconds: float
-    conditions: tuple[ForestConditionResult, ...]
+    conditions: tuple[ForestConditionSummary, ...]
     left_out: dict[str, str]
-    keys: dict[str, KeyDynamics]
+    keys: dict[str, KeyMotionModel]
     key_seeds: tuple[int, ...]
     sessions: tuple[str, ...]
 
@@ -86,14 +86,16 @@ class ForestResult:
 
 def summarise_condition(
     condition: str, policy: str, runs: Sequence[ForestEpisode], repeats: int
-) -> ForestConditionResult:
+) -> ForestConditionSummary:
     """The figures of one condition; consecutive runs make a repeat."""
 
-    def spread(name: str) -> RepeatSpread:
+    def spread(name: str) -> RepeatStatistics:
         values = np.array([float(getattr(run, name)) for run in runs]).reshape(repeats, -1).mean(axis=1)
-        return RepeatSpread(float(values.mean()), float(values.std(ddof=1)) if repeats > 1 else float("nan"))
+        return RepeatStatistics(
+            float(values.mean()), float(values.std(ddof=1)) if repeats > 1 else float("nan")
+        )
 
-    return ForestConditionResult(
+    return ForestConditionSummary(
         condition,
         policy,
         spread("reward"),

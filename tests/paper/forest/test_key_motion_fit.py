@@ -8,14 +8,20 @@ import numpy as np
 import pytest
 
 from pdtui.core.errors import RobotError
-from pdtui.paper.key_dynamics import KeyDynamics, ObservedDrive, RobotPlace, observe_place, predict_places
-from pdtui.paper.key_dynamics_fit import fit_key_dynamics
+from pdtui.paper.forest.key_motion_fit import fit_key_motion_models
+from pdtui.paper.forest.key_motion_model import (
+    KeyMotionModel,
+    ObservedDrive,
+    RobotMotion,
+    estimate_motion,
+    predict_motion,
+)
 
 DT = 0.016
 RESPONSES = {
-    "default": KeyDynamics(0.1, 1.4, 0.1, 2.5, 0.9, -0.1, 0.2, 0.0),
-    "left": KeyDynamics(1.5, 0.8, 0.3, 1.0, 0.8, -0.3, 0.4, 0.0),
-    "right": KeyDynamics(-0.9, 1.2, 0.2, 1.5, 1.1, 0.2, 0.3, 0.0),
+    "default": KeyMotionModel(0.1, 1.4, 0.1, 2.5, 0.9, -0.1, 0.2, 0.0),
+    "left": KeyMotionModel(1.5, 0.8, 0.3, 1.0, 0.8, -0.3, 0.4, 0.0),
+    "right": KeyMotionModel(-0.9, 1.2, 0.2, 1.5, 1.1, 0.2, 0.3, 0.0),
 }
 NAMES = list(RESPONSES)
 
@@ -23,13 +29,13 @@ NAMES = list(RESPONSES)
 def _drive(rng: np.random.Generator) -> ObservedDrive:
     held = rng.integers(20, 80, 15)
     choices = np.repeat(np.arange(15) % 3, held)
-    there, _ = predict_places(list(RESPONSES.values()), RobotPlace(0, 0, 0, 1.0), choices[None], DT)
+    there, _ = predict_motion(list(RESPONSES.values()), RobotMotion(0, 0, 0, 1.0), choices[None], DT)
     return ObservedDrive(np.vstack([[0.0, 0.0, 0.0], there[0]]), choices, False)
 
 
 def test_responses_are_found_again_and_predict_another_drive() -> None:
     rng = np.random.default_rng(0)
-    found = fit_key_dynamics([_drive(rng) for _ in range(4)], NAMES, DT)
+    found = fit_key_motion_models([_drive(rng) for _ in range(4)], NAMES, DT)
     for name, response in RESPONSES.items():
         assert found[name].pull == pytest.approx(response.pull, abs=0.15)
         assert found[name].lag == pytest.approx(response.lag, abs=0.1)
@@ -39,8 +45,8 @@ def test_responses_are_found_again_and_predict_another_drive() -> None:
     other = _drive(rng)
     errors = []
     for first in range(30, len(other.choices) - 63, 10):
-        start = observe_place(other.places[: first + 1], DT)
-        there, _ = predict_places(list(found.values()), start, other.choices[None, first : first + 63], DT)
+        start = estimate_motion(other.places[: first + 1], DT)
+        there, _ = predict_motion(list(found.values()), start, other.choices[None, first : first + 63], DT)
         errors.append(np.hypot(*(there[0, -1, :2] - other.places[first + 63, :2])))
     assert np.mean(errors) < 0.1  # m, after a second of about 2 m
 
@@ -48,11 +54,11 @@ def test_responses_are_found_again_and_predict_another_drive() -> None:
 def test_falls_count_for_each_press_of_what_was_latched() -> None:
     rng = np.random.default_rng(1)
     drives = [_drive(rng), replace(_drive(rng), fell=True)]
-    found = fit_key_dynamics(drives, NAMES, DT)
+    found = fit_key_motion_models(drives, NAMES, DT)
     assert [found[name].falls for name in NAMES] == pytest.approx([0.0, 0.0, 0.1])
 
 
 def test_a_choice_that_was_hardly_seen_is_named() -> None:
     rng = np.random.default_rng(2)
     with pytest.raises(RobotError, match="'never': the robot was seen with it in 0 stretches"):
-        fit_key_dynamics([_drive(rng)], [*NAMES, "never"], DT)
+        fit_key_motion_models([_drive(rng)], [*NAMES, "never"], DT)

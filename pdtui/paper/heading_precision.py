@@ -21,7 +21,7 @@ from pdtui.search.tracking_summary import HEADINGS, TrackingSummary, seed_errors
 from pdtui.stimulation.stimulation_map import Behavior
 
 ATTRIBUTE = "yaw"
-ControlMeans = Literal["command", "units", "both"]
+ControlInput = Literal["command", "units", "both"]
 
 
 @dataclass(frozen=True)
@@ -39,33 +39,33 @@ class ErrorRatio:
 
 
 @dataclass(frozen=True)
-class HeadingController:
+class HeadingControllerResult:
     """One behavior that holds the heading.
 
     Attributes:
         map: where it is from.
         robot, policy: names.
-        by: what its controller's output goes to.
-        driven: the commands and units that it goes to.
-        asked: what the policy is asked for besides.
+        input_kind: whether the PID sets commands, units or both.
+        inputs: names of the commands and units that it sets.
+        other_commands: the commands that it leaves alone, and their values.
         tracking: its figures.
         ratio: to the map's behavior by command; None for that one, and where there is none.
-        values: headings by seed and step, shape (seeds, targets × 100), rad; NaN after a fall.
+        headings: heading per seed and control step, rad, shape (seeds, targets × 100); NaN after a fall.
     """
 
     map: str
     robot: str
     policy: str
-    by: ControlMeans
-    driven: tuple[str, ...]
-    asked: dict[str, float]
+    input_kind: ControlInput
+    inputs: tuple[str, ...]
+    other_commands: dict[str, float]
     tracking: TrackingSummary
     ratio: ErrorRatio | None
-    values: Floats
+    headings: Floats
 
 
 @dataclass(frozen=True)
-class UnitCommandComparison:
+class HeadingPrecisionComparison:
     """The experiment.
 
     Attributes:
@@ -78,7 +78,7 @@ class UnitCommandComparison:
     seeds: tuple[int, ...]
     targets: tuple[float, ...]
     dt: float
-    rows: tuple[HeadingController, ...]
+    rows: tuple[HeadingControllerResult, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """The form that ``--json`` prints."""
@@ -87,9 +87,9 @@ class UnitCommandComparison:
                 "map": row.map,
                 "robot": row.robot,
                 "policy": row.policy,
-                "by": row.by,
-                "driven": list(row.driven),
-                "commands": row.asked,
+                "by": row.input_kind,
+                "driven": list(row.inputs),
+                "commands": row.other_commands,
                 **{name: value for name, value in asdict(row.tracking).items() if name != "default_error"},
                 "ratio": None if row.ratio is None else asdict(row.ratio),
             }
@@ -104,21 +104,21 @@ class UnitCommandComparison:
         }
 
 
-def control_means(behavior: Behavior) -> ControlMeans:
+def control_input(behavior: Behavior) -> ControlInput:
     """What a behavior's controller moves."""
     if behavior.commands and behavior.magnitudes:
         return "both"
     return "command" if behavior.commands else "units"
 
 
-def compare_unit_with_command(
+def compare_heading_precision(
     configs: Sequence[DriveConfig],
     seeds: Sequence[int],
     *,
     targets: Sequence[float] = HEADINGS,
     workers: int = 1,
     progress: Callable[[int, int], None] | None = None,
-) -> UnitCommandComparison:
+) -> HeadingPrecisionComparison:
     """Hold headings with every behavior of mode ``pid`` on the yaw angle that the maps have.
 
     Args:
@@ -134,7 +134,7 @@ def compare_unit_with_command(
     """
     found = [(config, _holding(config)) for config in configs]
     total, before = len(seeds) * sum(len(behaviors) for _, behaviors in found), 0
-    rows: list[HeadingController] = []
+    rows: list[HeadingControllerResult] = []
     steps: dict[str, float] = {}
     for config, behaviors in found:
 
@@ -154,7 +154,7 @@ def compare_unit_with_command(
     if len(set(steps.values())) > 1:
         told = ", ".join(f"{source} has {dt:g} s" for source, dt in steps.items())
         raise MapError(f"expected maps of robots with one control step, found: {told}")
-    return UnitCommandComparison(tuple(seeds), tuple(targets), next(iter(steps.values())), tuple(rows))
+    return HeadingPrecisionComparison(tuple(seeds), tuple(targets), next(iter(steps.values())), tuple(rows))
 
 
 def _holding(config: DriveConfig) -> list[Behavior]:
@@ -174,18 +174,18 @@ def _rows(
     behaviors: Sequence[Behavior],
     followed: Sequence[TrackingDriveResult],
     count: int,
-) -> list[HeadingController]:
+) -> list[HeadingControllerResult]:
     loop = runner.loop
     parts = [list(followed[number * count :][:count]) for number in range(len(behaviors))]
     by_command = next(
-        (p for b, p in zip(behaviors, parts, strict=True) if control_means(b) == "command"), None
+        (p for b, p in zip(behaviors, parts, strict=True) if control_input(b) == "command"), None
     )
     return [
-        HeadingController(
+        HeadingControllerResult(
             loop.map.source,
             loop.robot.name,
             loop.policy.name,
-            control_means(behavior),
+            control_input(behavior),
             (*behavior.commands, *loop.map.units_of(behavior)),
             {name: value for name, value in loop.robot.commands.items() if name not in behavior.commands},
             summarise_tracking(part, runner.attribute(ATTRIBUTE).unit),

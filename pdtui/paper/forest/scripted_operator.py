@@ -9,9 +9,15 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
-from pdtui.paper.key_dynamics import LOOKS_BACK, KeyDynamics, RobotPlace, observe_place, predict_places
-from pdtui.paper.key_planner import KeyPlanner
-from pdtui.paper.tree_escape import WATCHED, TreeEscape
+from pdtui.paper.forest.key_motion_model import (
+    LOOKS_BACK,
+    KeyMotionModel,
+    RobotMotion,
+    estimate_motion,
+    predict_motion,
+)
+from pdtui.paper.forest.key_planner import KeyPlanner
+from pdtui.paper.forest.tree_contact_recovery import WATCHED, TreeContactRecovery
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 REACTION = 0.3
@@ -45,9 +51,9 @@ def operator_keys(stimulation_map: StimulationMap) -> dict[str, str]:
 class ScriptedOperator:
     """Decides which key to press from what it saw `REACTION` ago and from its own presses since.
 
-    It predicts where the robot is by now, and where each of some hundred schedules of keys would lead
-    (`KeyPlanner`); where a tree holds the robot, it turns it away first (`TreeEscape`). Nothing is left to
-    chance, so that the same sight gives the same keys.
+    It predicts where the robot is now and where each of a few hundred key schedules would lead
+    (`KeyPlanner`). A robot that is stuck at a tree is turned away first (`TreeContactRecovery`). Nothing is
+    random: the same observations give the same key presses.
 
     Args:
         responses: what each key does, by name, the default first.
@@ -58,13 +64,13 @@ class ScriptedOperator:
 
     def __init__(
         self,
-        responses: Mapping[str, KeyDynamics],
+        responses: Mapping[str, KeyMotionModel],
         trees: Floats,
         dt: float,
         periods: Mapping[str, int] | None = None,
     ) -> None:
         self._names, self._responses = tuple(responses), tuple(responses.values())
-        self._planner, self._escape = KeyPlanner(self._responses, trees), TreeEscape(trees, dt)
+        self._planner, self._escape = KeyPlanner(self._responses, trees), TreeContactRecovery(trees, dt)
         self._dt, self._periods = dt, dict(periods or {})
         self._delay = math.ceil(REACTION / dt - 1e-9)
         self._second = math.ceil(1.0 / dt - 1e-9)
@@ -102,10 +108,10 @@ class ScriptedOperator:
             return self._names.index("left" if turn > 0 else "right")
         return self._planner.choose(place, now)
 
-    def _guess(self, old: int) -> RobotPlace:
+    def _guess(self, old: int) -> RobotMotion:
         """Where the robot is now, from how it moved up to step `old` and what was pressed since."""
-        seen = observe_place(np.array(self._seen[max(0, old - LOOKS_BACK) : old + 1]), self._dt)
-        return predict_places(self._responses, seen, np.array([self._latched[old:]]), self._dt)[1]
+        seen = estimate_motion(np.array(self._seen[max(0, old - LOOKS_BACK) : old + 1]), self._dt)
+        return predict_motion(self._responses, seen, np.array([self._latched[old:]]), self._dt)[1]
 
     def _still_latched(self, step: int) -> int:
         if not self._latched:

@@ -9,17 +9,17 @@ import pytest
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
-from pdtui.paper.key_dynamics import KeyDynamics, RobotPlace, predict_places
-from pdtui.paper.scripted_operator import DEFAULT, PRESSES, REACTION, ScriptedOperator, operator_keys
+from pdtui.paper.forest.key_motion_model import KeyMotionModel, RobotMotion, predict_motion
+from pdtui.paper.forest.scripted_operator import DEFAULT, PRESSES, REACTION, ScriptedOperator, operator_keys
 from pdtui.robots.legged.terrain import scatter_trees
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 DT = 0.016
 RESPONSES = {
-    DEFAULT: KeyDynamics(0.0, 1.4, 0.1, 2.5, 0.8, 0.0, 0.2, 0.0),
-    "left": KeyDynamics(0.7, 1.0, 0.1, 2.0, 0.8, 0.0, 0.2, 0.0),
-    "right": KeyDynamics(-0.7, 1.0, 0.1, 2.0, 0.8, 0.0, 0.2, 0.0),
-    "stop": KeyDynamics(0.0, 1.0, 0.1, 0.1, 0.8, 0.0, 0.2, 0.0),
+    DEFAULT: KeyMotionModel(0.0, 1.4, 0.1, 2.5, 0.8, 0.0, 0.2, 0.0),
+    "left": KeyMotionModel(0.7, 1.0, 0.1, 2.0, 0.8, 0.0, 0.2, 0.0),
+    "right": KeyMotionModel(-0.7, 1.0, 0.1, 2.0, 0.8, 0.0, 0.2, 0.0),
+    "stop": KeyMotionModel(0.0, 1.0, 0.1, 0.1, 0.8, 0.0, 0.2, 0.0),
 }
 NAMES = list(RESPONSES)
 
@@ -29,7 +29,7 @@ def _drive(
 ) -> tuple[Floats, dict[int, str]]:
     """Places before each step, shape (S, 3), and presses by step; from one step on, it sees itself aside."""
     operator = ScriptedOperator(RESPONSES, trees, DT)
-    place, latched = RobotPlace(0.0, 0.0, 0.0, 0.0), 0
+    place, latched = RobotMotion(0.0, 0.0, 0.0, 0.0), 0
     places, presses = [], {}
     for step in range(steps):
         places.append((place.x, place.y, place.heading))
@@ -37,7 +37,7 @@ def _drive(
         if driven and (name := operator.look(place.x, place.y + aside, place.heading)):
             presses[step] = name
             latched = NAMES.index(name)
-        _, place = predict_places(list(RESPONSES.values()), place, np.array([[latched]]), DT)
+        _, place = predict_motion(list(RESPONSES.values()), place, np.array([[latched]]), DT)
     return np.array(places), presses
 
 

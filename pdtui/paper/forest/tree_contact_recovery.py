@@ -23,7 +23,7 @@ _CLEAR_TURNED = 1.3
 _PATIENCE = 1.6
 
 
-class TreeEscape:
+class TreeContactRecovery:
     """Says which way to turn while the robot is held by a tree.
 
     Args:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 from dataclasses import asdict
@@ -14,6 +13,7 @@ import click
 from pdtui.cli.shared_options import json_option, judging_options, progress_bar_or_none, show_result
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PdtuiError, SessionError
+from pdtui.core.json_text import to_json
 from pdtui.core.plain_text import printable
 
 BROKEN, DIFFERS = 1, 3
@@ -104,7 +104,7 @@ def verify(files: tuple[Path, ...], policy: str, judging: dict[str, Any], as_jso
     """
     found = [_verified(file, policy, judging, as_json) for file in files]
     if as_json:
-        click.echo(json.dumps({"sessions": found}, indent=2))
+        click.echo(to_json({"sessions": found}))
     if any(row["repeats"] is False for row in found):
         sys.exit(DIFFERS)
     if not all(row["whole"] and row["repeats"] for row in found):

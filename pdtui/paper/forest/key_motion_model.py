@@ -25,7 +25,7 @@ _MOVING = 0.3
 
 
 @dataclass(frozen=True)
-class KeyDynamics:
+class KeyMotionModel:
     """What the robot does while one key is latched.
 
     Attributes:
@@ -61,7 +61,7 @@ class ObservedDrive:
 
 
 @dataclass(frozen=True)
-class RobotPlace:
+class RobotMotion:
     """Where a robot is and how it moves: x and y in m, heading in rad, speed in m/s, rate of turning in
     rad/s, direction of motion less heading in rad."""
 
@@ -73,7 +73,7 @@ class RobotPlace:
     drift: float = 0.0
 
 
-def observe_place(places: Floats, dt: float) -> RobotPlace:
+def estimate_motion(places: Floats, dt: float) -> RobotMotion:
     """Where a robot is and how it moves, from its last places.
 
     Args:
@@ -90,12 +90,12 @@ def observe_place(places: Floats, dt: float) -> RobotPlace:
     speed = math.hypot(forth, aside)
     drift = float(wrap_angle(math.atan2(aside, forth) - headings.mean())) if speed > _MOVING else 0.0
     x, y = places[-1, :2].tolist()
-    return RobotPlace(x, y, float(wrap_angle(heading)), speed, rate, drift)
+    return RobotMotion(x, y, float(wrap_angle(heading)), speed, rate, drift)
 
 
-def predict_places(
-    responses: Sequence[KeyDynamics], start: RobotPlace, schedule: NDArray[np.int64], dt: float
-) -> tuple[Floats, RobotPlace]:
+def predict_motion(
+    responses: Sequence[KeyMotionModel], start: RobotMotion, schedule: NDArray[np.int64], dt: float
+) -> tuple[Floats, RobotMotion]:
     """Where C schedules lead.
 
     Args:
@@ -118,7 +118,7 @@ def predict_places(
     x = start.x + np.cumsum(speeds * np.cos(headings + drifts) * dt, axis=0)
     y = start.y + np.cumsum(speeds * np.sin(headings + drifts) * dt, axis=0)
     last = (float(values[-1, 0]) for values in (x, y, headings, speeds, rates, drifts))
-    return np.stack([x.T, y.T, headings.T], axis=2), RobotPlace(*last)
+    return np.stack([x.T, y.T, headings.T], axis=2), RobotMotion(*last)
 
 
 def roll_heading(latched: Floats, heading: Floats, rate: Floats, dt: float) -> tuple[Floats, Floats]:

@@ -17,12 +17,12 @@ from scipy.optimize import least_squares
 from pdtui.core.angles import wrap_angle
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError
-from pdtui.paper.key_dynamics import (
+from pdtui.paper.forest.key_motion_model import (
     LOOKS_BACK,
-    KeyDynamics,
+    KeyMotionModel,
     ObservedDrive,
-    RobotPlace,
-    observe_place,
+    RobotMotion,
+    estimate_motion,
     roll_drift,
     roll_heading,
     roll_speed,
@@ -48,7 +48,7 @@ class _Stretches:
         headings, speeds, drifts: after each stride, shapes (T, N).
     """
 
-    starts: tuple[RobotPlace, ...]
+    starts: tuple[RobotMotion, ...]
     choices: NDArray[np.int64]
     headings: Floats
     speeds: Floats
@@ -58,9 +58,9 @@ class _Stretches:
         return np.array([getattr(start, name) for start in self.starts])
 
 
-def fit_key_dynamics(
+def fit_key_motion_models(
     drives: Sequence[ObservedDrive], names: Sequence[str], dt: float
-) -> dict[str, KeyDynamics]:
+) -> dict[str, KeyMotionModel]:
     """The responses that predict the drives best.
 
     Args:
@@ -104,7 +104,7 @@ def fit_key_dynamics(
     for name, row, (fell, presses) in zip(names, rows, falls, strict=True):
         pull, hold, lag, drive, drag, slip, settle = row.tolist()
         fallen = fell / max(presses, 1)
-        responses[name] = KeyDynamics(pull, hold, lag, drive, drag, slip, settle, fallen)
+        responses[name] = KeyMotionModel(pull, hold, lag, drive, drag, slip, settle, fallen)
     return responses
 
 
@@ -150,7 +150,7 @@ def _stretches(drives: Sequence[ObservedDrive], dt: float) -> _Stretches:
         path = drive.places.copy()
         path[:, 2] = np.unwrap(path[:, 2])
         for first in range(LOOKS_BACK, len(drive.choices) - length - half, _EVERY):
-            start = observe_place(path[: first + 1], dt)
+            start = estimate_motion(path[: first + 1], dt)
             after = first + _STRIDE * np.arange(1, strides + 1)
             moved = (path[after + half, :2] - path[after - half, :2]) / (2 * half * dt)
             turns = wrap_angle(float(path[first, 2])) - path[first, 2]

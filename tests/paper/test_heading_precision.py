@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from pdtui.cli import main
 from pdtui.core.errors import MapError
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.paper.unit_vs_command import compare_unit_with_command, paired_ratio
+from pdtui.paper.heading_precision import compare_heading_precision, paired_ratio
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.policies.weights.policy_loading import load_any_network
 from pdtui.search.tracking_drives import STEPS_EACH, TrackingDrive, TrackingDriveResult, TrackingDriveRunner
@@ -59,23 +59,23 @@ def test_a_unit_steers_the_authors_policy_as_its_command_does(tmp_path: Path) ->
     shutil.copy(REFERENCE, tmp_path)
     path = tmp_path / "authors.toml"
     path.write_text(MAP.format(sha256=load_any_network(REFERENCE, CHOICES, None)[1]))
-    result = compare_unit_with_command([DriveConfig("anymal", load_map(path), 0)], [100], targets=(0.0, 0.4))
+    result = compare_heading_precision([DriveConfig("anymal", load_map(path), 0)], [100], targets=(0.0, 0.4))
     command, unit = result.rows
-    assert (command.by, command.driven, command.asked) == (
+    assert (command.input_kind, command.inputs, command.other_commands) == (
         "command",
         ("yaw rate",),
         {"forward": 1.0, "lateral": 0.0},
     )
-    assert (unit.by, unit.driven, unit.asked["yaw rate"]) == ("units", ("0:121",), 0.0)
+    assert (unit.input_kind, unit.inputs, unit.other_commands["yaw rate"]) == ("units", ("0:121",), 0.0)
     assert command.ratio is None
     assert unit.ratio is not None
     assert unit.ratio.value == pytest.approx(unit.tracking.error / command.tracking.error)
     for row in result.rows:
         assert row.tracking.falls == 0
-        assert row.values.shape == (1, 2 * STEPS_EACH)
-        assert row.values[0, -1] == pytest.approx(0.4, abs=0.1)
+        assert row.headings.shape == (1, 2 * STEPS_EACH)
+        assert row.headings[0, -1] == pytest.approx(0.4, abs=0.1)
         assert row.tracking.error == pytest.approx(
-            np.abs(row.values[0] - np.repeat([0.0, 0.4], STEPS_EACH)).mean()
+            np.abs(row.headings[0] - np.repeat([0.0, 0.4], STEPS_EACH)).mean()
         )
 
 
@@ -112,7 +112,7 @@ def test_a_map_without_a_heading_to_hold_is_named(map_text: str, tmp_path: Path)
     with pytest.raises(
         MapError, match=r"other.toml: no behavior of mode pid holds 'yaw', .* held are: speed"
     ):
-        compare_unit_with_command([DriveConfig("ant", load_map(path), 0)], [100])
+        compare_heading_precision([DriveConfig("ant", load_map(path), 0)], [100])
 
 
 @pytest.mark.viewer
@@ -144,7 +144,18 @@ def test_the_command_compares_maps_and_draws(map_path: Path, tmp_path: Path, vie
     [
         (["evaluate", "MAP", "MAP"], "more than one map needs --experiment"),
         (["evaluate", "MAP", "-o", "f.png"], "-o needs --experiment"),
-        (["evaluate", "MAP", "--experiment", "tracking", "--policy-only"], "--experiment goes with neither"),
+        (
+            ["evaluate", "MAP", "--experiment", "tracking", "--policy-only"],
+            "--target, --policy-only, --update and --experiment exclude each other",
+        ),
+        (["evaluate", "MAP", "--experiment", "commands", "-o", "f.png"], "commands draws no pictures"),
+        (["evaluate", "MAP", "--experiment", "forest", "-o", "f.png"], "forest draws no pictures"),
+        (["evaluate", "MAP", "MAP", "--experiment", "forest"], "--experiment forest takes one map"),
+        (
+            ["evaluate", "MAP", "--experiment", "tracking", "--repeats", "2"],
+            "has no option --repeats",
+        ),
+        (["evaluate", "MAP", "--update", "--policy-only"], "exclude each other"),
         (["evaluate", "MAP", "--experiment", "tracking", "-o", "f.gif"], "f.gif: expected a name that ends"),
         (["tune", "MAP"], "expected either a BEHAVIOR or --all"),
         (["tune", "nowhere", "--all"], "no map 'nowhere'"),

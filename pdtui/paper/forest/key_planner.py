@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.paper.key_dynamics import KeyDynamics, RobotPlace, predict_places
+from pdtui.paper.forest.key_motion_model import KeyMotionModel, RobotMotion, predict_motion
 
 HORIZON = 2.56
 """How far ahead is looked, s."""
@@ -34,12 +34,12 @@ class KeyPlanner:
         trees: x, y and radius, m, shape (N, 3).
     """
 
-    def __init__(self, responses: Sequence[KeyDynamics], trees: Floats) -> None:
+    def __init__(self, responses: Sequence[KeyMotionModel], trees: Floats) -> None:
         self._responses, self._trees = tuple(responses), trees
         self._schedules = _schedules(len(self._responses))
         self._presses = (np.diff(self._schedules, axis=1) != 0).sum(axis=1)
 
-    def choose(self, place: RobotPlace, latched: int) -> int:
+    def choose(self, place: RobotMotion, latched: int) -> int:
         """The choice to latch now; the one that is latched already if nothing is better by a press's worth.
 
         Args:
@@ -49,9 +49,9 @@ class KeyPlanner:
         scores = self._scores(place, latched)
         return int(self._schedules[int(np.argmax(scores)), 0])
 
-    def _scores(self, place: RobotPlace, latched: int) -> Floats:
+    def _scores(self, place: RobotMotion, latched: int) -> Floats:
         """Expected metres of progress, less what hits, presses and a wrong heading at the end are worth."""
-        places, _ = predict_places(self._responses, place, self._schedules, _STEP)
+        places, _ = predict_motion(self._responses, place, self._schedules, _STEP)
         touching, untouched = self._chances(places)
         falls = np.array([response.falls for response in self._responses])
         starts = self._schedules[:, 0]

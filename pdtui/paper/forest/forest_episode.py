@@ -14,8 +14,8 @@ from pdtui.core.events import Event
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.headless import key_events
 from pdtui.drive.keystrokes import write_keystrokes
-from pdtui.paper.key_dynamics import KeyDynamics, ObservedDrive
-from pdtui.paper.scripted_operator import DEFAULT, ScriptedOperator, operator_keys
+from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
+from pdtui.paper.forest.scripted_operator import DEFAULT, ScriptedOperator, operator_keys
 from pdtui.robots.legged.terrain import AHEAD
 from pdtui.sessions.schema import ActivationsKept
 from pdtui.sessions.session_reader import read_session
@@ -176,7 +176,7 @@ def _sum_up(
     )
 
 
-def try_keys(loop: ControlLoop, steps: int) -> ObservedDrive:
+def drive_with_random_keys(loop: ControlLoop, steps: int) -> ObservedDrive:
     """Press the operator's keys in random order, each held for half a second to two, to see what they do.
 
     Args:
@@ -206,7 +206,7 @@ def try_keys(loop: ControlLoop, steps: int) -> ObservedDrive:
     return ObservedDrive(np.array(places), np.array(choices), False)
 
 
-def operator_for(loop: ControlLoop, responses: dict[str, KeyDynamics]) -> ScriptedOperator:
+def build_operator(loop: ControlLoop, responses: dict[str, KeyMotionModel]) -> ScriptedOperator:
     """The operator of one drive: it sees this forest."""
     dt = loop.robot.control_dt
     periods = {

@@ -1,0 +1,56 @@
+"""A group of commands that loads each command only when it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pkgutil import resolve_name
+from typing import Any
+
+import click
+
+from pdtui.core.errors import PdtuiError
+from pdtui.core.plain_text import printable
+
+OPTIONAL_ROOMS = ("pdtui.benchmarks", "pdtui.paper", "pdtui.training")
+"""Packages that an installation may leave out; only the commands that need one stop working."""
+
+
+class LazyCommandGroup(click.Group):
+    """Imports a command's module when the command is used, and prints expected errors as one line.
+
+    Args:
+        commands: for each command, where it is ("package.module:attribute") and its summary for the list.
+        arguments: as for `click.Group`.
+    """
+
+    def __init__(self, *, lazy_commands: Mapping[str, tuple[str, str]], **arguments: Any) -> None:
+        super().__init__(**arguments)
+        self._lazy_commands = lazy_commands
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        return list(self._lazy_commands)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        if cmd_name not in self._lazy_commands:
+            return None
+        command = resolve_name(self._lazy_commands[cmd_name][0])
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List names and summaries without importing the commands."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, summary) for name, (_, summary) in self._lazy_commands.items()])
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; a `PdtuiError` becomes one line and exit code 1, a traceback means a bug."""
+        try:
+            return super().invoke(ctx)
+        except PdtuiError as error:
+            message = str(error)
+        except ModuleNotFoundError as error:
+            if error.name not in OPTIONAL_ROOMS:
+                raise
+            message = f"{error.name} is not part of this installation, and the command needs it"
+        click.echo(f"pdtui: {printable(message)}", err=True)  # it may quote a file
+        return ctx.exit(1)

@@ -1,0 +1,89 @@
+"""What an experiment of the paper declares, so that `pdtui evaluate --experiment` finds and runs it.
+
+A new experiment is a module of this package whose name ends in ``_experiment`` and that defines
+`EXPERIMENT`.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import pdtui.paper
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from pdtui.drive.drive_config import DriveConfig
+
+
+@dataclass(frozen=True)
+class ExperimentRequest:
+    """What the user asks of an experiment.
+
+    Attributes:
+        configs: robot, map and policy of each map to measure.
+        seeds: seeds of the drives.
+        workers: number of worker processes.
+        pictures: picture files to write.
+        overwrite: whether pictures may replace existing files.
+        options: the experiment's own options that were given, by parameter name.
+        progress: called with the number of drives done and the total; None for no progress bar.
+    """
+
+    configs: Sequence[DriveConfig]
+    seeds: range
+    workers: int
+    pictures: tuple[Path, ...] = ()
+    overwrite: bool = False
+    options: Mapping[str, Any] = field(default_factory=dict)
+    progress: Callable[[int, int], None] | None = None
+
+
+@dataclass(frozen=True)
+class ExperimentReport:
+    """The result of an experiment.
+
+    Attributes:
+        data: what ``--json`` prints.
+        table: what is printed otherwise.
+        pictures: the files that were written.
+    """
+
+    data: dict[str, Any] | list[dict[str, Any]]
+    table: RenderableType
+    pictures: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One experiment.
+
+    Attributes:
+        name: the value of ``--experiment``.
+        progress_label: label of the progress bar.
+        run: runs the experiment.
+        options: options of `pdtui evaluate` that only this experiment takes.
+        takes_several_maps: whether it measures more than one map.
+        draws_pictures: whether it takes ``-o``.
+    """
+
+    name: str
+    progress_label: str
+    run: Callable[[ExperimentRequest], ExperimentReport]
+    options: tuple[click.Option, ...] = ()
+    takes_several_maps: bool = False
+    draws_pictures: bool = False
+
+
+def list_experiments() -> dict[str, Experiment]:
+    """Return all experiments of this package by name."""
+    names = [module.name for module in pkgutil.iter_modules(pdtui.paper.__path__)]
+    modules = [import_module(f"pdtui.paper.{name}") for name in names if name.endswith("_experiment")]
+    return {module.EXPERIMENT.name: module.EXPERIMENT for module in modules}

@@ -1,0 +1,98 @@
+"""`pdtui evaluate --experiment tracking`: how precisely headings are held, by a unit and by a command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pdtui.paper.experiment import Experiment, ExperimentReport, ExperimentRequest
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from pdtui.paper.heading_precision import HeadingControllerResult, HeadingPrecisionComparison
+    from pdtui.pictures.heading_figures import HeadingFigure
+
+
+def run_tracking_experiment(request: ExperimentRequest) -> ExperimentReport:
+    """Compare the heading controllers of the maps, and draw them.
+
+    Raises:
+        PdtuiError: as `compare_heading_precision`, or a picture cannot be written.
+    """
+    from pdtui.paper.heading_precision import compare_heading_precision
+    from pdtui.pictures.heading_figures import check_heading_pictures, draw_heading_pictures
+
+    check_heading_pictures(request.pictures, request.overwrite)
+    result = compare_heading_precision(
+        request.configs, request.seeds, workers=request.workers, progress=request.progress
+    )
+    draw_heading_pictures(request.pictures, heading_figure(result))
+    data = {**result.as_dict(), "pictures": [str(path) for path in request.pictures]}
+    return ExperimentReport(data, heading_precision_table(result), request.pictures)
+
+
+def heading_figure(result: HeadingPrecisionComparison) -> HeadingFigure:
+    """Return what the pictures show of a comparison."""
+    import numpy as np
+
+    from pdtui.pictures.heading_figures import HeadingFigure, TrackedHeading
+    from pdtui.search.tracking_drives import STEPS_EACH
+
+    several = len({row.map for row in result.rows}) > 1
+    headings = []
+    for row in result.rows:
+        figures = row.tracking
+        falls = f", {figures.falls} of {len(figures.seeds)} fell" if figures.falls else ""
+        name = f"{figures.behavior} ({row.policy})" if several else figures.behavior
+        headings.append(TrackedHeading(name, f"{figures.error:.3f} rad{falls}", row.headings))
+    robots = ", ".join(dict.fromkeys(row.robot for row in result.rows))
+    return HeadingFigure(
+        f"Holding headings: {robots}",
+        np.repeat(np.array(result.targets), STEPS_EACH),
+        result.dt,
+        tuple(headings),
+        heading_precision_table(result),
+        result.as_dict(),
+    )
+
+
+def heading_precision_table(result: HeadingPrecisionComparison) -> Table:
+    """Return a table with one column per behavior, map by map."""
+    from pdtui.core.text_tables import new_table, seed_range
+    from pdtui.evaluation.tracking_tables import add_tracking_figures
+    from pdtui.search.tracking_drives import STEPS_EACH
+
+    table = new_table(
+        f"Holding headings: {seed_range(result.seeds)}", "", *(row.tracking.behavior for row in result.rows)
+    )
+    table.add_row("map", *(Path(row.map).name for row in result.rows))
+    table.add_row("policy", *(row.policy for row in result.rows))
+    table.add_row("PID output to", *map(_inputs, result.rows))
+    table.add_row("other commands", *map(_other_commands, result.rows))
+    table.add_section()
+    add_tracking_figures(table, [row.tracking for row in result.rows])
+    ratios = [row.ratio for row in result.rows]
+    if any(ratios):
+        cells = ["" if one is None else f"{one.value:.2f} [{one.low:.2f}, {one.high:.2f}]" for one in ratios]
+        table.add_row("|error| / |error| of the command", *cells)
+    targets = ", ".join(f"{target:g}" for target in result.targets)
+    table.caption = (
+        f"Targets: {targets} rad, {STEPS_EACH} steps each. Intervals: 95 %; that of the ratio pairs drives "
+        "of the same seed. A drive counts until it ends or the robot falls."
+    )
+    return table
+
+
+def _inputs(row: HeadingControllerResult) -> str:
+    names = row.inputs if len(row.inputs) <= 2 else (row.inputs[0], f"{len(row.inputs) - 1} more")
+    return {"command": "command ", "units": "unit ", "both": ""}[row.input_kind] + ", ".join(names)
+
+
+def _other_commands(row: HeadingControllerResult) -> str:
+    return ", ".join(f"{name} {value:g}" for name, value in row.other_commands.items())
+
+
+EXPERIMENT = Experiment(
+    "tracking", "holding headings", run_tracking_experiment, takes_several_maps=True, draws_pictures=True
+)
