@@ -202,7 +202,10 @@ def test_a_divergence_is_one_line_and_leaves_the_session(
 
 def test_importing_the_commands_pulls_in_nothing_heavy() -> None:
     heavy = "torch", "mujoco", "gymnasium", "rerun", "scipy", "textual", "jax", "pyarrow"
-    code = f"import sys, pdtui.cli; print([m for m in {heavy!r} if m in sys.modules])"
+    code = (
+        "import sys; from pdtui.cli import COMMANDS, main; [main.get_command(None, n) for n in COMMANDS];"
+        f"print([m for m in {heavy!r} if m in sys.modules])"
+    )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
 
