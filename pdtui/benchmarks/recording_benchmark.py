@@ -18,8 +18,8 @@ from pdtui.drive.headless import build_loop
 from pdtui.drive.replay import replay_session
 from pdtui.drive.server import PACED_ROWS_PER_WRITE
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.schema import ACTIVATIONS_KEPT, ActivationsKept
 from pdtui.sessions.session_repair import examine_session
+from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 RATE = 50.0

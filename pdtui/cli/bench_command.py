@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from pdtui.cli.shared_options import drive_config, json_option, map_option, progress_bar_or_none, show_result
-from pdtui.sessions.schema import ACTIVATIONS_KEPT, ActivationsKept
+from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept
 
 
 @click.group()

@@ -20,9 +20,9 @@ from pdtui.cli.shared_options import (
     start_option,
 )
 from pdtui.core.errors import KeystrokeError, ScreenError, SessionError
-from pdtui.core.plain_text import printable
+from pdtui.core.plain_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
-from pdtui.sessions.schema import ACTIVATIONS_KEPT, ActivationsKept
+from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept
 from pdtui.sessions.viewer.viewer_address import LOCAL, PORT, ViewerAddress
 
 if TYPE_CHECKING:
@@ -127,11 +127,11 @@ def replay(session: Path, watch: bool, policy: str, judging: dict[str, Any]) -> 
         return
     with progress_bar_or_none("replaying") as advance:
         result = replay_session(session, policy=policy, progress=advance, **judging)
-    click.echo(printable(result.verdict), err=not result.passed)
+    click.echo(make_printable(result.verdict), err=not result.passed)
     if not result.identical:
         lines = [*(str(deviation) for deviation in result.deviations[:5]), *result.environment]
         for line in lines:
-            click.echo(f"  {printable(line)}", err=True)
+            click.echo(f"  {make_printable(line)}", err=True)
     if not result.passed:
         sys.exit(1)
 
@@ -164,9 +164,9 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, record: 
         f"steps with a key {summary.involvement}"
     )
     means = ", ".join(f"{name} {value:.3g}" for name, value in list(summary.mean.items())[:8])
-    click.echo(printable(f"mean {means}"))
+    click.echo(make_printable(f"mean {means}"))
     if record is not None:
-        click.echo(printable(f"recorded in {record}"))
+        click.echo(make_printable(f"recorded in {record}"))
 
 
 def _drive_on_screen(config: DriveConfig, recording: Path | None, fps: int) -> None:
@@ -191,7 +191,7 @@ def _show(config: DriveConfig, *, fps: int, watching: bool = False) -> None:
     if app.return_code or link.failed:
         said = message or last_words
         raise ScreenError(said if config.recording in said else f"{said}; {last_words}")
-    click.echo(printable(last_words))
+    click.echo(make_printable(last_words))
 
 
 def pick_and_drive() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from pdtui.cli.shared_options import import_option_flags, progress_bar_or_none
-from pdtui.core.plain_text import printable
+from pdtui.core.plain_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
 
 
@@ -78,5 +78,7 @@ def episode(
         )
     draw_matched_curves(output, curves, start=start, seconds=seconds)
     for pair in curves.pairs:
-        click.echo(f"{printable(pair.attribute.name)}: unit {pair.unit}, discrepancy {pair.discrepancy:.3g}")
+        click.echo(
+            f"{make_printable(pair.attribute.name)}: unit {pair.unit}, discrepancy {pair.discrepancy:.3g}"
+        )
     click.echo(f"wrote {output}")

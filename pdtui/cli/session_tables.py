@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from pdtui.core.events import describe_event
-from pdtui.core.plain_text import file_size, printable
+from pdtui.core.plain_text import file_size, make_printable
 from pdtui.sessions.session_comparison import AttributeDeviation, SessionComparison
 from pdtui.sessions.session_reader import Session
 from pdtui.sessions.session_summary import SessionSummary
@@ -24,7 +24,7 @@ _KEPT = {
 
 
 def _cell(text: object, style: str = "") -> Text:
-    return Text(printable(str(text)), style)
+    return Text(make_printable(str(text)), style)
 
 
 def _table(*columns: str, left: Sequence[str] = ()) -> Table:
@@ -72,7 +72,7 @@ def show_table(session: Session, summary: SessionSummary) -> Any:
         ("outcome", session.outcome or "none: the file was cut off"),
         *session.versions.items(),
     ):
-        facts.add_row(Text(printable(str(name)), "dim"), _cell(value))
+        facts.add_row(Text(make_printable(str(name)), "dim"), _cell(value))
     figures = Table(box=None, pad_edge=False, show_header=False)
     for name, value in (
         ("length", f"{summary.steps} steps, {summary.seconds:g} s"),

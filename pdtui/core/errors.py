@@ -56,7 +56,7 @@ class TrainingError(PdtuiError):
     """A training run cannot start or go on."""
 
 
-def error_in_one_line(error: BaseException) -> str:
+def format_error_in_one_line(error: BaseException) -> str:
     """An exception in one line, for where no traceback can be printed: what it is and where it was raised."""
     words = " ".join(traceback.format_exception_only(error)[-1].split())
     frames = traceback.extract_tb(error.__traceback__)

@@ -39,7 +39,7 @@ def describe_event(event: Event) -> str:
     return EVENT_WORDINGS[event.kind].sentence.format(name=event.name, value=event.value)
 
 
-def events_by_step(events: Iterable[Event]) -> dict[int, list[Event]]:
+def group_events_by_step(events: Iterable[Event]) -> dict[int, list[Event]]:
     """Events by the control step before which they apply, in their order."""
     grouped: dict[int, list[Event]] = {}
     for event in events:

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 
 @lru_cache(maxsize=512)
-def printable(text: str) -> str:
+def make_printable(text: str) -> str:
     """Text from a file without anything that a terminal would obey: control and formatting characters."""
     if text.isprintable():
         return text

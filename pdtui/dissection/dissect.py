@@ -24,7 +24,7 @@ from pdtui.probing.effect_probe import EffectProber
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.robot import Robot
-from pdtui.sessions.environment_versions import environment_versions
+from pdtui.sessions.environment_versions import collect_versions
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_preset
 from pdtui.spectra.monitor import StepProgress, monitor_episodes
@@ -156,7 +156,7 @@ def dissect(
 
 def _identity(crew: RolloutPool) -> str:
     """What a roll-out's outcome depends on besides its start and plan."""
-    return json.dumps([crew.robot.name, crew.policy.sha256, environment_versions()])
+    return json.dumps([crew.robot.name, crew.policy.sha256, collect_versions()])
 
 
 def _behaviors_of(stimulation_map: StimulationMap, policy: Policy) -> tuple[Stimulation, ...]:

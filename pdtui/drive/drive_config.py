@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pdtui.core.events import Event
-from pdtui.sessions.schema import ActivationsKept
+from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
 from pdtui.stimulation.stimulation_map import StimulationMap
 

@@ -8,7 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from pdtui.core.errors import DriveEnded, KeystrokeError, PdtuiError, SimulationDiverged, error_in_one_line
+from pdtui.core.errors import (
+    DriveEnded,
+    KeystrokeError,
+    PdtuiError,
+    SimulationDiverged,
+    format_error_in_one_line,
+)
 from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
 from pdtui.drive.control_loop import ControlLoop
@@ -126,7 +132,7 @@ def drive_headless(
                 raise DriveEnded(f"{reason}: {done} steps{_recorded(recorder)}")
         outcome = "finished"
     except Exception as error:
-        outcome = str(error) if isinstance(error, PdtuiError) else error_in_one_line(error)
+        outcome = str(error) if isinstance(error, PdtuiError) else format_error_in_one_line(error)
         raise
     finally:
         if recorder is not None:

@@ -10,16 +10,16 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import PdtuiError, SessionError
-from pdtui.core.events import events_by_step
+from pdtui.core.events import group_events_by_step
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.headless import build_loop
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot
 from pdtui.sessions.environment_versions import (
-    environment_versions,
-    numeric_version_differences,
-    version_differences,
+    collect_versions,
+    list_numeric_version_differences,
+    list_version_differences,
 )
 from pdtui.sessions.session_comparison import (
     AttributeDeviation,
@@ -166,8 +166,8 @@ def replay_session(
     if loop.robot.attributes != session.info.attributes:
         raise SessionError(f"{path}: the robot measures other attributes now; nothing can be compared")
     first, changes, stopped = _run(session, loop, progress)
-    here = environment_versions()
-    elsewhere = bool(numeric_version_differences(session.versions, here)) and not strict
+    here = collect_versions()
+    elsewhere = bool(list_numeric_version_differences(session.versions, here)) and not strict
     spread = attribute_spread(session.attributes)
     wrong = np.flatnonzero((changes > tolerance * spread).any(axis=1))
     agreed = (first or 0) + (int(wrong[0]) if wrong.size else len(changes))
@@ -177,7 +177,7 @@ def replay_session(
         first_difference=first,
         change=found[0].first if found else 0.0,
         detail=_detail(found),
-        environment=tuple(version_differences(session.versions, here)),
+        environment=tuple(list_version_differences(session.versions, here)),
         total=session.steps,
         dt=session.info.dt,
         deviations=found,
@@ -192,7 +192,7 @@ def _run(
     session: Session, loop: ControlLoop, progress: Callable[[int, int], None] | None
 ) -> tuple[int | None, Floats, str]:
     """The first step that differs, how far attributes are off from there on, and why that ended early."""
-    events = events_by_step(session.events)
+    events = group_events_by_step(session.events)
     first: int | None = None
     changes = []
     stopped = ""

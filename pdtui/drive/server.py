@@ -11,8 +11,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from pdtui.core.errors import PdtuiError, SessionError, error_in_one_line
-from pdtui.core.events import Event, events_by_step
+from pdtui.core.errors import PdtuiError, SessionError, format_error_in_one_line
+from pdtui.core.events import Event, group_events_by_step
 from pdtui.core.step_record import StepRecord
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
@@ -50,7 +50,7 @@ class DriveServer:
         self._closing = ""
         self._finished = ""
         self.failed = False
-        self._script = events_by_step(config.script or ())
+        self._script = group_events_by_step(config.script or ())
 
     def facts(self) -> None:
         """Tell the screen what there is to see."""
@@ -77,7 +77,7 @@ class DriveServer:
                     self._send_snapshot()
         except Exception as error:
             if not isinstance(error, PdtuiError):
-                self._closing = error_in_one_line(error)
+                self._closing = format_error_in_one_line(error)
             raise
         finally:
             self._close_recording()
@@ -204,7 +204,7 @@ def serve_drive(connection: Connection, config: DriveConfig) -> None:
         return  # the screen went away while robot and policy were loading
     except Exception as error:
         # A traceback would be drawn over by the screen.
-        said = error_in_one_line(error) if simulation is None else simulation.outcome()
+        said = format_error_in_one_line(error) if simulation is None else simulation.outcome()
         _send_quietly(connection, PdtuiError(f"the simulation failed: {said}"))
 
 

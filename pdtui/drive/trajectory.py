@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats, column_of
-from pdtui.core.errors import PdtuiError, error_in_one_line
+from pdtui.core.errors import PdtuiError, format_error_in_one_line
 from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
 from pdtui.core.units import Stimulation, parse_unit
@@ -103,7 +103,7 @@ def drive_trajectory(
                 recorder.write(record)
         outcome = "finished"
     except Exception as error:
-        outcome = str(error) if isinstance(error, PdtuiError) else error_in_one_line(error)
+        outcome = str(error) if isinstance(error, PdtuiError) else format_error_in_one_line(error)
         raise
     finally:
         if recorder is not None:

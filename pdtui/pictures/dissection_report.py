@@ -36,7 +36,7 @@ from pdtui.pictures.report_blueprint import (
 )
 from pdtui.pictures.report_file import open_report_file
 from pdtui.pictures.viewer_axes import Log, ViewerAxes, ViewerAxis
-from pdtui.sessions.environment_versions import environment_versions
+from pdtui.sessions.environment_versions import collect_versions
 
 APP, TIME = "pdtui-dissection", "time"
 PROPERTY, VERSIONS = "dissection", "versions"
@@ -61,7 +61,7 @@ def _write(recording: rr.RecordingStream, dissection: Dissection) -> None:
 
     recording.send_recording_name(f"Dissection of {dissection.policy} on {dissection.robot}")
     recording.send_property(PROPERTY, rr.AnyValues(summary=json.dumps(summarise_dissection(dissection))))
-    versions: dict[str, Any] = dict(environment_versions())
+    versions: dict[str, Any] = dict(collect_versions())
     recording.send_property(VERSIONS, rr.AnyValues(**versions))
     log(SUMMARY, rr.TextDocument(dissection_markdown(dissection), media_type=rr.MediaType.MARKDOWN))
     for column in range(len(dissection.attributes)):

@@ -10,7 +10,7 @@ from rich.table import Table
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.dissection.dissection_tables import dissection_remarks, dissection_tables
-from pdtui.sessions.environment_versions import environment_versions
+from pdtui.sessions.environment_versions import collect_versions
 
 
 def dissection_markdown(dissection: Dissection) -> str:
@@ -24,7 +24,7 @@ def dissection_markdown(dissection: Dissection) -> str:
 
 def _origin(dissection: Dissection, summary: dict[str, Any]) -> str:
     preset, dt = dissection.preset, dissection.dt
-    versions = environment_versions()
+    versions = collect_versions()
     episodes = ", ".join(str(seed) for seed in summary["episodes"])
     rows = [
         ("policy", f"{summary['policy']}, SHA-256 `{summary['sha256']}`"),

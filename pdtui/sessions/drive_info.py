@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from pdtui.core.attributes import Attribute
 from pdtui.core.robot_data import Link
-from pdtui.sessions.schema import ActivationsKept
+from pdtui.sessions.session_schema import ActivationsKept
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ COMPUTES_NOTHING = ("system", "rerun-sdk")
 """What may differ without any number of a run being computed in another way."""
 
 
-def environment_versions() -> dict[str, str]:
+def collect_versions() -> dict[str, str]:
     """Versions of the interpreter and the libraries, and what is known of the machine.
 
     A package that is not installed is left out.
@@ -37,7 +37,7 @@ def environment_versions() -> dict[str, str]:
     return found
 
 
-def version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
+def list_version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
     """What differs between two environments, one line each, such as ``numpy: 2.2.0 there, 2.3.1 here``.
 
     Args:
@@ -51,9 +51,9 @@ def version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]
     ]
 
 
-def numeric_version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
-    """Those of `version_differences` that can change a bit of a run."""
-    return version_differences(
+def list_numeric_version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
+    """Those of `list_version_differences` that can change a bit of a run."""
+    return list_version_differences(
         *({name: value for name, value in one.items() if name not in COMPUTES_NOTHING} for one in (a, b))
     )
 

@@ -14,8 +14,8 @@ import pyarrow.parquet
 from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import SessionError
 from pdtui.core.units import format_unit
-from pdtui.sessions.schema import ACTIVE_FIELDS
 from pdtui.sessions.session_reader import Session, read_activations, read_session
+from pdtui.sessions.session_schema import ACTIVE_FIELDS
 
 Columns = dict[str, Any]
 _WRITERS: dict[str, Callable[[pa.Table, str], None]] = {

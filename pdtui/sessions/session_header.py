@@ -11,10 +11,10 @@ from pdtui.core.errors import SessionError
 from pdtui.core.events import Event
 from pdtui.core.key_table import EVENT_WORDINGS
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.drive_properties import info_from_properties
-from pdtui.sessions.rrd.entity_rows import EntityRows
-from pdtui.sessions.rrd.rrd_file import RrdFile
-from pdtui.sessions.schema import DIGEST_EPISODE, DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
+from pdtui.sessions.drive_info_codec import decode_drive_info
+from pdtui.sessions.rrd.entity_table import EntityTable
+from pdtui.sessions.rrd.rrd_contents import RrdContents
+from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
 
 
 @dataclass(frozen=True)
@@ -59,20 +59,20 @@ def read_session_header(path: Path | str) -> SessionHeader:
         SessionError: no such file, not a session, torn, or incomplete; the message names the file.
     """
     path = Path(path)
-    file = RrdFile(path, only=(DIGEST_EPISODE,))
+    file = RrdContents(path, only=(DIGEST_EPISODE,))
     try:
-        return header_of(file, path)
+        return decode_header(file, path)
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
 
 
-def header_of(file: RrdFile, path: Path) -> SessionHeader:
+def decode_header(file: RrdContents, path: Path) -> SessionHeader:
     """The heading of an open session.
 
     Raises:
         SessionError: a part is missing or not what it should be; the message does not name the file.
     """
-    info, created = info_from_properties(file.properties(INFO))
+    info, created = decode_drive_info(file.properties(INFO))
     return SessionHeader(
         path=path,
         info=info,
@@ -85,7 +85,7 @@ def header_of(file: RrdFile, path: Path) -> SessionHeader:
     )
 
 
-def count_steps(drive: EntityRows) -> int:
+def count_steps(drive: EntityTable) -> int:
     """How many there are, none missing.
 
     Raises:
@@ -98,7 +98,7 @@ def count_steps(drive: EntityRows) -> int:
     return len(steps)
 
 
-def _events(found: EntityRows) -> tuple[Event, ...]:
+def _events(found: EntityTable) -> tuple[Event, ...]:
     if not len(found.steps):
         return ()
     order = np.argsort(found.numbers("number", np.int64), kind="stable")
@@ -115,12 +115,12 @@ def _events(found: EntityRows) -> tuple[Event, ...]:
     return tuple(events)
 
 
-def _endings(found: EntityRows) -> dict[int, str]:
+def _endings(found: EntityTable) -> dict[int, str]:
     if not len(found.steps):
         return {}
     return dict(zip(found.steps.tolist(), found.texts("TextLog:text"), strict=True))
 
 
-def _outcome(file: RrdFile) -> str:
+def _outcome(file: RrdContents) -> str:
     values = file.properties(OUTCOME).get("outcome", [])
     return values[0] if len(values) == 1 and isinstance(values[0], str) else ""

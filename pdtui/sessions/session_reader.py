@@ -14,10 +14,11 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import SessionError
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.core.units import Stimulation
-from pdtui.sessions.drive_properties import info_from_properties
-from pdtui.sessions.rrd.entity_rows import EntityRows
-from pdtui.sessions.rrd.rrd_file import RrdFile
-from pdtui.sessions.schema import (
+from pdtui.sessions.drive_info_codec import decode_drive_info
+from pdtui.sessions.rrd.entity_table import EntityTable
+from pdtui.sessions.rrd.rrd_contents import RrdContents
+from pdtui.sessions.session_header import SessionHeader, count_steps, decode_header
+from pdtui.sessions.session_schema import (
     ACTIVE_FIELDS,
     DIGEST_EPISODE,
     DRIVE,
@@ -25,7 +26,6 @@ from pdtui.sessions.schema import (
     OVERWRITE_FIELDS,
     REWARD_COST_ACTION,
 )
-from pdtui.sessions.session_header import SessionHeader, count_steps, header_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,9 +67,9 @@ def read_session(path: Path | str) -> Session:
             what is wrong.
     """
     path = Path(path)
-    file = RrdFile(path, skip=("activations",))
+    file = RrdContents(path, skip=("activations",))
     try:
-        heading = header_of(file, path)
+        heading = decode_header(file, path)
         drive, info = file.rows(DRIVE), heading.info
         gains = drive.block(REWARD_COST_ACTION, np.float64)
         if heading.steps and gains.shape[1] < 2:
@@ -102,9 +102,9 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
         SessionError: as `read_session`, and where they were not recorded.
     """
     path = Path(path)
-    file = RrdFile(path, only=("activations",))
+    file = RrdContents(path, only=("activations",))
     try:
-        info, _ = info_from_properties(file.properties(INFO))
+        info, _ = decode_drive_info(file.properties(INFO))
         drive = file.rows(DRIVE)
         count_steps(drive)
         if info.activations == "off":
@@ -117,7 +117,7 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
         raise SessionError(f"{path}: {error}") from error
 
 
-def _active(drive: EntityRows) -> tuple[tuple[ActiveBehavior, ...], ...]:
+def _active(drive: EntityTable) -> tuple[tuple[ActiveBehavior, ...], ...]:
     width = len(ACTIVE_FIELDS)
     steps = []
     states = drive.lists("active", float, optional=True)
@@ -137,7 +137,7 @@ def _behavior(name: str, values: Sequence[float]) -> ActiveBehavior:
 
 
 def _stimulations(
-    drive: EntityRows, units: int
+    drive: EntityTable, units: int
 ) -> tuple[tuple[Stimulation, ...], tuple[tuple[float, ...], ...]]:
     width = len(OVERWRITE_FIELDS)
     stimulations, natural = [], []

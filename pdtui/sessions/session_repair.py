@@ -14,11 +14,11 @@ import rerun.chunk
 from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.drive_properties import info_from_properties
-from pdtui.sessions.rrd.rrd_file import ChunkStream, RrdFile
-from pdtui.sessions.schema import DIGEST_EPISODE, DRIVE, INFO, OUTCOME, STEP
+from pdtui.sessions.drive_info_codec import decode_drive_info
+from pdtui.sessions.rrd.rrd_contents import ChunkStream, RrdContents
 from pdtui.sessions.session_header import SessionHeader, read_session_header
-from pdtui.sessions.writer.recording_stream import errors_named, open_recording, send_property
+from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, INFO, OUTCOME, STEP
+from pdtui.sessions.writer.rerun_recording import name_file_in_errors, open_recording, send_property
 
 _CHUNKS_A_FLUSH = 64
 
@@ -48,9 +48,9 @@ def examine_session(path: Path) -> SessionCondition:
     Raises:
         SessionError: no session, or cut before everything that determines the run was written.
     """
-    file = RrdFile(path, only=(DIGEST_EPISODE,), torn=True)
+    file = RrdContents(path, only=(DIGEST_EPISODE,), torn=True)
     try:
-        info, _ = info_from_properties(file.properties(INFO))
+        info, _ = decode_drive_info(file.properties(INFO))
         steps = file.rows(DRIVE).steps
     except SessionError as error:
         raise SessionError(f"{path}: nothing can be rescued: {error}") from error
@@ -78,7 +78,7 @@ def repair_session(path: Path, output: Path) -> SessionHeader:
     condition = examine_session(path)
     if not output.parent.is_dir():
         raise SessionError(f"{output}: cannot be written: the folder does not exist")
-    with errors_named(output), replace_file(output, SessionError) as partial:
+    with name_file_in_errors(output), replace_file(output, SessionError) as partial:
         _rewrite(path, partial, condition)
         repaired = read_session_header(partial)
         if repaired.steps != condition.steps:

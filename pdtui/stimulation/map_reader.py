@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import cast, get_args
 
 from pdtui.core.attributes import AimDirection, BehaviorAim
-from pdtui.core.bounded_read import read_at_most
 from pdtui.core.errors import MapError
 from pdtui.core.key_table import RESERVED_KEYS
 from pdtui.core.units import ADDRESS
+from pdtui.core.untrusted_file import read_bounded_file
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions
 from pdtui.stimulation.map_table_reader import NUMBER, MapTableReader
 from pdtui.stimulation.stimulation_map import (
@@ -37,7 +37,7 @@ def load_map(path: Path) -> StimulationMap:
         MapError: the file is missing, is no TOML, or a field is wrong; the message names line and field.
     """
     try:
-        text = read_at_most(path, MAX_BYTES).decode("utf-8")
+        text = read_bounded_file(path, MAX_BYTES).decode("utf-8")
     except OSError as error:
         raise MapError(f"{path}: cannot be read as a map: {error.strerror}") from error
     except UnicodeDecodeError as error:

@@ -7,7 +7,7 @@ from rich.segment import Segment
 from rich.style import Style
 from textual.strip import Strip
 
-from pdtui.core.plain_text import printable
+from pdtui.core.plain_text import make_printable
 
 _KEYS = {
     "up": "↑",
@@ -64,7 +64,7 @@ def format_signed(value: float) -> str:
 
 def key_name(key: str) -> str:
     """How a key is written on the screen."""
-    return printable(_KEYS.get(key, key))
+    return make_printable(_KEYS.get(key, key))
 
 
 class ScreenRow:

@@ -13,7 +13,7 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
-from pdtui.core.plain_text import printable
+from pdtui.core.plain_text import make_printable
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import key_name
 from pdtui.tui.theme import ThemeStyles, theme_styles
@@ -59,7 +59,7 @@ class HelpScreen(ModalScreen[None]):
         def line(key: str, says: str, cap: Style, style: Style) -> None:
             text.append(f" {key_name(key)} ", cap)
             text.append(" " * max(1, 9 - len(key_name(key))))
-            text.append(f"{printable(says)}\n", style)
+            text.append(f"{make_printable(says)}\n", style)
 
         text.append("behaviors\n", palette.accent)
         for row, behavior in enumerate(self._map.behaviors.values()):

@@ -14,7 +14,7 @@ from textual.containers import Vertical
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from pdtui.core.plain_text import printable
+from pdtui.core.plain_text import make_printable
 from pdtui.tui.cell_text import fit_cells
 from pdtui.tui.style_sheets import PICKER
 from pdtui.tui.theme import THEME, ThemeStyles, theme_styles
@@ -146,10 +146,10 @@ def _prompt(row: PickerRow, palette: ThemeStyles) -> Text:
     """Two lines: what it is, then how many behaviors, or what is wrong."""
     bad = bool(row.problem)
     text = Text(no_wrap=True, overflow="ellipsis")
-    text.append(fit_cells(printable(row.title), 26), palette.muted if bad else palette.title)
-    text.append(f" {printable(row.map_path)}\n", palette.muted if bad else palette.primary)
+    text.append(fit_cells(make_printable(row.title), 26), palette.muted if bad else palette.title)
+    text.append(f" {make_printable(row.map_path)}\n", palette.muted if bad else palette.primary)
     if bad:
-        return text.append(f"  ✗ {printable(row.problem)}", palette.bad)
+        return text.append(f"  ✗ {make_printable(row.problem)}", palette.bad)
     count = "1 behavior" if row.behaviors == 1 else f"{row.behaviors} behaviors"
     text.append(fit_cells(f"  {count}", 26), palette.good)
-    return text.append(f" {printable(row.policy)}", palette.muted + Style(italic=True))
+    return text.append(f" {make_printable(row.policy)}", palette.muted + Style(italic=True))

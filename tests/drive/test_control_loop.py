@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.errors import KeystrokeError
-from pdtui.core.events import Event, events_by_step
+from pdtui.core.events import Event, group_events_by_step
 from pdtui.core.step_record import StepRecord
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.policies.runtime.policy import Policy
@@ -22,7 +22,7 @@ def _loop(policy: Policy, small_map: StimulationMap, seed: int = 3, **options: A
 
 
 def _drive(loop: ControlLoop, steps: int, events: Iterable[Event] = ()) -> list[StepRecord]:
-    by_step = events_by_step(events)
+    by_step = group_events_by_step(events)
     return [loop.advance(by_step.get(step, ())) for step in range(loop.step, loop.step + steps)]
 
 

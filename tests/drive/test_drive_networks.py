@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pdtui.core.events import Event, events_by_step
+from pdtui.core.events import Event, group_events_by_step
 from pdtui.core.step_record import StepRecord
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.policies.runtime.policy import Policy
@@ -26,7 +26,7 @@ EVENTS = (
 def _drive(robot: Robot, policy: Policy, unit: str, events: tuple[Event, ...]) -> list[StepRecord]:
     push = Behavior("push", "w", "pushes", {unit: 1.5})
     loop = ControlLoop(robot, policy, StimulationMap(robot.name, "", "", "space", {}, {"push": push}), 3)
-    by_step = events_by_step(events)
+    by_step = group_events_by_step(events)
     return [loop.advance(by_step.get(step, ())) for step in range(70)]
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from pdtui.core.errors import SessionError
-from pdtui.sessions.schema import ActivationsKept
 from pdtui.sessions.session_comparison import compare_sessions
 from pdtui.sessions.session_export import export_stream
 from pdtui.sessions.session_reader import read_activations, read_session
 from pdtui.sessions.session_repair import examine_session, repair_session
+from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded
 

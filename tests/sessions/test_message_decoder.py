@@ -12,10 +12,10 @@ import pyarrow as pa
 import pytest
 
 from pdtui.core.errors import SessionError
-from pdtui.sessions.rrd import protobuf
-from pdtui.sessions.rrd.arrow_checks import MAX_ROWS, read_batch
-from pdtui.sessions.rrd.framing import CHUNK, read_frames
-from pdtui.sessions.rrd.message_decoder import MAX_MESSAGE, read_chunk
+from pdtui.sessions.rrd.arrow_checks import MAX_ROWS, read_record_batch
+from pdtui.sessions.rrd.message_decoder import MAX_MESSAGE, decode_chunk
+from pdtui.sessions.rrd.message_framing import CHUNK, read_message_frames
+from pdtui.sessions.rrd.protobuf_fields import read_fields
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_reader import read_session
 from tests.sessions.conftest import Recorded
@@ -36,7 +36,7 @@ def test_rows_come_back() -> None:
     given = batch(
         step=pa.array([1, 2]), names=pa.array([["a"], []]), fixed=pa.array([b"ab", b"cd"], pa.binary(2))
     )
-    assert read_batch(stream(given)).equals(given)
+    assert read_record_batch(stream(given)).equals(given)
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_rows_come_back() -> None:
 )
 def test_what_could_be_larger_than_it_looks_is_refused(content: pa.Buffer, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        read_batch(content)
+        read_record_batch(content)
 
 
 def test_a_message_cannot_claim_to_unpack_to_any_size() -> None:
@@ -63,20 +63,20 @@ def test_a_message_cannot_claim_to_unpack_to_any_size() -> None:
         sizes = b"\x18" + _varint(size)
         payload = b"\x0a\x02\x08\x01" + b"\x10\x02" + sizes + b"\x20\x01" + b"\x2a\x05aaaaa"
         with pytest.raises(ValueError, match="cannot unpack"):
-            read_chunk(memoryview(payload))
+            decode_chunk(memoryview(payload))
 
 
 @pytest.mark.parametrize("content", [b"\x0a\x05ab", b"\x07", b"\x80" * 11, b"\x08", b"\x0b"])
 def test_a_damaged_envelope_is_refused(content: bytes) -> None:
     with pytest.raises(ValueError, match=r"."):
-        protobuf.read_fields(memoryview(content))
+        read_fields(memoryview(content))
 
 
 def test_a_wrong_length_is_named_and_does_not_shorten(recorded: Recorded, tmp_path: Path) -> None:
     """Kind and length of some messages are changed: no such file is read, and each error names a byte."""
     whole = recorded[0].read_bytes()
     with recorded[0].open("rb") as file:
-        starts = [frame.start - 16 for frame in read_frames(file, len(whole)) if frame.kind == CHUNK]
+        starts = [frame.start - 16 for frame in read_message_frames(file, len(whole)) if frame.kind == CHUNK]
     path = tmp_path / "wrong.rrd"
     for start in starts[::25]:
         kind, length = struct.unpack_from("<QQ", whole, start)
@@ -90,7 +90,7 @@ def test_rows_of_another_recording_are_not_left_out(recorded: Recorded, tmp_path
     data = bytearray(recorded[0].read_bytes())
     name = data.rindex(b"/drive") if b"/drive" in data else 0
     with recorded[0].open("rb") as file:
-        last = [frame for frame in read_frames(file, len(data)) if frame.kind == CHUNK][-1]
+        last = [frame for frame in read_message_frames(file, len(data)) if frame.kind == CHUNK][-1]
     place = data.index(b"pdtui", last.start)
     data[place] ^= 1
     assert name < len(data)

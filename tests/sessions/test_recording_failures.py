@@ -15,7 +15,7 @@ import pytest
 import rerun as rr
 
 from pdtui.core.errors import SessionError
-from pdtui.sessions.drive_properties import info_from_properties, info_to_properties
+from pdtui.sessions.drive_info_codec import decode_drive_info, encode_drive_info
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded
@@ -169,7 +169,7 @@ def test_missing_streams(recorded: Recorded, tmp_path: Path) -> None:
     path = tmp_path / "thin.rrd"
     with rr.RecordingStream("pdtui") as recording:
         recording.save(path)
-        properties = info_to_properties(recorded[1].info, "2026-01-01T00:00:00+00:00")
+        properties = encode_drive_info(recorded[1].info, "2026-01-01T00:00:00+00:00")
         arrays = {name: pa.array(v if isinstance(v, list) else [v]) for name, v in properties.items()}
         recording.send_property("drive", rr.AnyValues(**arrays))
         recording.set_time("step", sequence=0)
@@ -206,12 +206,12 @@ def test_a_torn_file_is_called_torn(share: float, recorded: Recorded, tmp_path: 
     ],
 )
 def test_a_doctored_property_is_named(name: str, value: object, recorded: Recorded) -> None:
-    properties = info_to_properties(recorded[1].info, "2026-01-01T00:00:00+00:00")
+    properties = encode_drive_info(recorded[1].info, "2026-01-01T00:00:00+00:00")
     listed = {key: item if isinstance(item, list) else [item] for key, item in properties.items()}
-    assert info_from_properties(listed)[0] == recorded[1].info
+    assert decode_drive_info(listed)[0] == recorded[1].info
     listed[name] = value if isinstance(value, list) else [value]
     with pytest.raises(SessionError, match=f"property '{name}'"):
-        info_from_properties(listed)
+        decode_drive_info(listed)
 
 
 def test_the_loop_of_the_tests_repeats_itself(weights: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pdtui.core.plain_text import file_size, printable
+from pdtui.core.plain_text import file_size, make_printable
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.tui.camera import Camera, round_length
 from pdtui.tui.cell_text import fit_cells, format_number, format_signed, wrap_text
@@ -172,7 +172,7 @@ def test_sizes(count: int, shown: str) -> None:
 
 
 def test_foreign_text_is_made_harmless() -> None:
-    assert printable("a\x1b[2Jb\x9b\u202ec\td") == "a\ufffd[2Jb\ufffd\ufffdc d"
+    assert make_printable("a\x1b[2Jb\x9b\u202ec\td") == "a\ufffd[2Jb\ufffd\ufffdc d"
 
 
 def test_text_is_fitted_by_cells() -> None:

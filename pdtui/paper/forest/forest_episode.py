@@ -17,8 +17,8 @@ from pdtui.drive.keystrokes import write_keystrokes
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
 from pdtui.paper.forest.scripted_operator import DEFAULT, ScriptedOperator, operator_keys
 from pdtui.robots.legged.terrain import AHEAD
-from pdtui.sessions.schema import ActivationsKept
 from pdtui.sessions.session_reader import read_session
+from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 FOREST, ROUGH = "forest", "rough"

@@ -15,8 +15,8 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
 from pdtui.core.atomic_file import write_file
-from pdtui.core.bounded_read import open_regular
 from pdtui.core.errors import PolicyError
+from pdtui.core.untrusted_file import open_regular_file
 from pdtui.policies.weights.file_search import find_beside
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork, check_tensors
 
@@ -44,7 +44,7 @@ def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
 def is_own_format(path: Path) -> bool:
     """Whether `save_network` wrote the file: safetensors with metadata of ours."""
     try:
-        with open_regular(path):
+        with open_regular_file(path):
             pass  # no pipe is waited for
         with safe_open(str(path), framework="pt") as handle:
             return _KEY in (handle.metadata() or {})
@@ -59,7 +59,7 @@ def hash_file(path: Path) -> str:
         PolicyError: the file cannot be read.
     """
     try:
-        with open_regular(path) as file:
+        with open_regular_file(path) as file:
             return file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise PolicyError(f"{path}: cannot be read: {error.strerror}") from error
@@ -107,7 +107,7 @@ def load_network(path: Path) -> PolicyNetwork:
 
 def _read(path: Path) -> tuple[dict[str, str], dict[str, torch.Tensor]]:
     try:
-        with open_regular(path) as file:
+        with open_regular_file(path) as file:
             size = fstat(file.fileno()).st_size
         if size > MAX_BYTES:
             raise PolicyError(

@@ -30,7 +30,7 @@ _SIZED = (
 _HEADER, _COMPRESSION = 2, 3  # fields of a message, and of a record batch
 
 
-def read_batch(data: pa.Buffer) -> pa.RecordBatch:
+def read_record_batch(data: pa.Buffer) -> pa.RecordBatch:
     """The only record batch of an IPC stream.
 
     Args:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import pyarrow as pa
 
-from pdtui.sessions.rrd import protobuf
-from pdtui.sessions.rrd.arrow_checks import read_batch
+from pdtui.sessions.rrd.arrow_checks import read_record_batch
+from pdtui.sessions.rrd.protobuf_fields import Value, bytes_field, number_field, read_fields, text_field
 
 MAX_MESSAGE = 256 << 20
 """Bytes of one message, packed or not. A batch of 1000 steps of 4096 units has 16 MB."""
@@ -33,7 +33,7 @@ class StoreInfo:
 
 
 @dataclass(frozen=True)
-class RowChunk:
+class EntityChunk:
     """Some rows of one entity.
 
     Attributes:
@@ -47,48 +47,46 @@ class RowChunk:
     batch: pa.RecordBatch
 
 
-def read_store(payload: memoryview) -> StoreInfo:
+def decode_store_info(payload: memoryview) -> StoreInfo:
     """The store that a message announces.
 
     Raises:
         ValueError: the message is damaged.
     """
-    return _store(
-        protobuf.bytes_field(protobuf.read_fields(protobuf.bytes_field(protobuf.read_fields(payload), 2)), 2)
-    )
+    return _store(bytes_field(read_fields(bytes_field(read_fields(payload), 2)), 2))
 
 
-def read_chunk(payload: memoryview) -> tuple[StoreInfo, RowChunk]:
+def decode_chunk(payload: memoryview) -> tuple[StoreInfo, EntityChunk]:
     """Decode a message that holds rows.
 
     Raises:
         ValueError, pyarrow.ArrowException: the message is damaged, or would unpack to more than is bearable.
     """
-    message = protobuf.read_fields(payload)
-    store = _store(protobuf.bytes_field(message, 1))
-    if protobuf.number_field(message, 4) != _ARROW_IPC:
+    message = read_fields(payload)
+    store = _store(bytes_field(message, 1))
+    if number_field(message, 4) != _ARROW_IPC:
         raise ValueError("expected rows in Arrow's format")
-    batch = read_batch(_unpacked(message))
+    batch = read_record_batch(_unpacked(message))
     metadata = batch.schema.metadata or {}
     if _PATH not in metadata:
         raise ValueError("rows of no entity")
     timelines = tuple(field.name for field in batch.schema if (field.metadata or {}).get(_KIND) == _INDEX)
-    return store, RowChunk(metadata[_PATH].decode(), timelines, batch)
+    return store, EntityChunk(metadata[_PATH].decode(), timelines, batch)
 
 
 def _store(message: memoryview) -> StoreInfo:
-    found = protobuf.read_fields(message)
-    application = protobuf.text_field(protobuf.read_fields(protobuf.bytes_field(found, 3)), 1)
-    return StoreInfo(protobuf.number_field(found, 1) == 1, protobuf.text_field(found, 2), application)
+    found = read_fields(message)
+    application = text_field(read_fields(bytes_field(found, 3)), 1)
+    return StoreInfo(number_field(found, 1) == 1, text_field(found, 2), application)
 
 
-def _unpacked(message: dict[int, protobuf.Value]) -> pa.Buffer:
-    packed, compression = protobuf.bytes_field(message, 5), protobuf.number_field(message, 2)
+def _unpacked(message: dict[int, Value]) -> pa.Buffer:
+    packed, compression = bytes_field(message, 5), number_field(message, 2)
     if compression in _PLAIN:
         return pa.py_buffer(bytes(packed))
     if compression != _LZ4:
         raise ValueError(f"unknown compression {compression}")
-    size = protobuf.number_field(message, 3)
+    size = number_field(message, 3)
     if size > min(MAX_MESSAGE, _LZ4_RATIO * len(packed)):
         raise ValueError(f"{len(packed)} bytes cannot unpack to {size}, or must not")
     return pa.decompress(packed, size, codec="lz4_raw")

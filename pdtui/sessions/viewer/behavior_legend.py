@@ -39,6 +39,6 @@ class BehaviorLegend:
         """Of a behavior."""
         return behavior_rgb(self._rows.setdefault(name, len(self._rows)))
 
-    def color_of_all(self, names: Sequence[str]) -> tuple[int, int, int]:
+    def color_of_state(self, names: Sequence[str]) -> tuple[int, int, int]:
         """Of behaviors that are active together: the color of the latest."""
         return self.color(names[-1]) if names else IDLE

@@ -11,11 +11,11 @@ from typing import Any, cast
 import rerun as rr
 
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.schema import APP
+from pdtui.sessions.session_schema import APP
 from pdtui.sessions.viewer.session_blueprint import BEGUN, DriveContent, session_blueprint
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
-from pdtui.sessions.writer.component_columns import ComponentColumn, time_columns
-from pdtui.sessions.writer.recording_stream import send_property
+from pdtui.sessions.writer.arrow_columns import ComponentColumn, time_columns
+from pdtui.sessions.writer.rerun_recording import send_property
 
 _CLOSE_SECONDS = 2.0
 _WAITING = 2000

@@ -12,7 +12,7 @@ from rerun.blueprint.encodings import ComponentSourceKind, TextLogColumnKind, Vi
 
 from pdtui.core.attributes import Attribute
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.schema import (
+from pdtui.sessions.session_schema import (
     BEHAVIORS,
     DRIVE,
     ENDINGS,

@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from pdtui.sessions.writer.component_columns import ComponentColumn, number_lists
+from pdtui.sessions.writer.arrow_columns import ComponentColumn, number_list_column
 
 Key = TypeVar("Key")
 Send = Callable[[str, Sequence[int], list[ComponentColumn]], None]
@@ -85,7 +85,7 @@ class ViewerCurves(Generic[Key]):
                 steps, values = zip(*buffered, strict=True)
                 block = np.array(values, np.float64)
                 self._send(
-                    self._entity_of(key), steps, [number_lists(rr.Scalars.descriptor_scalars(), block)]
+                    self._entity_of(key), steps, [number_list_column(rr.Scalars.descriptor_scalars(), block)]
                 )
                 self._rows[key] = []
 
@@ -100,7 +100,7 @@ class ViewerCurves(Generic[Key]):
         return f"{self._entity}/{rr.escape_entity_path_part(self._label(key))}"
 
 
-class HeatMap:
+class ActivationHeatMap:
     """All activations over the whole session, thinned out as it grows."""
 
     def __init__(self) -> None:

@@ -16,18 +16,24 @@ from pdtui.core.errors import RecordingEnded, SessionError
 from pdtui.core.plain_text import file_size
 from pdtui.core.step_record import StepRecord
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.drive_properties import info_to_properties
-from pdtui.sessions.environment_versions import environment_versions
-from pdtui.sessions.rrd.framing import undamaged_length
-from pdtui.sessions.schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
+from pdtui.sessions.drive_info_codec import encode_drive_info
+from pdtui.sessions.environment_versions import collect_versions
+from pdtui.sessions.rrd.message_framing import undamaged_length
+from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
 from pdtui.sessions.viewer.live_viewer import LiveViewer
 from pdtui.sessions.viewer.session_blueprint import session_blueprint
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
-from pdtui.sessions.viewer.viewer_data import ViewerData
-from pdtui.sessions.writer.component_columns import ComponentColumn, time_columns
+from pdtui.sessions.viewer.viewer_data_writer import ViewerDataWriter
+from pdtui.sessions.writer.arrow_columns import ComponentColumn, time_columns
 from pdtui.sessions.writer.disk_space import DiskReserve, free_space
-from pdtui.sessions.writer.recording_stream import abandon, errors_named, flush, open_recording, send_property
-from pdtui.sessions.writer.step_columns import drive_columns, ending_columns, event_columns
+from pdtui.sessions.writer.rerun_recording import (
+    abandon,
+    flush,
+    name_file_in_errors,
+    open_recording,
+    send_property,
+)
+from pdtui.sessions.writer.step_record_columns import ending_columns, event_columns, step_record_columns
 
 _VIEW_ROWS, _LIVE_ROWS = 128, 8
 _SAFE_ROWS = 16
@@ -84,7 +90,7 @@ class SessionRecorder:
         if viewer is not None:
             self._live = LiveViewer(viewer, info, self._recording.get_recording_id() or "")
         self._write_start()
-        self._views = ViewerData(info, self._send, self._log_static)
+        self._views = ViewerDataWriter(info, self._send, self._log_static)
         self._send_off()
 
     def write(self, record: StepRecord) -> None:
@@ -173,8 +179,8 @@ class SessionRecorder:
         with self._errors_named():
             self._recording.send_recording_name(name)
         created = datetime.now(UTC).isoformat(timespec="seconds")
-        self._property(INFO, info_to_properties(info, created))
-        self._property(VERSIONS, environment_versions())
+        self._property(INFO, encode_drive_info(info, created))
+        self._property(VERSIONS, collect_versions())
 
     def _require_room_to_begin(self) -> None:
         with self._errors_named():
@@ -214,7 +220,7 @@ class SessionRecorder:
             return
         self._write_events(records)
         steps = [record.step for record in records]
-        self._send(DRIVE, steps, drive_columns(records, self.info.activations))
+        self._send(DRIVE, steps, step_record_columns(records, self.info.activations))
         self._views.add(records)
         self._views.write_changes()
         if self._views.pending >= self._view_rows:
@@ -260,4 +266,4 @@ class SessionRecorder:
                 self._recording.flush(timeout_sec=0.0)
 
     def _errors_named(self) -> AbstractContextManager[None]:
-        return errors_named(self.path)
+        return name_file_in_errors(self.path)

@@ -8,7 +8,7 @@ import numpy as np
 from rich.cells import cell_len
 from textual.strip import Strip
 
-from pdtui.core.plain_text import printable
+from pdtui.core.plain_text import make_printable
 from pdtui.drive.drive_snapshot import DriveSnapshot
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.panel import Panel
@@ -39,7 +39,7 @@ class AttributeTable(Panel):
             return [ScreenRow(width).add("values come with the policy", self.palette.faint).strip()]
         shown = self._choose(height)
         attributes = [self.facts.attributes[index] for index in shown]
-        widest = max(cell_len(printable(attribute.name)) for attribute in attributes)
+        widest = max(cell_len(make_printable(attribute.name)) for attribute in attributes)
         holds = any(behavior.pid is not None for behavior in self.map.behaviors.values())
         target_width = _TARGET if holds else 0
         fixed = _VALUE + _UNIT + target_width + 3
@@ -55,9 +55,9 @@ class AttributeTable(Panel):
             value = "" if values is None else format_number(float(values[index]))
             strips.append(
                 ScreenRow(width)
-                .add(printable(attribute.name), name_style, name_width)
+                .add(make_printable(attribute.name), name_style, name_width)
                 .add(" " + value, palette.title, _VALUE + 1, right=True)
-                .add(" " + printable(attribute.unit), palette.muted, _UNIT + 1)
+                .add(" " + make_printable(attribute.unit), palette.muted, _UNIT + 1)
                 .add("" if target is None else f"→ {format_number(target)}", name_style, target_width)
                 .add(" " + line, palette.primary if target is None else palette.behavior(row))
                 .strip()

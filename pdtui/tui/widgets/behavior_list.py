@@ -8,7 +8,7 @@ from rich.cells import cell_len
 from rich.style import Style
 from textual.strip import Strip
 
-from pdtui.core.plain_text import printable
+from pdtui.core.plain_text import make_printable
 from pdtui.tui.cell_text import ScreenRow, format_number, format_signed, key_name, wrap_text
 from pdtui.tui.panel import Panel
 
@@ -32,7 +32,7 @@ class BehaviorList(Panel):
         behaviors = list(self.map.behaviors.values())
         if not behaviors:
             return [ScreenRow(width).add("none: the map has no behaviors", self.palette.faint).strip()]
-        names = [printable(behavior.name) for behavior in behaviors]
+        names = [make_printable(behavior.name) for behavior in behaviors]
         keys = [key_name(behavior.key) for behavior in behaviors]
         key_width = max((cell_len(key) for key in keys), default=0) + 2
         name_width = min(max((cell_len(name) for name in names), default=0), max(8, width // 3))
@@ -58,17 +58,19 @@ class BehaviorList(Panel):
         palette = self.palette
         name_width = self._columns[1]
         color = palette.behavior(row)
-        says = printable(behavior.says)
+        says = make_printable(behavior.says)
         line = ScreenRow(width)
         if active is None:
             self._add_cap(line, behavior.key, palette.key)
-            line.add("  " + printable(behavior.name), color, name_width + 2).add("  ", palette.text)
+            line.add("  " + make_printable(behavior.name), color, name_width + 2).add("  ", palette.text)
             line.add(self._kind(behavior) if roomy else says, palette.muted)
             lines = [line.strip()]
         else:
             self._add_cap(line, behavior.key, palette.caps[row % len(palette.caps)])
             line.add(" ▌", color)
-            line.add(printable(behavior.name), color + Style(bold=True), name_width).add("  ", palette.text)
+            line.add(make_printable(behavior.name), color + Style(bold=True), name_width).add(
+                "  ", palette.text
+            )
             self._add_state(line, behavior, active, color)
             lines = [line.strip()]
             if active.target is not None:
@@ -87,7 +89,7 @@ class BehaviorList(Panel):
 
     def _kind(self, behavior: Behavior) -> str:
         if behavior.pid is not None:
-            return f"holds {printable(behavior.pid.attribute)}"
+            return f"holds {make_printable(behavior.pid.attribute)}"
         return "" if behavior.period is None else f"for {format_number(behavior.period)} s"
 
     def _add_state(self, line: ScreenRow, behavior: Behavior, active: ActiveBehavior, color: Style) -> None:
@@ -120,7 +122,7 @@ class BehaviorList(Panel):
         if self.facts is None or behavior.pid is None:
             return ""
         named = {attribute.name: attribute.unit for attribute in self.facts.attributes}
-        return printable(named.get(behavior.pid.attribute, ""))
+        return make_printable(named.get(behavior.pid.attribute, ""))
 
     def _crop(self, entries: list[list[Strip]], latched: list[bool], width: int, height: int) -> list[Strip]:
         """As many entries as fit: latched ones first, in the order of the map."""

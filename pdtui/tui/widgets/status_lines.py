@@ -9,7 +9,7 @@ from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
-from pdtui.core.plain_text import file_size, printable
+from pdtui.core.plain_text import file_size, make_printable
 from pdtui.sessions.episode_statistics import NO_STATISTICS
 from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number
 from pdtui.tui.panel import Panel
@@ -27,7 +27,7 @@ class StatusLine(Panel):
         del height
         palette = self.palette
         title = self.map.robot if self.facts is None else self.facts.title
-        row = ScreenRow(width).add(" pdtui ", palette.caps[1]).add(f" {printable(title)}", palette.title)
+        row = ScreenRow(width).add(" pdtui ", palette.caps[1]).add(f" {make_printable(title)}", palette.title)
         shown: list[tuple[int, Part]] = []
         left = row.left - 1
         for position, part in sorted(self._parts(), key=lambda item: item[0]):
@@ -47,10 +47,10 @@ class StatusLine(Panel):
         if self.facts is None:
             return [
                 (0, ("loading the policy…", palette.warn)),
-                (4, (printable(self.map.policy), palette.muted)),
+                (4, (make_printable(self.map.policy), palette.muted)),
             ]
         parts: list[tuple[int, Part]] = [
-            (4, (printable(PurePath(self.facts.policy).name), palette.muted)),
+            (4, (make_printable(PurePath(self.facts.policy).name), palette.muted)),
             (6, (f"seed {self.facts.seed}", palette.muted)),
         ]
         snapshot = self.snapshot
@@ -64,7 +64,7 @@ class StatusLine(Panel):
             (7, (f"episode {snapshot.episode}", palette.muted)),
         ]
         if self.facts.recording:
-            name = _shorten(printable(PurePath(self.facts.recording).name), _NAME)
+            name = _shorten(make_printable(PurePath(self.facts.recording).name), _NAME)
             parts.append((3, (f"● {file_size(snapshot.recorded_bytes)}", palette.bad)))
             parts.append((8, (name, palette.muted)))
         return parts
@@ -97,10 +97,10 @@ class NoticeLine(Panel):
         palette, row, counters = self.palette, ScreenRow(width), self._counters()
         finished = self.snapshot.finished if self.snapshot is not None else ""
         if finished:
-            said, style = f" ■ the drive is over: {printable(finished)}   {self.hints} ", palette.alert
+            said, style = f" ■ the drive is over: {make_printable(finished)}   {self.hints} ", palette.alert
         elif self.notice:
             row.add(" ▌ ", palette.warn)
-            said, style = printable(self.notice), palette.title
+            said, style = make_printable(self.notice), palette.title
         else:
             row.add(" ▌ ", palette.faint)
             said, style = self._summary(), palette.muted
@@ -131,7 +131,7 @@ class NoticeLine(Panel):
         if self.snapshot is None or self.facts is None:
             return "pdtui is ready when the policy is"
         facts = self.facts
-        place = printable(facts.recording) or "not recorded"
+        place = make_printable(facts.recording) or "not recorded"
         if self._counters():
             return f"seed {facts.seed} · {place}"
         share = 100.0 * self.snapshot.involvement / max(1, self.snapshot.step)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.cells import cell_len
 from textual.strip import Strip
 
-from pdtui.core.plain_text import printable
+from pdtui.core.plain_text import make_printable
 from pdtui.core.units import format_unit
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.panel import Panel
@@ -47,8 +47,8 @@ class UnitTable(Panel):
                 .add("  → ", palette.faint)
                 .add(format_number(view.overwritten), palette.title, _NUMBER)
             )
-            if row.left > cell_len(printable(name)):
-                row.add(" " + printable(name), style)
+            if row.left > cell_len(make_printable(name)):
+                row.add(" " + make_printable(name), style)
             strips.append(row.strip())
         if len(units) > room:
             strips.append(ScreenRow(width).add(f"+{len(units) - room} more", palette.faint).strip())

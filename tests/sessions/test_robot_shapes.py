@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pdtui.core.robot_data import Link
-from pdtui.sessions.viewer.viewer_shapes import RobotShapes
+from pdtui.sessions.viewer.robot_shapes import RobotShapes
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 ON_ITS_SIDE = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)

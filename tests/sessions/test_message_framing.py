@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pdtui.sessions.rrd.framing import undamaged_length
+from pdtui.sessions.rrd.message_framing import undamaged_length
 from tests.sessions.conftest import Recorded
 
 

@@ -12,14 +12,14 @@ from pdtui.core.attributes import Attribute
 from pdtui.core.errors import SessionError
 from pdtui.core.robot_data import Link
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.schema import ACTIVATIONS_KEPT, SCHEMA
+from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, SCHEMA
 
 T = TypeVar("T")
 _SIZES = {"capsule": 2, "sphere": 1, "box": 3}
 _MAX_LINKS, _MAX_UNITS, _MAX_TEXT = 10_000, 4_000_000, 1000
 
 
-def info_to_properties(info: DriveInfo, created: str) -> dict[str, Any]:
+def encode_drive_info(info: DriveInfo, created: str) -> dict[str, Any]:
     """Plain values: what people read in the viewer as it is, structures as JSON.
 
     Args:
@@ -46,8 +46,8 @@ def info_to_properties(info: DriveInfo, created: str) -> dict[str, Any]:
     }
 
 
-def info_from_properties(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, str]:
-    """Read back what `info_to_properties` gave, trusting nothing.
+def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, str]:
+    """Read back what `encode_drive_info` gave, trusting nothing.
 
     Args:
         properties: a list of values by name, as the file holds them.

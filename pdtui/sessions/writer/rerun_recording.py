@@ -16,7 +16,7 @@ from rerun.recording_stream import is_enabled
 
 from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.schema import APP
+from pdtui.sessions.session_schema import APP
 from pdtui.sessions.viewer.session_blueprint import session_blueprint
 from pdtui.sessions.writer.disk_space import is_full
 
@@ -32,7 +32,7 @@ def open_recording(path: Path, info: DriveInfo, recording_id: str | None = None)
     Raises:
         SessionError: the file cannot be written.
     """
-    with errors_named(path):
+    with name_file_in_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         recording = rr.RecordingStream(APP, recording_id=recording_id)
         if not is_enabled(recording):
@@ -78,7 +78,7 @@ def abandon(recording: rr.RecordingStream) -> None:
 
 
 @contextmanager
-def errors_named(path: Path) -> Iterator[None]:
+def name_file_in_errors(path: Path) -> Iterator[None]:
     """Turn what the operating system or the library says into a `SessionError` that names the file."""
     try:
         yield

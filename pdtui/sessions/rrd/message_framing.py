@@ -61,7 +61,7 @@ def check_start(file: BinaryIO) -> None:
         raise SessionError("byte 9: cannot be read as a recording: expected messages in protobuf")
 
 
-def read_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
+def read_message_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
     """Messages in their order, up to the end of the file.
 
     Args:
@@ -121,7 +121,7 @@ def undamaged_length(path: Path) -> int:
             size = file.seek(0, 2)
             place = min(_START.size, size)
             try:
-                for frame in read_frames(file, size):
+                for frame in read_message_frames(file, size):
                     place = frame.end
             except SessionError:
                 pass

@@ -10,9 +10,9 @@ import rerun as rr
 from pdtui.core.attributes import Floats
 from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.core.step_record import StepRecord
-from pdtui.sessions.schema import OBSTACLES, OBSTACLES_ABOVE
+from pdtui.sessions.session_schema import OBSTACLES, OBSTACLES_ABOVE
 from pdtui.sessions.viewer.viewer_curves import LogStatic, Send
-from pdtui.sessions.writer.component_columns import number_lists, vector_lists
+from pdtui.sessions.writer.arrow_columns import number_list_column, vector_list_column
 
 _COLOR = (92, 138, 84)
 _HEIGHT = 1.2
@@ -60,13 +60,13 @@ class ObstacleWriter:
         # As with the path, a picture's y axis points down.
         above = centers[:, :, :2] * np.array([1.0, -1.0], np.float32)
         cylinders = [
-            vector_lists(rr.Cylinders3D.descriptor_centers(), centers),
-            number_lists(rr.Cylinders3D.descriptor_radii(), radii),
-            number_lists(rr.Cylinders3D.descriptor_lengths(), np.full((1, count), _HEIGHT, np.float32)),
+            vector_list_column(rr.Cylinders3D.descriptor_centers(), centers),
+            number_list_column(rr.Cylinders3D.descriptor_radii(), radii),
+            number_list_column(rr.Cylinders3D.descriptor_lengths(), np.full((1, count), _HEIGHT, np.float32)),
         ]
         discs = [
-            vector_lists(rr.Points2D.descriptor_positions(), above),
-            number_lists(rr.Points2D.descriptor_radii(), radii),
+            vector_list_column(rr.Points2D.descriptor_positions(), above),
+            number_list_column(rr.Points2D.descriptor_radii(), radii),
         ]
         self._send(OBSTACLES, [step], cylinders)
         self._send(OBSTACLES_ABOVE, [step], discs)

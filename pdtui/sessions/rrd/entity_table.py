@@ -11,12 +11,12 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from pdtui.core.errors import SessionError
-from pdtui.sessions.schema import STEP
+from pdtui.sessions.session_schema import STEP
 
 Number = TypeVar("Number", bound=np.generic)
 
 
-class EntityRows:
+class EntityTable:
     """All rows of one entity, in the order of their steps."""
 
     def __init__(self, entity: str, batches: Sequence[pa.RecordBatch]) -> None:

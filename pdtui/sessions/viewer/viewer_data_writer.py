@@ -17,13 +17,13 @@ from pdtui.core.attributes import Floats
 from pdtui.core.step_record import StepRecord
 from pdtui.core.units import format_unit
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.schema import BEHAVIORS, HEAT_MAP, MAGNITUDES, PATH, ROBOT, TARGETS, UNITS
+from pdtui.sessions.session_schema import BEHAVIORS, HEAT_MAP, MAGNITUDES, PATH, ROBOT, TARGETS, UNITS
 from pdtui.sessions.viewer.behavior_legend import BehaviorLegend
+from pdtui.sessions.viewer.obstacle_writer import ObstacleWriter
+from pdtui.sessions.viewer.robot_shapes import RobotShapes
 from pdtui.sessions.viewer.session_blueprint import DriveContent
-from pdtui.sessions.viewer.viewer_curves import Color, HeatMap, LogStatic, Send, ViewerCurves
-from pdtui.sessions.viewer.viewer_obstacles import ObstacleWriter
-from pdtui.sessions.viewer.viewer_shapes import RobotShapes
-from pdtui.sessions.writer.component_columns import number_lists, polylines, texts
+from pdtui.sessions.viewer.viewer_curves import ActivationHeatMap, Color, LogStatic, Send, ViewerCurves
+from pdtui.sessions.writer.arrow_columns import number_list_column, polyline_column, texts
 
 _UNITS_DRAWN = 4
 """Units drawn of a state: an imprint of sixty would be a tangle, and the heat map has them all."""
@@ -32,7 +32,7 @@ _DRAWN_APART = 0.04
 the activations, and a replay has all of them."""
 
 
-class ViewerData:
+class ViewerDataWriter:
     """Collects control steps and writes what the viewer draws of them.
 
     Args:
@@ -75,7 +75,7 @@ class ViewerData:
         self._jumped = True
         self._episode = self._last = 0
         self._bounds = np.array([[np.inf] * 2, [-np.inf] * 2])
-        self._heat = HeatMap()
+        self._heat = ActivationHeatMap()
         self._heat_drawn = False
 
     def add(self, records: Sequence[StepRecord]) -> None:
@@ -163,7 +163,7 @@ class ViewerData:
         )
 
     def _color(self, state: str) -> Color:
-        return self._legend.color_of_all(self._states.get(state, ()))
+        return self._legend.color_of_state(self._states.get(state, ()))
 
     def _outputs(self, state: str, record: StepRecord) -> dict[tuple[str, int], tuple[float, float]]:
         """Natural and overwritten outputs of the units that the state changed most when it first came."""
@@ -197,13 +197,13 @@ class ViewerData:
         # A picture's y axis points down, and only in a picture does the viewer fit the path to the frame.
         above = pieces[:, :, :2] * np.array([1.0, -1.0], np.float32)
         packed = {state: _packed(self._color(state)) for state in set(states)}
-        colors = number_lists(
+        colors = number_list_column(
             rr.LineStrips3D.descriptor_colors(), np.array([packed[state] for state in states], np.uint32)
         )
         columns = [
-            polylines(rr.LineStrips3D.descriptor_strips(), pieces),
+            polyline_column(rr.LineStrips3D.descriptor_strips(), pieces),
             colors,
-            polylines(rr.LineStrips2D.descriptor_strips(), above),
+            polyline_column(rr.LineStrips2D.descriptor_strips(), above),
             replace(colors, descriptor=rr.LineStrips2D.descriptor_colors()),
         ]
         self._send(PATH, steps, columns)

@@ -10,10 +10,17 @@ from typing import Any, BinaryIO, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from pdtui.core.bounded_read import open_regular
 from pdtui.core.errors import SessionError
-from pdtui.sessions.rrd.entity_rows import EntityRows
-from pdtui.sessions.rrd.framing import (
+from pdtui.core.untrusted_file import open_regular_file
+from pdtui.sessions.rrd.entity_table import EntityTable
+from pdtui.sessions.rrd.message_decoder import (
+    MAX_MESSAGE,
+    EntityChunk,
+    StoreInfo,
+    decode_chunk,
+    decode_store_info,
+)
+from pdtui.sessions.rrd.message_framing import (
     CHUNK,
     LAST,
     RESCUE,
@@ -21,10 +28,9 @@ from pdtui.sessions.rrd.framing import (
     MessageFrame,
     check_end,
     check_start,
-    read_frames,
+    read_message_frames,
 )
-from pdtui.sessions.rrd.message_decoder import MAX_MESSAGE, RowChunk, StoreInfo, read_chunk, read_store
-from pdtui.sessions.schema import APP, DRIVE, STEP, VIEWS
+from pdtui.sessions.session_schema import APP, DRIVE, STEP, VIEWS
 
 MAX_KEPT = 4 << 30
 """Bytes of rows that are kept in memory: an hour at 50 Hz with 512 units has 0.6 GB."""
@@ -36,7 +42,7 @@ _MAX_STORES = 16
 _DAMAGED = (ValueError, OverflowError, EOFError, OSError, MemoryError, pa.ArrowException)
 
 
-class RrdFile:
+class RrdContents:
     """An .rrd of pdtui, read once from its beginning to its end.
 
     Every message is decoded and checked, also those that are not kept.
@@ -76,11 +82,11 @@ class RrdFile:
         """Values of one group of properties, by name; empty if the file has none."""
         return self._properties.get(name, {})
 
-    def rows(self, entity: str) -> EntityRows:
+    def rows(self, entity: str) -> EntityTable:
         """All rows of an entity; none if the file has none."""
-        return EntityRows(entity, self._batches.get(entity, []))
+        return EntityTable(entity, self._batches.get(entity, []))
 
-    def _take(self, path: Path, chunk: RowChunk, only: Sequence[str], skip: Sequence[str]) -> None:
+    def _take(self, path: Path, chunk: EntityChunk, only: Sequence[str], skip: Sequence[str]) -> None:
         entity, batch = chunk.entity, chunk.batch
         if entity.startswith(_PROPERTIES):
             group = self._properties.setdefault(entity.removeprefix(_PROPERTIES), {})
@@ -115,7 +121,7 @@ class ChunkStream:
         self.store: StoreInfo | None = None
         self.complete = self.finished = False
 
-    def __iter__(self) -> Iterator[RowChunk]:
+    def __iter__(self) -> Iterator[EntityChunk]:
         """Read from the beginning.
 
         Raises:
@@ -123,7 +129,7 @@ class ChunkStream:
                 before the damage were given. The message names file and byte.
         """
         try:
-            with open_regular(self._path) as file:
+            with open_regular_file(self._path) as file:
                 yield from self._chunks(file)
         except FileNotFoundError:
             raise SessionError(f"{self._path}: no such file") from None
@@ -144,16 +150,16 @@ class ChunkStream:
             raise SessionError(f"{self._path}: holds no recording")
         return self.store
 
-    def _chunks(self, file: BinaryIO) -> Iterator[RowChunk]:
+    def _chunks(self, file: BinaryIO) -> Iterator[EntityChunk]:
         check_start(file)
-        for frame in read_frames(file, os.fstat(file.fileno()).st_size):
+        for frame in read_message_frames(file, os.fstat(file.fileno()).st_size):
             if frame.kind == LAST:
                 check_end(file, frame)
                 self.finished = True
             elif frame.kind == STORE:
-                self._announced(_decoded(file, frame, read_store))
+                self._announced(_decoded(file, frame, decode_store_info))
             elif frame.kind == CHUNK:
-                store, chunk = _decoded(file, frame, read_chunk)
+                store, chunk = _decoded(file, frame, decode_chunk)
                 if store not in self._stores:
                     raise SessionError(
                         f"byte {frame.start}: rows of a recording that the file does not announce"

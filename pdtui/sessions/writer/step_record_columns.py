@@ -13,44 +13,53 @@ from numpy.typing import NDArray
 
 from pdtui.core.events import Event, describe_event
 from pdtui.core.step_record import ActiveBehavior, StepRecord
-from pdtui.sessions.schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION, ActivationsKept
-from pdtui.sessions.writer.component_columns import (
+from pdtui.sessions.session_schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION, ActivationsKept
+from pdtui.sessions.writer.arrow_columns import (
     ComponentColumn,
-    nested_lists,
-    number_lists,
-    ragged_lists,
-    stack_arrays,
+    nested_list_column,
+    number_list_column,
+    ragged_list_column,
+    stack_rows,
     texts,
 )
 
 
-def drive_columns(records: Sequence[StepRecord], kept: ActivationsKept = "all") -> list[ComponentColumn]:
+def step_record_columns(
+    records: Sequence[StepRecord], kept: ActivationsKept = "all"
+) -> list[ComponentColumn]:
     """One row a control step: everything of a `StepRecord` but its events and poses.
 
     What no step of the batch has (behaviors, stimulation) gets no column; activations do as `kept` says.
     """
     of: Any = StepRecord._make(zip(*records, strict=True))
-    actions = stack_arrays(of.action)
+    actions = stack_rows(of.action)
     gains = np.empty((len(records), 2 + actions.shape[1]))
     gains[:, 0], gains[:, 1], gains[:, 2:] = of.reward, of.cost, actions
     counters = np.empty((len(records), 2), np.int64)
     counters[:, 0], counters[:, 1] = of.digest, of.episode
     columns = [
-        nested_lists("attributes", stack_arrays(of.attributes)),
-        nested_lists(REWARD_COST_ACTION, gains),
-        number_lists(DIGEST_EPISODE, counters),
+        nested_list_column("attributes", stack_rows(of.attributes)),
+        nested_list_column(REWARD_COST_ACTION, gains),
+        number_list_column(DIGEST_EPISODE, counters),
     ]
     if kept != "off":
-        activations = stack_arrays(of.activations)
-        columns.append(nested_lists("activations", to_half(activations) if kept == "half" else activations))
+        activations = stack_rows(of.activations)
+        columns.append(
+            nested_list_column("activations", to_half(activations) if kept == "half" else activations)
+        )
     if any(stimulation.units for stimulation in of.stimulation):
-        columns.append(ragged_lists("stimulation", [_overwrites(record) for record in records], pa.float64()))
+        columns.append(
+            ragged_list_column("stimulation", [_overwrites(record) for record in records], pa.float64())
+        )
     if any(of.behaviors):
         names = [[behavior.name for behavior in behaviors] for behaviors in of.behaviors]
         states = [
             [value for behavior in behaviors for value in _state(behavior)] for behaviors in of.behaviors
         ]
-        columns += [ragged_lists("behaviors", names, pa.utf8()), ragged_lists("active", states, pa.float64())]
+        columns += [
+            ragged_list_column("behaviors", names, pa.utf8()),
+            ragged_list_column("active", states, pa.float64()),
+        ]
     return columns
 
 
@@ -71,10 +80,10 @@ def event_columns(events: Sequence[Event], first: int) -> list[ComponentColumn]:
     return [
         texts(rr.TextLog.descriptor_text(), [_log_line(event) for event in events]),
         texts(rr.TextLog.descriptor_level(), ["INFO"] * len(events)),
-        number_lists("number", numbers),
+        number_list_column("number", numbers),
         texts("kind", [event.kind for event in events]),
         texts("name", [event.name for event in events]),
-        number_lists("value", np.array([event.value for event in events], np.float64)),
+        number_list_column("value", np.array([event.value for event in events], np.float64)),
         texts("key", [event.key for event in events]),
     ]
 

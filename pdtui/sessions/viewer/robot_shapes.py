@@ -10,7 +10,7 @@ import rerun as rr
 from pdtui.core.attributes import Floats
 from pdtui.core.robot_data import Link
 from pdtui.robots.geometry import capsule_ends, place_links
-from pdtui.sessions.writer.component_columns import ComponentColumn, vector_lists
+from pdtui.sessions.writer.arrow_columns import ComponentColumn, vector_list_column
 
 _COLOR = (214, 137, 76)
 _TORSO = (90, 122, 158)
@@ -63,14 +63,14 @@ class RobotShapes:
             # The viewer's capsule starts at its translation and extends along z; ours is centred.
             starts = capsule_ends(self._round, placed)[..., 0, :]
             columns += [
-                vector_lists(rr.Capsules3D.descriptor_translations(), starts.astype(np.float32)),
-                vector_lists(rr.Capsules3D.descriptor_quaternions(), _xyzw(placed)),
+                vector_list_column(rr.Capsules3D.descriptor_translations(), starts.astype(np.float32)),
+                vector_list_column(rr.Capsules3D.descriptor_quaternions(), _xyzw(placed)),
             ]
         if self._boxes:
             placed = place_links(self._boxes, poses)
             columns += [
-                vector_lists(rr.Boxes3D.descriptor_centers(), placed[..., :3].astype(np.float32)),
-                vector_lists(rr.Boxes3D.descriptor_quaternions(), _xyzw(placed)),
+                vector_list_column(rr.Boxes3D.descriptor_centers(), placed[..., :3].astype(np.float32)),
+                vector_list_column(rr.Boxes3D.descriptor_quaternions(), _xyzw(placed)),
             ]
         return columns
 

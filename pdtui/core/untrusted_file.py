@@ -8,7 +8,7 @@ from io import BufferedReader
 from pathlib import Path
 
 
-def open_regular(path: Path) -> BufferedReader:
+def open_regular_file(path: Path) -> BufferedReader:
     """Open a file for reading; a pipe or a device, which might never end, is refused.
 
     Raises:
@@ -22,7 +22,7 @@ def open_regular(path: Path) -> BufferedReader:
     return os.fdopen(descriptor, "rb")
 
 
-def read_at_most(path: Path, limit: int) -> bytes:
+def read_bounded_file(path: Path, limit: int) -> bytes:
     """All bytes of a file.
 
     Args:
@@ -32,7 +32,7 @@ def read_at_most(path: Path, limit: int) -> bytes:
     Raises:
         OSError: it cannot be read, is no file, or is larger.
     """
-    with open_regular(path) as file:
+    with open_regular_file(path) as file:
         content = file.read(limit + 1)
     if len(content) > limit:
         raise OSError(None, f"expected at most {limit} bytes, the file has more", str(path))

@@ -13,7 +13,7 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
-from pdtui.sessions.schema import STEP, TIME
+from pdtui.sessions.session_schema import STEP, TIME
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class TimeColumn:
         return self.array
 
 
-def stack_arrays(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
+def stack_rows(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """What `numpy.stack` gives for arrays (width,) of one width, in half the time for many short ones."""
     return np.concatenate(arrays).reshape(len(arrays), -1)
 
@@ -56,19 +56,19 @@ def time_columns(steps: Sequence[int], dt: float) -> list[TimeColumn]:
     return [TimeColumn(STEP, pa.array(numbers)), TimeColumn(TIME, pa.array(nanoseconds))]
 
 
-def number_lists(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
+def number_list_column(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
     """A block (n, width) as n lists; a block (n,) as n lists of one number."""
     return _listed(descriptor, pa.array(block.reshape(-1)), _regular(len(block), block.size // len(block)))
 
 
-def nested_lists(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
+def nested_list_column(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
     """A block (n, width) as n lists of one list each: only so can the viewer select one of its numbers."""
     inner = _regular(len(block), block.shape[1])
     values = pa.ListArray.from_arrays(inner, pa.array(block.reshape(-1)))
     return _listed(descriptor, values, _regular(len(block), 1))
 
 
-def vector_lists(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
+def vector_list_column(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
     """A block (n, m, k) as n lists of m vectors of length k."""
     count, width, length = block.shape
     item = pa.field("item", pa.from_numpy_dtype(block.dtype), nullable=False)
@@ -76,15 +76,15 @@ def vector_lists(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) 
     return _listed(descriptor, values, _regular(count, width))
 
 
-def polylines(descriptor: rr.ComponentDescriptor, block: NDArray[Any]) -> ComponentColumn:
+def polyline_column(descriptor: rr.ComponentDescriptor, block: NDArray[Any]) -> ComponentColumn:
     """A block (n, m, k) as n lists of one polyline through m points of k coordinates."""
-    points = vector_lists(descriptor, block).array
+    points = vector_list_column(descriptor, block).array
     item = pa.field("item", points.type.value_type, nullable=False)
     strips = pa.ListArray.from_arrays(points.offsets, points.values, type=pa.list_(item))
     return _listed(descriptor, strips, _regular(len(block), 1))
 
 
-def ragged_lists(
+def ragged_list_column(
     descriptor: rr.ComponentDescriptor | str, lists: Sequence[Sequence[Any]], kind: pa.DataType
 ) -> ComponentColumn:
     """One list of its own length a row."""
