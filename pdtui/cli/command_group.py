@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from pdtui.core.errors import PdtuiError
-from pdtui.core.plain_text import printable
+from pdtui.core.printable_text import make_printable
 
 OPTIONAL_ROOMS = ("pdtui.benchmarks", "pdtui.paper", "pdtui.training")
 """Packages that an installation may leave out; only the commands that need one stop working."""
@@ -52,5 +52,5 @@ class LazyCommandGroup(click.Group):
             if error.name not in OPTIONAL_ROOMS:
                 raise
             message = f"{error.name} is not part of this installation, and the command needs it"
-        click.echo(f"pdtui: {printable(message)}", err=True)  # it may quote a file
+        click.echo(f"pdtui: {make_printable(message)}", err=True)  # it may quote a file
         return ctx.exit(1)

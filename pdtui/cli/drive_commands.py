@@ -20,7 +20,7 @@ from pdtui.cli.shared_options import (
     start_option,
 )
 from pdtui.core.errors import KeystrokeError, ScreenError, SessionError
-from pdtui.core.plain_text import make_printable
+from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept
 from pdtui.sessions.viewer.viewer_address import LOCAL, PORT, ViewerAddress

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from pdtui.cli.shared_options import import_option_flags, progress_bar_or_none
-from pdtui.core.plain_text import make_printable
+from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
 
 

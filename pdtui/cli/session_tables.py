@@ -6,12 +6,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from rich import filesize
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
 from pdtui.core.events import describe_event
-from pdtui.core.plain_text import file_size, make_printable
+from pdtui.core.printable_text import make_printable
 from pdtui.sessions.session_comparison import AttributeDeviation, SessionComparison
 from pdtui.sessions.session_reader import Session
 from pdtui.sessions.session_summary import SessionSummary
@@ -40,7 +41,7 @@ def list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
         "session", "robot", "length", "keys", "size", "outcome", left=("session", "robot", "outcome")
     )
     for row in rows:
-        name, size = _cell(Path(row["path"]).relative_to(folder)), file_size(row["bytes"])
+        name, size = _cell(Path(row["path"]).relative_to(folder)), filesize.decimal(row["bytes"])
         if row["broken"]:
             table.add_row(name, "", "", "", size, _cell(f"broken: {row['broken']}", "red"))
             continue

@@ -14,7 +14,7 @@ from pdtui.cli.shared_options import json_option, judging_options, progress_bar_
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.json_text import to_json
-from pdtui.core.plain_text import printable
+from pdtui.core.printable_text import make_printable
 
 BROKEN, DIFFERS = 1, 3
 _file = click.argument("file", type=click.Path(path_type=Path))
@@ -37,7 +37,7 @@ def list_command(folder: Path, as_json: bool) -> None:
         raise SessionError(f"{folder}: no such folder")
     rows = [_row(path) for path in sorted(folder.rglob("*.rrd")) if path.is_file()]
     if not rows and not as_json:
-        click.echo(f"no sessions under {printable(str(folder))}")
+        click.echo(f"no sessions under {make_printable(str(folder))}")
         return
     show_result({"sessions": rows}, as_json, lambda: session_tables.list_table(rows, folder))
 
@@ -128,9 +128,9 @@ def _verified(file: Path, policy: str, judging: dict[str, Any], as_json: bool) -
         row["broken"] = str(error).removeprefix(f"{file}: ")
         lines = [f"broken: {row['broken']}"]
     if not as_json:
-        click.echo(printable(f"{file}: {lines[0]}"))
+        click.echo(make_printable(f"{file}: {lines[0]}"))
         for line in lines[1:]:
-            click.echo(printable(line))
+            click.echo(make_printable(line))
     return row
 
 
@@ -150,7 +150,7 @@ def repair(file: Path, output: Path | None, in_place: bool) -> None:
     if in_place and output is not None:
         raise SessionError("--in-place replaces the file; -o writes another: choose one")
     if examine_session(file).whole:
-        click.echo(f"{printable(str(file))}: whole; nothing to repair")
+        click.echo(f"{make_printable(str(file))}: whole; nothing to repair")
         return
     target = file if in_place else output or file.with_suffix(".repaired.rrd")
     if target.exists() and not in_place:
@@ -159,7 +159,7 @@ def repair(file: Path, output: Path | None, in_place: bool) -> None:
     said = (
         f"{repaired.steps} steps ({repaired.seconds:g} s), {repaired.keys} keys, outcome '{repaired.outcome}'"
     )
-    click.echo(printable(f"wrote {target}: {said}"))
+    click.echo(make_printable(f"wrote {target}: {said}"))
 
 
 @sessions.command()
@@ -176,7 +176,7 @@ def export(file: Path, stream: str | None, output: Path | None, keys: Path | Non
         raise SessionError("--stream says what, -o where: give both")
     if stream is not None and output is not None:
         rows = export_stream(file, stream, output, overwrite=overwrite)
-        click.echo(printable(f"wrote {output}: {rows} rows"))
+        click.echo(make_printable(f"wrote {output}: {rows} rows"))
     if keys is not None:
         _export_keys(file, keys, overwrite)
     if stream is None and keys is None:
@@ -194,7 +194,7 @@ def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
     write_file(output, write_keystrokes(heading.events), SessionError)
     without = len(heading.events) - heading.keys
     note = f"; {without} events had no key and are not in it" if without else ""
-    click.echo(printable(f"wrote {output}: {heading.keys} keys of {heading.steps} steps{note}"))
+    click.echo(make_printable(f"wrote {output}: {heading.keys} keys of {heading.steps} steps{note}"))
 
 
 @sessions.command()

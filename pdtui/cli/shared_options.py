@@ -13,7 +13,7 @@ import click
 
 from pdtui.core.errors import MapError
 from pdtui.core.json_text import to_json
-from pdtui.core.plain_text import printable
+from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, NO_OPTIONS, SQUASH_NAMES, ImportOptions
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ def _map_of(robot: str, name: str, policy: str) -> StimulationMap:
     except MapError as error:
         if not policy:
             raise
-        click.echo(printable(f"{error}; driving without behaviors"), err=True)
+        click.echo(make_printable(f"{error}; driving without behaviors"), err=True)
         return bare_map(robot, policy)
     return load_map(path)
 

@@ -7,7 +7,7 @@ from rich.segment import Segment
 from rich.style import Style
 from textual.strip import Strip
 
-from pdtui.core.plain_text import make_printable
+from pdtui.core.printable_text import make_printable
 
 _KEYS = {
     "up": "↑",

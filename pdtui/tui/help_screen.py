@@ -13,7 +13,7 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
-from pdtui.core.plain_text import make_printable
+from pdtui.core.printable_text import make_printable
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import key_name
 from pdtui.tui.theme import ThemeStyles, theme_styles

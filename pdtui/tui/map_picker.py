@@ -14,7 +14,7 @@ from textual.containers import Vertical
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from pdtui.core.plain_text import make_printable
+from pdtui.core.printable_text import make_printable
 from pdtui.tui.cell_text import fit_cells
 from pdtui.tui.style_sheets import PICKER
 from pdtui.tui.theme import THEME, ThemeStyles, theme_styles

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rich import filesize
 
-from pdtui.core.plain_text import file_size, make_printable
+from pdtui.core.printable_text import make_printable
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.tui.camera import Camera, round_length
 from pdtui.tui.cell_text import fit_cells, format_number, format_signed, wrap_text
@@ -165,10 +166,10 @@ def test_signed_numbers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("count", "shown"), [(0, "0 B"), (1499, "1.5 kB"), (2_500_000, "2.5 MB"), (7_100_000_000, "7.1 GB")]
+    ("count", "shown"), [(0, "0 bytes"), (1499, "1.5 kB"), (2_500_000, "2.5 MB"), (7_100_000_000, "7.1 GB")]
 )
 def test_sizes(count: int, shown: str) -> None:
-    assert file_size(count) == shown
+    assert filesize.decimal(count) == shown
 
 
 def test_foreign_text_is_made_harmless() -> None:

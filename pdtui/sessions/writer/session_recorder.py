@@ -11,9 +11,9 @@ from types import TracebackType
 from typing import Any, Self, cast
 
 import rerun as rr
+from rich import filesize
 
 from pdtui.core.errors import RecordingEnded, SessionError
-from pdtui.core.plain_text import file_size
 from pdtui.core.step_record import StepRecord
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.drive_info_codec import encode_drive_info
@@ -188,8 +188,8 @@ class SessionRecorder:
             left, needed = free_space(self.path.parent), self._reserve.to_begin
         if left < needed:
             raise SessionError(
-                f"{self.path}: cannot be written: the disk is full: {file_size(left)} are left, "
-                f"a recording begins with {file_size(needed)}"
+                f"{self.path}: cannot be written: the disk is full: {filesize.decimal(left)} are left, "
+                f"a recording begins with {filesize.decimal(needed)}"
             )
 
     def _require_room(self) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from rich.cells import cell_len
 from textual.strip import Strip
 
-from pdtui.core.plain_text import make_printable
+from pdtui.core.printable_text import make_printable
 from pdtui.drive.drive_snapshot import DriveSnapshot
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.panel import Panel

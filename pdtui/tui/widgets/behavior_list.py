@@ -8,7 +8,7 @@ from rich.cells import cell_len
 from rich.style import Style
 from textual.strip import Strip
 
-from pdtui.core.plain_text import make_printable
+from pdtui.core.printable_text import make_printable
 from pdtui.tui.cell_text import ScreenRow, format_number, format_signed, key_name, wrap_text
 from pdtui.tui.panel import Panel
 

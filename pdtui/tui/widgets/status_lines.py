@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import PurePath
 
+from rich import filesize
 from rich.cells import cell_len
 from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
-from pdtui.core.plain_text import file_size, make_printable
+from pdtui.core.printable_text import make_printable
 from pdtui.sessions.episode_statistics import NO_STATISTICS
 from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number
 from pdtui.tui.panel import Panel
@@ -65,7 +66,7 @@ class StatusLine(Panel):
         ]
         if self.facts.recording:
             name = _shorten(make_printable(PurePath(self.facts.recording).name), _NAME)
-            parts.append((3, (f"● {file_size(snapshot.recorded_bytes)}", palette.bad)))
+            parts.append((3, (f"● {filesize.decimal(snapshot.recorded_bytes)}", palette.bad)))
             parts.append((8, (name, palette.muted)))
         return parts
 

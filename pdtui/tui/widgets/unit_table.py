@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.cells import cell_len
 from textual.strip import Strip
 
-from pdtui.core.plain_text import make_printable
+from pdtui.core.printable_text import make_printable
 from pdtui.core.units import format_unit
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.panel import Panel
