@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +15,7 @@ from pdtui.benchmarks.librosa_matching import load_librosa, match_by_loop
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PdtuiError
 from pdtui.core.units import Stimulation
+from pdtui.core.worker_pool import WorkerProcess
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.stimulated_rollout import RolloutJob
 from pdtui.spectra.matching import Discrepancies, match_units
@@ -293,11 +292,13 @@ def matching_memory(units: int, steps: int, attributes: int) -> tuple[float, flo
     """
     if not _STATUS.exists():
         raise PdtuiError("the benchmark of memory reads /proc, which this system does not have")
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        return pool.submit(_match_many, units, steps, attributes).result()
+    with WorkerProcess("memory of matching", int) as worker:
+        worker.send(_match_many, units, steps, attributes)
+        seconds: tuple[float, float] = worker.receive()
+    return seconds
 
 
-def _match_many(units: int, steps: int, attributes: int) -> tuple[float, float]:
+def _match_many(_: object, units: int, steps: int, attributes: int) -> tuple[float, float]:
     """One synthetic episode of random walks; seconds are those of matching and correlating alone."""
     rng = np.random.default_rng(0)
     activations = np.empty((steps, units), np.float32)

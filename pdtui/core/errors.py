@@ -56,6 +56,10 @@ class TrainingError(PdtuiError):
     """A training run cannot start or go on."""
 
 
+class WorkerError(PdtuiError):
+    """A worker process died."""
+
+
 def format_error_in_one_line(error: BaseException) -> str:
     """An exception in one line, for where no traceback can be printed: what it is and where it was raised."""
     words = " ".join(traceback.format_exception_only(error)[-1].split())

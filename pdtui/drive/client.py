@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import time
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
 from pdtui.core.errors import PdtuiError
+from pdtui.core.worker_pool import describe_exit
 from pdtui.drive.drive_protocol import PaceRequest
 from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
 
@@ -101,7 +101,6 @@ class DriveClient:
                 return None
             message: DriveFacts | DriveSnapshot | PdtuiError | str = self._connection.recv()
         except (EOFError, OSError):
-            self._process.join(timeout=1.0)
             return PdtuiError(self._death())
         return message
 
@@ -112,9 +111,5 @@ class DriveClient:
             return  # the process is gone; the next poll says why
 
     def _death(self) -> str:
-        code = self._process.exitcode
-        how = (
-            f"was killed by {signal.Signals(-code).name}" if code and code < 0 else f"ended with code {code}"
-        )
-        line = f"the simulation's process {how}"
+        line = f"the simulation's process {describe_exit(self._process)}"
         return f"{line}; the recording up to then is in {self._recording}" if self._recording else line

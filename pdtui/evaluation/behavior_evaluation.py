@@ -7,7 +7,7 @@ difference.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,10 +16,10 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.events import Event
 from pdtui.core.intervals import confidence_interval
+from pdtui.core.worker_pool import WorkerPool
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.headless import build_loop
-from pdtui.drive.loop_cache import cached_loop, drive_worker_pool
 from pdtui.evaluation.task_evaluation import TaskEvaluation, TaskRun, run_task, summarise_task
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
 
@@ -115,15 +115,10 @@ def evaluate_map(
     behaviors = [b for b in known if b.aim is not None and b.pid is None]
     loop = build_loop(config)
     names = ["", *(b.name for b in behaviors)] if behaviors else []
-    jobs: list[_Job] = [(config, name, seed, "aim") for name in names for seed in seeds]
-    jobs += [(config, b.name, seed, kind) for b in tasked for kind in ("task", "untouched") for seed in seeds]
-    runs: dict[tuple[str, int, str], Any] = {}
-    with drive_worker_pool(workers) as pool:
-        results: Iterable[_Run | TaskRun] = pool.imap(_run_job, jobs)
-        for done, ((_, name, seed, kind), run) in enumerate(zip(jobs, results, strict=True), start=1):
-            runs[name, seed, kind] = run
-            if progress is not None:
-                progress(done, len(jobs))
+    jobs: list[_Job] = [(name, seed, "aim") for name in names for seed in seeds]
+    jobs += [(b.name, seed, kind) for b in tasked for kind in ("task", "untouched") for seed in seeds]
+    with WorkerPool(f"evaluation of {config.robot}", workers, loop, build_loop, config) as pool:
+        runs: dict[_Job, Any] = dict(zip(jobs, pool.map(_run_job, jobs, progress), strict=True))
     return MapEvaluation(
         config.robot,
         loop.policy.name,
@@ -141,13 +136,12 @@ def evaluate_map(
     )
 
 
-_Job = tuple[DriveConfig, str, int, str]
-"""A drive, a behavior's name, a seed, and what to run: ``aim``, ``task`` or ``untouched``."""
+_Job = tuple[str, int, str]
+"""A behavior's name, a seed, and what to run: ``aim``, ``task`` or ``untouched``."""
 
 
-def _run_job(job: _Job) -> _Run | TaskRun:
-    config, name, seed, kind = job
-    loop = cached_loop(config)
+def _run_job(loop: ControlLoop, job: _Job) -> _Run | TaskRun:
+    name, seed, kind = job
     if kind == "aim":
         return run_behavior(loop, name, seed)
     return run_task(loop, loop.map.behaviors[name], seed, untouched=kind == "untouched")
@@ -169,7 +163,7 @@ def run_behavior(built: ControlLoop, name: str, seed: int) -> _Run:
 
 
 def _summarise(
-    loop: ControlLoop, behavior: Behavior, runs: dict[tuple[str, int, str], Any], seeds: Sequence[int]
+    loop: ControlLoop, behavior: Behavior, runs: dict[_Job, Any], seeds: Sequence[int]
 ) -> BehaviorEvaluation:
     assert behavior.aim is not None
     column = loop.robot.attribute_index(behavior.aim.attribute)

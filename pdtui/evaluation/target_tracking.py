@@ -48,8 +48,7 @@ def evaluate_tracking(
             for name in (behavior.name, "")
             for seed in seeds
         ]
-        total = len(drives)
-        followed = runner.run(drives, progress and (lambda done: progress(done, total)))
+        followed = runner.run(drives, progress)
         unit = runner.attribute(attribute).unit
     untouched = finite_mean(seed_errors(followed[len(seeds) :]))
     return summarise_tracking(followed[: len(seeds)], unit, untouched)

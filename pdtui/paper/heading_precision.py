@@ -138,7 +138,7 @@ def compare_heading_precision(
     steps: dict[str, float] = {}
     for config, behaviors in found:
 
-        def tell(done: int, before: int = before) -> None:
+        def tell(done: int, _: int, before: int = before) -> None:
             if progress is not None:
                 progress(before + done, total)
 

@@ -69,7 +69,7 @@ class EffectProber:
             progress: called with (roll-outs done, roll-outs).
 
         Raises:
-            RobotError: a worker process died.
+            WorkerError: a worker process died.
         """
         first = steps // 2 if measure_from is None else measure_from
         keys = [(state_fingerprint(start), steps, first) for start in starts]

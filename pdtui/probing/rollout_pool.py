@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import multiprocessing.connection
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 from pdtui.core.closable import Closable
-from pdtui.core.errors import RobotError
-from pdtui.core.worker_processes import obey_parent
+from pdtui.core.worker_pool import WorkerPool
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_fit import check_fit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, WorldSpaces
@@ -25,42 +22,39 @@ from pdtui.spectra.monitor import StartState, StepProgress
 # Control steps handed over at once: long enough to hide the hand-over, short enough to stop within a second.
 _STEPS_A_CHUNK = 1200
 
-_worker: tuple[Robot, Policy] | None = None
 WorkItem = TypeVar("WorkItem")
 WorkResult = TypeVar("WorkResult")
+_Pair = tuple[Robot, Policy]
 
 
-def _start_worker(robot: str, policy: str, import_options: ImportOptions) -> None:
-    global _worker  # noqa: PLW0603  (a process's own robot is its global state)
-    obey_parent()
+@dataclass(frozen=True)
+class _Chunk:
+    jobs: Sequence[RolloutJob]
+    starts: dict[int, StartState]
+    steps: int
+    measure_from: int
+
+
+def _build_pair(robot: str, policy: str, import_options: ImportOptions) -> _Pair:
     world = make_robot(robot)
-    _worker = (world, _load(policy, world, import_options))
+    return world, _load(policy, world, import_options)
 
 
 def _load(policy: str | Path, world: Robot, import_options: ImportOptions) -> Policy:
     return load_policy(policy, world.name, import_options=import_options, spaces=WorldSpaces.of_world(world))
 
 
-def _apply(function: Callable[[Robot, Policy, WorkItem], WorkResult], item: WorkItem) -> WorkResult:
-    assert _worker is not None
-    return function(*_worker, item)
+def _apply(
+    function: Callable[[Robot, Policy, WorkItem], WorkResult], pair: _Pair, item: WorkItem
+) -> WorkResult:
+    return function(*pair, item)
 
 
-def _run_chunk(
-    jobs: Sequence[RolloutJob], starts: dict[int, StartState], steps: int, measure_from: int
-) -> list[RolloutOutcome]:
-    assert _worker is not None
-    return _run(_worker, jobs, starts, steps, measure_from)
-
-
-def _run(
-    pair: tuple[Robot, Policy],
-    jobs: Sequence[RolloutJob],
-    starts: dict[int, StartState],
-    steps: int,
-    measure_from: int,
-) -> list[RolloutOutcome]:
-    return [roll_out(*pair, starts[index], plan, steps, measure_from) for plan, index in jobs]
+def _roll_out_chunk(pair: _Pair, chunk: _Chunk) -> list[RolloutOutcome]:
+    return [
+        roll_out(*pair, chunk.starts[index], plan, chunk.steps, chunk.measure_from)
+        for plan, index in chunk.jobs
+    ]
 
 
 class RolloutPool(Closable):
@@ -93,17 +87,19 @@ class RolloutPool(Closable):
         self.policy = policy if isinstance(policy, Policy) else _load(policy, self.robot, import_options)
         check_fit(self.policy, self.robot, self.robot.name)
         named = isinstance(robot, str) and not isinstance(policy, Policy)
-        self._names = (robot if isinstance(robot, str) else robot.name, str(policy), import_options)
-        self._workers = max(1, workers) if named else 1
-        self._pool: ProcessPoolExecutor | None = None
+        self._pool = WorkerPool(
+            f"roll-outs of {self.robot.name}",
+            workers if named else 1,
+            (self.robot, self.policy),
+            _build_pair,
+            *(robot, str(policy), import_options),
+        )
         self.steps_run = 0
         self.rollouts = 0
 
     def close(self) -> None:
         """End the worker processes; a later `run` starts new ones."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
-            self._pool = None
+        self._pool.close()
 
     def run(
         self,
@@ -125,13 +121,16 @@ class RolloutPool(Closable):
             keep: called with each batch of finished jobs, by number, and their outcomes.
 
         Raises:
-            RobotError: a worker process died.
+            WorkerError: a worker process died.
         """
         size = max(1, _STEPS_A_CHUNK // steps)
-        chunks = [jobs[low : low + size] for low in range(0, len(jobs), size)]
+        parts = [jobs[low : low + size] for low in range(0, len(jobs), size)]
+        chunks = [
+            _Chunk(part, {index: starts[index] for _, index in part}, steps, measure_from) for part in parts
+        ]
         results: list[list[RolloutOutcome]] = [[] for _ in chunks]
         finished = 0
-        for number, outcomes in self._chunks(chunks, starts, steps, measure_from):
+        for number, outcomes in self._pool.as_completed(_roll_out_chunk, chunks):
             results[number] = outcomes
             finished += len(outcomes)
             self.count(outcomes)
@@ -150,70 +149,11 @@ class RolloutPool(Closable):
         """Apply a function of a module to robot, policy and each item; results in the order of the items.
 
         Raises:
-            RobotError: a worker process died.
+            WorkerError: a worker process died.
         """
-        results: list[WorkResult] = []
-        if self._workers == 1:
-            for item in items:
-                results.append(function(self.robot, self.policy, item))
-                if progress is not None:
-                    progress(len(results), len(items))
-            return results
-        try:
-            for result in self._processes().map(_apply, [function] * len(items), items):
-                results.append(result)
-                if progress is not None:
-                    progress(len(results), len(items))
-        except BrokenProcessPool as error:
-            raise self._died() from error
-        except BaseException:
-            self.close()
-            raise
-        return results
+        return self._pool.map(partial(_apply, function), items, progress)
 
     def count(self, outcomes: Sequence[RolloutOutcome]) -> None:
         """Take roll-outs into `rollouts` and `steps_run`, wherever they were run."""
         self.rollouts += len(outcomes)
         self.steps_run += sum(outcome.lived for outcome in outcomes)
-
-    def _chunks(
-        self,
-        chunks: Sequence[Sequence[RolloutJob]],
-        starts: Sequence[StartState],
-        steps: int,
-        measure_from: int,
-    ) -> Iterator[tuple[int, list[RolloutOutcome]]]:
-        needed = [{index: starts[index] for _, index in chunk} for chunk in chunks]
-        if self._workers == 1:
-            for number, chunk in enumerate(chunks):
-                yield number, _run((self.robot, self.policy), chunk, needed[number], steps, measure_from)
-            return
-        pool = self._processes()
-        futures: dict[Future[list[RolloutOutcome]], int] = {}
-        try:
-            for number, chunk in enumerate(chunks):
-                future = pool.submit(_run_chunk, chunk, needed[number], steps, measure_from)
-                futures[future] = number
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BrokenProcessPool as error:
-            raise self._died() from error
-        except BaseException:
-            self.close()
-            raise
-
-    def _processes(self) -> ProcessPoolExecutor:
-        if self._pool is None:
-            self._pool = ProcessPoolExecutor(
-                self._workers,
-                mp_context=multiprocessing.get_context("spawn"),
-                initializer=_start_worker,
-                initargs=self._names,
-            )
-        return self._pool
-
-    def _died(self) -> RobotError:
-        return RobotError(
-            f"{self.robot.name}: a worker process died (out of memory, or killed); one worker runs "
-            "without other processes"
-        )

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from multiprocessing.pool import Pool
 
 import numpy as np
 
@@ -12,10 +11,10 @@ from pdtui.core.angles import wrap_angle, wrap_angles
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.closable import Closable
 from pdtui.core.events import Event
+from pdtui.core.worker_pool import WorkerPool
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.headless import build_loop
-from pdtui.drive.loop_cache import cached_loop, drive_worker_pool
 from pdtui.search.step_response import StepResponse, measure_step_response
 from pdtui.stimulation.stimulation_map import PidGains
 
@@ -85,16 +84,13 @@ class TrackingDriveRunner(Closable):
 
     def __init__(self, config: DriveConfig | ControlLoop, workers: int = 1) -> None:
         self.loop = build_loop(config) if isinstance(config, DriveConfig) else config
-        self._order = config if isinstance(config, DriveConfig) and workers > 1 else None
-        self._workers = workers
-        self._pool: Pool | None = None
+        workers = workers if isinstance(config, DriveConfig) else 1
+        name = f"drives of {self.loop.robot.name}"
+        self._pool = WorkerPool(name, workers, self.loop, build_loop, config)
 
     def close(self) -> None:
         """End the processes; a later `run` starts new ones."""
-        if self._pool is not None:
-            self._pool.terminate()
-            self._pool.join()
-            self._pool = None
+        self._pool.close()
 
     def attribute(self, name: str) -> Attribute:
         """The attribute of a name.
@@ -105,33 +101,18 @@ class TrackingDriveRunner(Closable):
         return self.loop.robot.attributes[self.loop.robot.attribute_index(name)]
 
     def run(
-        self, drives: Sequence[TrackingDrive], done: Callable[[int], None] | None = None
+        self, drives: Sequence[TrackingDrive], progress: Callable[[int, int], None] | None = None
     ) -> list[TrackingDriveResult]:
         """Drive them all; results in their order.
 
         Args:
             drives: what to drive.
-            done: called with the number of drives finished so far.
+            progress: called with the number of drives finished and of all drives.
+
+        Raises:
+            WorkerError: a worker process died.
         """
-        results: list[TrackingDriveResult] = []
-        for followed in self._results(drives):
-            results.append(followed)
-            if done is not None:
-                done(len(results))
-        return results
-
-    def _results(self, drives: Sequence[TrackingDrive]) -> Iterable[TrackingDriveResult]:
-        config = self._order
-        if config is None:
-            return (drive_targets(self.loop, drive) for drive in drives)
-        if self._pool is None:
-            self._pool = drive_worker_pool(self._workers)
-        return self._pool.imap(_follow_job, [(config, drive) for drive in drives])
-
-
-def _follow_job(job: tuple[DriveConfig, TrackingDrive]) -> TrackingDriveResult:
-    config, drive = job
-    return drive_targets(cached_loop(config), drive)
+        return self._pool.map(drive_targets, drives, progress)
 
 
 def drive_targets(built: ControlLoop, drive: TrackingDrive) -> TrackingDriveResult:

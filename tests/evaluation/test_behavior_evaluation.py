@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import multiprocessing
+
 import numpy as np
 import pytest
 from scipy import stats
 
-from pdtui.core.errors import MapError
+from pdtui.core.errors import MapError, WorkerError
 from pdtui.core.intervals import confidence_interval
 from pdtui.core.units import Stimulation
 from pdtui.drive.drive_config import DriveConfig
@@ -16,6 +18,7 @@ from pdtui.evaluation.target_tracking import evaluate_tracking, holding_behavior
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import StimulationMap
+from tests.deadline import deadline
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +55,14 @@ def test_effects_are_paired_differences_over_the_last_200_steps(config: DriveCon
 
 def test_the_number_of_workers_changes_nothing(config: DriveConfig) -> None:
     assert evaluate_map(config, [100, 101], workers=1) == evaluate_map(config, [100, 101], workers=2)
+
+
+def test_a_killed_worker_ends_an_evaluation(config: DriveConfig) -> None:
+    def kill_one(_done: int, _total: int) -> None:
+        multiprocessing.active_children()[0].kill()
+
+    with deadline(60), pytest.raises(WorkerError, match="evaluation of ant: .*killed by SIGKILL"):
+        evaluate_map(config, range(100, 110), workers=2, progress=kill_one)
 
 
 def test_the_interval_is_students() -> None:

@@ -1,8 +1,5 @@
 from __future__ import annotations
 
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -143,39 +140,3 @@ def test_bootstrap_interval() -> None:
     assert bootstrap_interval(samples, 1) == (low, high)
     assert bootstrap_interval(np.append(samples, np.nan), 1) == (low, high)
     assert np.isnan(bootstrap_interval(np.array([1.0]), 1)).all()
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_workers_end_when_their_parent_is_killed(policy_file: Path) -> None:
-    script = (
-        "import sys, time\n"
-        "from pdtui.spectra.monitor import collect_starts\n"
-        "from pdtui.probing.effect_probe import Prober\n"
-        "from pdtui.probing.rollout_pool import Crew\n"
-        "crew = Crew('ant', sys.argv[1], 2)\n"
-        "starts = collect_starts(crew.robot, crew.policy, 1000, 1, at=1)\n"
-        "Prober(crew).sweep(range(4), (1.0,), starts, steps=2)\n"
-        "print(*(child.pid for child in __import__('multiprocessing').active_children()), flush=True)\n"
-        "time.sleep(600)\n"
-    )
-    command = [sys.executable, "-c", script, str(policy_file)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as parent:
-        assert parent.stdout is not None
-        workers = [int(word) for word in parent.stdout.readline().split()]
-        assert workers
-        assert all(_alive(worker) for worker in workers)
-        parent.kill()
-    for _ in range(300):
-        if not any(_alive(worker) for worker in workers):
-            return
-        time.sleep(0.1)
-    pytest.fail(f"still alive: {[worker for worker in workers if _alive(worker)]}")
-
-
-def _alive(process: int) -> bool:
-    try:
-        state = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0]
-    except OSError:
-        return False
-    # Nobody may be left to collect its exit status.
-    return state != "Z"

@@ -37,7 +37,7 @@ def test_what_goes_wrong_there_is_heard_here() -> None:
     with pytest.raises(RobotError, match="unknown robot 'nobody'"):
         RemoteWorldBatch("nobody", {}, 1, 0)
     worlds = RemoteWorldBatch("ant", {}, 1, 0)
-    worlds.process.kill()
-    worlds.process.join()
-    with pytest.raises(TrainingError, match=r"ended \(exit code -9\).*goes on from its last checkpoint"):
+    worlds.worker.process.kill()
+    worlds.worker.process.join()
+    with pytest.raises(TrainingError, match=r"worlds of ant: .* SIGKILL.*goes on from its last checkpoint"):
         worlds.step(np.zeros((1, 8), np.float32))

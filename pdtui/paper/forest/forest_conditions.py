@@ -6,17 +6,16 @@ cannot sense. All conditions meet the same forests for the same time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pdtui.core.errors import PdtuiError, PolicyError, SessionError
+from pdtui.core.worker_pool import WorkerPool
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.headless import build_loop
-from pdtui.drive.loop_cache import cached_loop, drive_worker_pool
 from pdtui.paper.forest.forest_episode import (
     FOREST,
     ROUGH,
@@ -97,23 +96,24 @@ def evaluate_forest(
     total, done = len(learning) + len(configs) * len(seeds), 0
     responses: dict[str, KeyMotionModel] = {}
     runs: dict[ForestCondition, list[ForestEpisode]] = {}
-    with _pool(workers if total else 0) as run_all:
-        drives = []
-        for drive in run_all(
-            _try_keys, [(replace(config, start=ROUGH), seed, tried[1]) for seed in learning]
-        ):
-            drives.append(drive)
-            done = _tell(progress, done, total)
+
+    def tell(here: int, _: int) -> None:
+        if progress is not None:
+            progress(done + here, total)
+
+    with WorkerPool(f"forests of {name}", workers, _LoopCache(), _LoopCache) as pool:
+        drives = pool.map(
+            _try_keys, [(replace(config, start=ROUGH), seed, tried[1]) for seed in learning], tell
+        )
+        done += len(drives)
         if drives:
             responses = fit_key_motion_models(drives, keys, dt)
-        for condition, its_order in configs.items():
+        for condition, its_config in configs.items():
             with_it = responses if condition == "operator" else {}
             folder = record if with_it else None
-            jobs = [(its_order, seed, steps, with_it, folder) for seed in seeds]
-            runs[condition] = []
-            for run in run_all(_run_episode, jobs):
-                runs[condition].append(run)
-                done = _tell(progress, done, total)
+            jobs = [(its_config, seed, steps, with_it, folder) for seed in seeds]
+            runs[condition] = pool.map(_run_episode, jobs, tell)
+            done += len(jobs)
     measured = [
         summarise_condition(CONDITIONS[one], configs[one].policy or policy, runs[one], repeats)
         for one in runs
@@ -138,24 +138,32 @@ def evaluate_forest(
 _Episode = tuple[DriveConfig, int, int, dict[str, KeyMotionModel], Path | None]
 
 
-def _try_keys(job: tuple[DriveConfig, int, int]) -> ObservedDrive:
+class _LoopCache:
+    """The loop built last: building one takes longer than many episodes, and conditions run one by one."""
+
+    _built: tuple[DriveConfig, ControlLoop] | None = None
+
+    def loop(self, config: DriveConfig, seed: int) -> ControlLoop:
+        common = replace(config, start="")
+        if self._built is None or self._built[0] != common:
+            self._built = common, build_loop(common)
+        built = self._built[1]
+        return ControlLoop(built.robot, built.policy, built.map, seed, start=config.start)
+
+
+def _try_keys(loops: _LoopCache, job: tuple[DriveConfig, int, int]) -> ObservedDrive:
     config, seed, steps = job
-    return drive_with_random_keys(_loop(config, seed), steps)
+    return drive_with_random_keys(loops.loop(config, seed), steps)
 
 
-def _run_episode(job: _Episode) -> ForestEpisode:
+def _run_episode(loops: _LoopCache, job: _Episode) -> ForestEpisode:
     config, seed, steps, responses, folder = job
-    loop = _loop(config, seed)
+    loop = loops.loop(config, seed)
     operator = build_operator(loop, responses) if responses else None
     if operator is None or folder is None:
         return drive_forest_episode(loop, steps, operator)[0]
     path = folder / f"{file_stem(config.robot)}-forest-seed{seed}.rrd"
     return record_forest_episode(loop, steps, operator, path, config.activations)
-
-
-def _loop(config: DriveConfig, seed: int) -> ControlLoop:
-    built = cached_loop(replace(config, start=""))
-    return ControlLoop(built.robot, built.policy, built.map, seed, start=config.start)
 
 
 def _configs(
@@ -184,18 +192,3 @@ def _with_vision(config: DriveConfig) -> DriveConfig:
         raise PolicyError(f"'{name}' has no policy yet: {error}") from error
     nothing = StimulationMap(name, name, "", config.stimulation_map.default_key, {}, {})
     return DriveConfig(name, nothing, 0, name, start=FOREST, force=True)
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator[Callable[..., Any]]:
-    if not workers:
-        yield lambda _, jobs: iter(jobs)
-        return
-    with drive_worker_pool(workers) as pool:
-        yield pool.imap
-
-
-def _tell(progress: Callable[[int, int], None] | None, done: int, total: int) -> int:
-    if progress is not None:
-        progress(done + 1, total)
-    return done + 1

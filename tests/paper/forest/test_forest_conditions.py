@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 from dataclasses import asdict
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from pdtui.cli import main
-from pdtui.core.errors import MapError, PdtuiError, SessionError
+from pdtui.core.errors import MapError, PdtuiError, SessionError, WorkerError
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.headless import build_loop, drive_headless
@@ -31,6 +32,7 @@ from pdtui.policies.weights.weights_file import hash_file, save_network
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_reader import load_map
+from tests.deadline import deadline
 
 pytest.importorskip("pybullet", reason="PyBullet is not installed (it has no wheels for this Python)")
 
@@ -171,6 +173,16 @@ def test_conditions_and_a_person_stand_in_one_table(
     ]
     assert list(result.keys) == list(RESPONSES)
     assert json.loads(json.dumps(result.as_dict()))["seeds"] == [1, 2]
+
+
+def test_a_killed_worker_ends_the_experiment(config: DriveConfig) -> None:
+    def kill_one(_done: int, _total: int) -> None:
+        multiprocessing.active_children()[0].kill()
+
+    with deadline(120), pytest.raises(WorkerError, match="forests of a1: .*killed by SIGKILL"):
+        evaluate_forest(
+            config, range(1, 7), repeats=2, steps=40, conditions=["alone"], workers=2, progress=kill_one
+        )
 
 
 def test_what_cannot_be_measured_is_named(config: DriveConfig) -> None:
