@@ -13,10 +13,10 @@ from pdtui.dissection import dissect as dissection
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_settings import QUICK_DISSECTION, DissectionSettings
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless import build_loop
 from pdtui.drive.keystrokes import read_keystrokes
+from pdtui.drive.loop_builder import build_loop
 from pdtui.drive.replay import ReplayResult, replay_session
-from pdtui.drive.trajectory import Trajectory, drive_trajectory
+from pdtui.drive.trajectory import Trajectory, collect_trajectory
 from pdtui.policies.runtime.action_decoders import Decoder
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
@@ -218,7 +218,7 @@ def drive(
     if record is not None and Path(record).exists():
         raise SessionError(f"{record}: exists already; a drive is recorded into a new file")
     recorder = SessionRecorder(Path(record), loop.info) if record is not None else None
-    return drive_trajectory(loop, presses, steps, recorder)
+    return collect_trajectory(loop, presses, steps, recorder)
 
 
 def replay(

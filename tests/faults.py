@@ -19,7 +19,8 @@ from pdtui.core.errors import PdtuiError
 from pdtui.drive.client import DriveClient
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.drive_snapshot import DriveSnapshot
-from pdtui.drive.headless import build_loop, key_events
+from pdtui.drive.headless_drive import key_events
+from pdtui.drive.loop_builder import build_loop
 from pdtui.drive.replay import replay_session
 from pdtui.drive.server import PACED_ROWS_PER_WRITE
 from pdtui.sessions.session_repair import examine_session, repair_session
@@ -125,7 +126,7 @@ class _Drive:
     def __init__(self, path: Path, map_path: Path, number: signal.Signals, drawn: random.Random) -> None:
         self.path, self._number, self._drawn = path, number, drawn
         config = DriveConfig("ant", load_map(map_path), drawn.randrange(1000), recording=str(path))
-        self._link = DriveClient(config)
+        self._client = DriveClient(config)
         self._moment: float | None = None
         self._lasts = drawn.uniform(0.0, 2.5)
         self._killed = False
@@ -133,10 +134,10 @@ class _Drive:
 
     def serve(self) -> None:
         try:
-            message = self._link.poll()
+            message = self._client.poll_message()
         except PdtuiError:
             self.over = True
-            self._link.close()
+            self._client.close()
             return
         if self._killed or not isinstance(message, DriveSnapshot):
             return
@@ -145,11 +146,11 @@ class _Drive:
         if self._moment is None and self.driven:
             self._moment = now + self._lasts
             for _ in range(self._drawn.randrange(3)):
-                self._link.pace("faster")
+                self._client.change_pace("faster")
         elif self._drawn.random() < 0.1:
-            self._link.press(self._drawn.choice(KEYS))
+            self._client.press_key(self._drawn.choice(KEYS))
         if self._moment is not None and now >= self._moment:
-            os.kill(self._link.pid, self._number)
+            os.kill(self._client.pid, self._number)
             self._killed = True
 
 

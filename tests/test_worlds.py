@@ -16,7 +16,7 @@ from pdtui.cli import main
 from pdtui.core.events import Event
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.drive_snapshot import DriveFacts
-from pdtui.drive.headless import build_loop
+from pdtui.drive.loop_builder import build_loop
 from pdtui.drive.snapshot_builder import SnapshotBuilder
 from pdtui.policies.weights.policy_network import Head, NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import hash_file, save_network
@@ -24,7 +24,7 @@ from pdtui.robots import make_robot
 from pdtui.sessions.session_reader import read_session
 from pdtui.stimulation.map_reader import load_map
 from pdtui.tui.drive_app import DriveApp
-from tests.tui.conftest import Message, ScriptedLink
+from tests.tui.conftest import Message, ScriptedConnection
 from tests.tui.screens import played, shown
 
 MAP = """\
@@ -105,12 +105,14 @@ async def test_the_screen_shows_it(robot: str, size: tuple[int, int], tmp_path: 
         DriveFacts(robot, "small", 3, loop.robot.control_dt, loop.robot.attributes, loop.robot.links, (8, 8))
     ]
     for step in range(40):
-        observer.see(loop.advance([Event(39, "behavior", "push", key="w")] if step == 39 else []))
+        observer.add_step(loop.advance([Event(39, "behavior", "push", key="w")] if step == 39 else []))
         if step % 4 == 3:
             messages.append(
-                observer.snapshot(paused=False, speed=1.0, achieved=1.0, recorded_bytes=0, finished="")
+                observer.build_snapshot(
+                    paused=False, speed=1.0, achieved_speed=1.0, recorded_bytes=0, finished=""
+                )
             )
-    link = ScriptedLink(messages)
+    link = ScriptedConnection(messages)
     app = DriveApp(link, stimulation_map, fps=200)
     async with app.run_test(size=size) as pilot:
         await played(pilot, link)

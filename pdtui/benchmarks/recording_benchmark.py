@@ -14,7 +14,7 @@ from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless import build_loop
+from pdtui.drive.loop_builder import build_loop
 from pdtui.drive.replay import replay_session
 from pdtui.drive.server import PACED_ROWS_PER_WRITE
 from pdtui.sessions.drive_info import DriveInfo

@@ -118,12 +118,12 @@ def drive(
 @judging_options
 def replay(session: Path, watch: bool, policy: str, judging: dict[str, Any]) -> None:
     """Run SESSION again and compare every step; exit with 1 if it does not repeat."""
-    from pdtui.drive.replay import config_of, replay_session
+    from pdtui.drive.replay import replay_config, replay_session
 
     if watch:
         from pdtui.sessions.session_reader import read_session
 
-        _show(config_of(read_session(session), str(session), policy), fps=12, watching=True)
+        _show(replay_config(read_session(session), str(session), policy), fps=12, watching=True)
         return
     with progress_bar_or_none("replaying") as advance:
         result = replay_session(session, policy=policy, progress=advance, **judging)
@@ -145,9 +145,10 @@ def _new_session(config: DriveConfig) -> Path:
 
 
 def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, record: Path | None) -> None:
-    from pdtui.drive.ending_signals import ending_signals
-    from pdtui.drive.headless import build_loop, drive_headless
+    from pdtui.drive.ending_signals import catch_ending_signals
+    from pdtui.drive.headless_drive import drive_headless
     from pdtui.drive.keystrokes import read_keystrokes
+    from pdtui.drive.loop_builder import build_loop
     from pdtui.sessions.writer.session_recorder import SessionRecorder
 
     presses = read_keystrokes(keys, config.stimulation_map) if keys is not None else {}
@@ -157,7 +158,7 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, record: 
         click.echo(viewer.absence, err=True)
         viewer = None
     recorder = SessionRecorder(record, info, viewer=viewer) if record is not None else None
-    with ending_signals() as ended:
+    with catch_ending_signals() as ended:
         summary = drive_headless(loop, presses, steps, recorder, ended)
     click.echo(
         f"{summary.steps} steps, {summary.seconds:g} s simulated; falls {summary.falls}, "
@@ -180,15 +181,15 @@ def _show(config: DriveConfig, *, fps: int, watching: bool = False) -> None:
     _check_terminal()
     from pdtui.drive.client import DriveClient
 
-    link = DriveClient(config)
+    connection = DriveClient(config)
     try:
         from pdtui.tui.drive_app import DriveApp
 
-        app = DriveApp(link, config.stimulation_map, fps=fps, watching=watching)
+        app = DriveApp(connection, config.stimulation_map, fps=fps, watching=watching)
         message = app.run()
     finally:
-        last_words = link.close()
-    if app.return_code or link.failed:
+        last_words = connection.close()
+    if app.return_code or connection.failed:
         said = message or last_words
         raise ScreenError(said if config.recording in said else f"{said}; {last_words}")
     click.echo(make_printable(last_words))
@@ -197,9 +198,9 @@ def _show(config: DriveConfig, *, fps: int, watching: bool = False) -> None:
 def pick_and_drive() -> None:
     _check_terminal()
     from pdtui.stimulation.map_library import list_maps
-    from pdtui.tui.map_picker import PickerApp, picker_rows
+    from pdtui.tui.map_picker import MapPickerApp, map_picker_rows
 
-    chosen = PickerApp(picker_rows(list_maps())).run()
+    chosen = MapPickerApp(map_picker_rows(list_maps())).run()
     if chosen is not None:
         config = drive_config(str(chosen), None, "")
         _drive_on_screen(config, _new_session(config), 12)

@@ -185,13 +185,13 @@ def export(file: Path, stream: str | None, output: Path | None, keys: Path | Non
 
 
 def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
-    from pdtui.drive.keystrokes import write_keystrokes
+    from pdtui.drive.keystrokes import format_keystrokes
     from pdtui.sessions.session_header import read_session_header
 
     if output.exists() and not overwrite:
         raise SessionError(f"{output}: exists already; --overwrite replaces it")
     heading = read_session_header(file)
-    write_file(output, write_keystrokes(heading.events), SessionError)
+    write_file(output, format_keystrokes(heading.events), SessionError)
     without = len(heading.events) - heading.keys
     note = f"; {without} events had no key and are not in it" if without else ""
     click.echo(make_printable(f"wrote {output}: {heading.keys} keys of {heading.steps} steps{note}"))

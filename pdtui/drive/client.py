@@ -6,18 +6,40 @@ import multiprocessing
 import os
 import time
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from pdtui.core.errors import PdtuiError
 from pdtui.core.worker_pool import describe_exit
-from pdtui.drive.drive_protocol import PaceRequest
 from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.drive.pacer import PaceRequest
 
 if TYPE_CHECKING:
     from pdtui.drive.drive_config import DriveConfig
 
 _PATIENCE = 60.0
 """For the end of the recording, on a busy machine: a process that is killed leaves it without one; s."""
+
+
+class DriveConnection(Protocol):
+    """The screen's end of the pipe to a drive."""
+
+    def poll_message(self) -> DriveFacts | DriveSnapshot | None:
+        """The newest message that has arrived, or None. A `DriveFacts` comes first, and alone.
+
+        Several waiting snapshots are merged into the newest, histories and paths joined.
+
+        Raises:
+            PdtuiError: what ended the simulation's process.
+        """
+
+    def press_key(self, key: str) -> None:
+        """Send a key that changes the run; it applies before the next control step."""
+
+    def change_pace(self, request: PaceRequest) -> None:
+        """Change the pacing: no part of the run, so not recorded."""
+
+    def close(self) -> str:
+        """End the drive, wait for the recording to be whole, and return one line on how it ended."""
 
 
 def _simulate(connection: Connection, config: DriveConfig) -> None:
@@ -28,7 +50,7 @@ def _simulate(connection: Connection, config: DriveConfig) -> None:
     serve_drive(connection, config)
 
 
-class DriveClient:
+class DriveClient(DriveConnection):
     """Starts the simulation's process; start it before the screen takes the terminal.
 
     Args:
@@ -52,8 +74,7 @@ class DriveClient:
         """Of the simulation's process."""
         return self._process.pid or 0
 
-    def poll(self) -> DriveFacts | DriveSnapshot | None:
-        """The newest message that has arrived, or None; see `DriveLink.poll`."""
+    def poll_message(self) -> DriveFacts | DriveSnapshot | None:
         message = self._receive()
         if isinstance(message, DriveFacts) or (message is None and not self._asked):
             self._send("frame", None)
@@ -67,16 +88,13 @@ class DriveClient:
             raise PdtuiError(message)
         return message
 
-    def press(self, key: str) -> None:
-        """Send a key that changes the run."""
+    def press_key(self, key: str) -> None:
         self._send("press", key)
 
-    def pace(self, request: PaceRequest) -> None:
-        """Change the pacing."""
+    def change_pace(self, request: PaceRequest) -> None:
         self._send("pace", request)
 
     def close(self) -> str:
-        """End the drive, wait until the recording is whole, and say how it ended."""
         self._send("close", None)
         deadline = time.monotonic() + _PATIENCE
         while not self._last_words and time.monotonic() < deadline:

@@ -24,12 +24,12 @@ from pdtui.sessions.drive_info import DriveInfo
 from pdtui.stimulation.latch import Latch
 from pdtui.stimulation.stimulation_map import StimulationMap
 
-SNAPSHOT_EVERY = 10
-SNAPSHOTS_KEPT = 240
+STEPS_PER_KEPT_STATE = 10
+MAX_KEPT_STATES = 240
 
 
 @dataclass(frozen=True)
-class _Moment:
+class _KeptState:
     robot: RobotState
     policy: PolicyState
     latch: list[Any]
@@ -72,7 +72,7 @@ class ControlLoop:
         self.latch = Latch(stimulation_map, policy.layers, robot.attributes, robot.control_dt)
         self._noise = np.random.default_rng(seed) if stochastic else None
         self._ended = False
-        self._moments: OrderedDict[int, _Moment] = OrderedDict()
+        self._kept: OrderedDict[int, _KeptState] = OrderedDict()
         self._observation, _ = robot.reset(seed=seed, options=self._options)
         policy.reset()
         self.attributes: Floats = robot.read_attributes()
@@ -100,9 +100,9 @@ class ControlLoop:
         return {"start": self.start} if self.start else None
 
     @property
-    def rewindable(self) -> tuple[int, ...]:
+    def kept_steps(self) -> tuple[int, ...]:
         """Steps to which a rewind can go, oldest first."""
-        return tuple(self._moments)
+        return tuple(self._kept)
 
     def advance(self, events: Sequence[Event] = ()) -> StepRecord:
         """Apply the events, then run one control step.
@@ -115,8 +115,8 @@ class ControlLoop:
         """
         if self._ended:
             self._start_episode()
-        if self.step % SNAPSHOT_EVERY == 0:
-            self._remember()
+        if self.step % STEPS_PER_KEPT_STATE == 0:
+            self._keep_state()
         for event in events:
             if event.step != self.step:
                 raise KeystrokeError(f"event for step {event.step} given to step {self.step}")
@@ -156,7 +156,7 @@ class ControlLoop:
             self.robot.obstacles,
         )
         self.step += 1
-        self.latch.tick()
+        self.latch.end_step()
         self._ended = bool(ended)
         return record
 
@@ -164,7 +164,7 @@ class ControlLoop:
         """Do what the event says; in a rehearsal, only to the latch."""
         match event.kind:
             case "behavior":
-                self.latch.press(event.name, self.attributes)
+                self.latch.latch_behavior(event.name, self.attributes)
             case "default":
                 self.latch.clear()
             case "target":
@@ -176,7 +176,7 @@ class ControlLoop:
             case "reset":
                 self._start_episode()
             case "rewind" if rehearsing:
-                self.latch.load(self._moments[int(event.value)].latch)
+                self.latch.restore_state(self._kept[int(event.value)].latch)
             case "rewind":
                 self._rewind(event.value)
             case _:
@@ -188,14 +188,14 @@ class ControlLoop:
 
         So one can see what a key means after those that were pressed before the same step.
         """
-        kept = self.latch.save()
+        kept = self.latch.copy_state()
 
         if self._ended:
             self.latch.clear()  # the next step begins an episode
         try:
             yield partial(self._apply, rehearsing=True)
         finally:
-            self.latch.load(kept)
+            self.latch.restore_state(kept)
 
     def _start_episode(self) -> None:
         self._observation, _ = self.robot.reset(options=self._options)
@@ -205,28 +205,28 @@ class ControlLoop:
         self.episode += 1
         self._ended = False
 
-    def _remember(self) -> None:
+    def _keep_state(self) -> None:
         noise = self._noise.bit_generator.state if self._noise is not None else {}
-        self._moments[self.step] = _Moment(
-            self.robot.snapshot(), self.policy.snapshot(), self.latch.save(), noise, self.episode
+        self._kept[self.step] = _KeptState(
+            self.robot.snapshot(), self.policy.snapshot(), self.latch.copy_state(), noise, self.episode
         )
-        while len(self._moments) > SNAPSHOTS_KEPT:
-            self._moments.popitem(last=False)
+        while len(self._kept) > MAX_KEPT_STATES:
+            self._kept.popitem(last=False)
 
     def _rewind(self, value: float) -> None:
         step = int(value) if math.isfinite(value) else -1
-        if step not in self._moments:
-            known = f"{self.rewindable[0]}..{self.rewindable[-1]}" if self._moments else "none yet"
+        if step not in self._kept:
+            known = f"{self.kept_steps[0]}..{self.kept_steps[-1]}" if self._kept else "none yet"
             raise KeystrokeError(
-                f"cannot rewind to step {step}; kept is every {SNAPSHOT_EVERY}th step of {known}"
+                f"cannot rewind to step {step}; kept is every {STEPS_PER_KEPT_STATE}th step of {known}"
             )
-        moment = self._moments[step]
-        self.robot.restore(moment.robot)
-        self.policy.restore(moment.policy)
-        self.latch.load(moment.latch)
+        state = self._kept[step]
+        self.robot.restore(state.robot)
+        self.policy.restore(state.policy)
+        self.latch.restore_state(state.latch)
         if self._noise is not None:
-            self._noise.bit_generator.state = moment.noise
-        self.episode = moment.episode
+            self._noise.bit_generator.state = state.noise
+        self.episode = state.episode
         self._observation = self.robot.observe()
         self.attributes = self.robot.read_attributes()
         self._ended = False

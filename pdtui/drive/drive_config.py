@@ -25,8 +25,8 @@ class DriveConfig:
         recording: file to record into, empty for none.
         activations: how they are recorded.
         viewer: where a Rerun viewer listens that is to show a recorded drive; None for none.
-        script: events by step that are played instead of keys, where a session is watched.
-        digests: what the watched session left, to compare with.
+        scripted_events: events by step that are played instead of keys, where a session is watched.
+        expected_digests: what the watched session left, to compare with.
     """
 
     robot: str
@@ -39,5 +39,5 @@ class DriveConfig:
     recording: str = ""
     activations: ActivationsKept = "all"
     viewer: ViewerAddress | None = None
-    script: tuple[Event, ...] | None = None
-    digests: tuple[int, ...] = ()
+    scripted_events: tuple[Event, ...] | None = None
+    expected_digests: tuple[int, ...] = ()

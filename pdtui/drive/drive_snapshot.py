@@ -68,12 +68,12 @@ class DriveSnapshot:
         restarted: whether an episode began, or a rewind happened, since the last snapshot: the old path ends.
         paused: whether the pacer waits.
         speed: speed factor that was asked for.
-        achieved: speed factor that was reached lately.
+        achieved_speed: speed factor that was reached lately.
         involvement: control steps in which a key was pressed.
         recorded_bytes: size of the recording.
         notice: what the user should read now (a fall, a rewind, a key that does nothing), empty if nothing.
         finished: why the drive is over, empty while it goes on.
-        tally: how the present episode stands.
+        statistics: how the present episode stands.
         obstacles: as `Robot.obstacles`, where they are others than in the snapshot before; else None.
     """
 
@@ -90,10 +90,10 @@ class DriveSnapshot:
     restarted: bool = False
     paused: bool = False
     speed: float = 1.0
-    achieved: float = 1.0
+    achieved_speed: float = 1.0
     involvement: int = 0
     recorded_bytes: int = 0
     notice: str = ""
     finished: str = ""
-    tally: EpisodeStatistics = NO_STATISTICS
+    statistics: EpisodeStatistics = NO_STATISTICS
     obstacles: Floats | None = None

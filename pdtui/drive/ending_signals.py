@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
-def ending_signals() -> Iterator[Callable[[], str]]:
+def catch_ending_signals() -> Iterator[Callable[[], str]]:
     """Yield a function that tells which signal came, in words; empty while none did.
 
     Left to their default, SIGTERM and SIGHUP would leave a recording without its end. What was set before
@@ -22,7 +22,7 @@ def ending_signals() -> Iterator[Callable[[], str]]:
     def note(number: int, _frame: FrameType | None) -> None:
         came.append(f"ended by {signal.Signals(number).name}")
 
-    before = {number: signal.signal(number, note) for number in ENDING}
+    before = {number: signal.signal(number, note) for number in ENDING_SIGNALS}
     try:
         yield lambda: came[0] if came else ""
     finally:

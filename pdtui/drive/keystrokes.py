@@ -26,7 +26,7 @@ def run_keys(stimulation_map: StimulationMap) -> tuple[str, ...]:
     return stimulation_map.default_key, *behaviors, *RUN_KEYS
 
 
-def key_event(key: str, loop: ControlLoop) -> Event | str:
+def interpret_key(key: str, loop: ControlLoop) -> Event | str:
     """Return the event that a key means in the loop's present state, or a sentence why it means nothing."""
     if key == loop.map.default_key:
         return Event(loop.step, "default", key=key)
@@ -48,12 +48,12 @@ def key_event(key: str, loop: ControlLoop) -> Event | str:
             return Event(loop.step, kind, key=key)
 
 
-def key_meanings(keys: Iterable[str], loop: ControlLoop) -> list[Event | str]:
-    """What keys mean that are pressed before the same step, each after those before it; see `key_event`."""
+def interpret_keys(keys: Iterable[str], loop: ControlLoop) -> list[Event | str]:
+    """Return what each key means that is pressed before the same step, given those pressed before it."""
     meanings: list[Event | str] = []
     with loop.rehearsal() as rehearse:
         for key in keys:
-            meanings.append(meaning := key_event(key, loop))
+            meanings.append(meaning := interpret_key(key, loop))
             if isinstance(meaning, Event):
                 rehearse(meaning)
     return meanings
@@ -68,7 +68,7 @@ def _factor_event(row: FixedKey, loop: ControlLoop) -> Event | str:
 
 def _rewind_event(row: FixedKey, loop: ControlLoop) -> Event | str:
     wanted = loop.step - round(REWIND_SECONDS / loop.robot.control_dt)
-    earlier = [kept for kept in loop.rewindable if kept <= wanted]
+    earlier = [kept for kept in loop.kept_steps if kept <= wanted]
     if not earlier:
         return "nothing to rewind to yet"
     return Event(loop.step, "rewind", value=float(earlier[-1]), key=row.key)
@@ -133,7 +133,7 @@ def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, li
     return presses
 
 
-def write_keystrokes(events: Iterable[Event]) -> str:
+def format_keystrokes(events: Iterable[Event]) -> str:
     """The key presses among events as the text of a keystroke file.
 
     Raises:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import get_args
+from typing import Literal, get_args
 
-from pdtui.drive.drive_protocol import PaceRequest
-
+PaceRequest = Literal["pause", "step", "slower", "faster"]
 SLOWEST, FASTEST = 1 / 16, 16.0
 _LAG_FORGIVEN = 0.25
 
@@ -25,7 +24,7 @@ class Pacer:
         self._single = 0
         self._marks: list[float] = []
 
-    def request(self, pace: PaceRequest, now: float) -> None:
+    def change_pace(self, pace: PaceRequest, now: float) -> None:
         """Change the pace. A single step pauses first.
 
         Raises:
@@ -46,13 +45,13 @@ class Pacer:
         self._due = now
         self._marks = []
 
-    def wait(self, now: float) -> float | None:
+    def seconds_until_due(self, now: float) -> float | None:
         """Seconds until the next step, 0 if it is due; None while paused."""
         if self._single:
             return 0.0
         return None if self.paused else max(0.0, self._due - now)
 
-    def stepped(self, now: float) -> None:
+    def note_step(self, now: float) -> None:
         """A control step was done."""
         if self._single:
             self._single -= 1
@@ -63,7 +62,7 @@ class Pacer:
         self._marks = [*self._marks[-40:], now]
 
     @property
-    def achieved(self) -> float:
+    def achieved_speed(self) -> float:
         """Speed factor of the last steps."""
         if self.paused or len(self._marks) < 2 or self._marks[-1] <= self._marks[0]:
             return 0.0 if self.paused else self.speed

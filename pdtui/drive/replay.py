@@ -13,7 +13,7 @@ from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.events import group_events_by_step
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless import build_loop
+from pdtui.drive.loop_builder import build_loop
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot
 from pdtui.sessions.environment_versions import (
@@ -104,7 +104,7 @@ class ReplayResult:
         return f"differs: {where}: {self.detail}; only the first {kept}, expected were {self.judged}"
 
 
-def config_of(session: Session, source: str, policy: str = "") -> DriveConfig:
+def replay_config(session: Session, source: str, policy: str = "") -> DriveConfig:
     """The drive that repeats a session.
 
     Raises:
@@ -123,8 +123,8 @@ def config_of(session: Session, source: str, policy: str = "") -> DriveConfig:
         policy=policy,
         stochastic=info.stochastic,
         start=info.start,
-        script=session.events,
-        digests=tuple(int(digest) for digest in session.digests),
+        scripted_events=session.events,
+        expected_digests=tuple(int(digest) for digest in session.digests),
     )
 
 
@@ -161,7 +161,7 @@ def replay_session(
     """
     session = read_session(path)
     given = policy if isinstance(policy, Policy) else None
-    config = config_of(session, str(path), policy if isinstance(policy, str) else "given")
+    config = replay_config(session, str(path), policy if isinstance(policy, str) else "given")
     loop = build_loop(replace(config, force=force), robot, given)
     if loop.robot.attributes != session.info.attributes:
         raise SessionError(f"{path}: the robot measures other attributes now; nothing can be compared")

@@ -17,8 +17,8 @@ from pdtui.core.step_record import StepRecord
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.drive_snapshot import DriveFacts
-from pdtui.drive.headless import build_loop
-from pdtui.drive.keystrokes import key_meanings
+from pdtui.drive.keystrokes import interpret_keys
+from pdtui.drive.loop_builder import build_loop
 from pdtui.drive.pacer import Pacer
 from pdtui.drive.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.writer.session_recorder import SessionRecorder
@@ -34,23 +34,23 @@ class DriveServer:
     """
 
     def __init__(self, connection: Connection, config: DriveConfig) -> None:
-        self._connection, self._order = connection, config
+        self._connection, self._config = connection, config
         self._loop: ControlLoop = build_loop(config)
-        self._observer = SnapshotBuilder(self._loop)
+        self._builder = SnapshotBuilder(self._loop)
         self._recorder: SessionRecorder | None = None
         if config.recording:
             path, viewer = Path(config.recording), config.viewer
             if viewer is not None and not viewer.listens:
-                self._observer.notice, viewer = viewer.absence, None
+                self._builder.notice, viewer = viewer.absence, None
             info = replace(self._loop.info, activations=config.activations)
             self._recorder = SessionRecorder(path, info, rows_per_write=PACED_ROWS_PER_WRITE, viewer=viewer)
         self._pacer = Pacer(self._loop.robot.control_dt, time.monotonic())
-        self._pressed: list[str] = []
-        self._wanted = False
+        self._pressed_keys: list[str] = []
+        self._snapshot_requested = False
         self._closing = ""
         self._finished = ""
         self.failed = False
-        self._script = group_events_by_step(config.script or ())
+        self._scripted_events = group_events_by_step(config.scripted_events or ())
 
     def facts(self) -> None:
         """Tell the screen what there is to see."""
@@ -64,7 +64,7 @@ class DriveServer:
                 attributes=loop.robot.attributes,
                 links=loop.robot.links,
                 layers=loop.policy.layers,
-                recording=self._order.recording,
+                recording=self._config.recording,
             )
         )
 
@@ -73,7 +73,7 @@ class DriveServer:
         try:
             while not self._closing:
                 self._serve()
-                if self._wanted:
+                if self._snapshot_requested:
                     self._send_snapshot()
         except Exception as error:
             if not isinstance(error, PdtuiError):
@@ -89,12 +89,12 @@ class DriveServer:
     def outcome(self) -> str:
         """How the drive ended, in one line."""
         line = f"{self._finished or self._closing}: {self._loop.step} steps"
-        place = self._order.recording
+        place = self._config.recording
         return f"{line}, recorded in {place}" if place and place not in line else line
 
     def _serve(self) -> None:
         """Wait for the next step or a request, whichever is first."""
-        wait = None if self._finished else self._pacer.wait(time.monotonic())
+        wait = None if self._finished else self._pacer.seconds_until_due(time.monotonic())
         try:
             while self._connection.poll(_IDLE if wait is None else wait):
                 self._handle(*self._connection.recv())
@@ -103,18 +103,18 @@ class DriveServer:
             self._closing = self._closing or "the screen went away"
         if self._closing or self._finished:
             return
-        due = self._pacer.wait(time.monotonic())
+        due = self._pacer.seconds_until_due(time.monotonic())
         if due is not None and due <= 0.0:
             self._advance()
 
     def _handle(self, kind: str, value: Any) -> None:
         match kind:
             case "press":
-                self._pressed.append(value)
+                self._pressed_keys.append(value)
             case "pace":
-                self._pacer.request(value, time.monotonic())
+                self._pacer.change_pace(value, time.monotonic())
             case "frame":
-                self._wanted = True
+                self._snapshot_requested = True
             case "close":
                 self._closing = self._closing or "stopped"
 
@@ -122,12 +122,12 @@ class DriveServer:
         record = self._loop.advance(self._events())
         if self._recorder is not None:
             self._record(self._recorder, record)
-        self._observer.see(record)
-        self._pacer.stepped(time.monotonic())
+        self._builder.add_step(record)
+        self._pacer.note_step(time.monotonic())
         if record.diverged:
             self._finished, self.failed = record.ended, True
             self._close_recording()
-        if self._order.script is not None:
+        if self._config.scripted_events is not None:
             self._compare(record.step, record.digest)
 
     def _record(self, recorder: SessionRecorder, record: StepRecord) -> None:
@@ -140,32 +140,32 @@ class DriveServer:
                 recorder.close(str(error))
 
     def _events(self) -> list[Event]:
-        if self._order.script is not None:
-            return self._script.get(self._loop.step, [])
+        if self._config.scripted_events is not None:
+            return self._scripted_events.get(self._loop.step, [])
         events = []
-        for meaning in key_meanings(self._pressed, self._loop):
+        for meaning in interpret_keys(self._pressed_keys, self._loop):
             if isinstance(meaning, Event):
                 events.append(meaning)
             else:
-                self._observer.notice = meaning
-        self._pressed = []
+                self._builder.notice = meaning
+        self._pressed_keys = []
         return events
 
     def _compare(self, step: int, digest: int) -> None:
-        if digest != self._order.digests[step]:
+        if digest != self._config.expected_digests[step]:
             self._finished, self.failed = f"step {step} differs from the session", True
-        elif step + 1 == len(self._order.digests):
+        elif step + 1 == len(self._config.expected_digests):
             self._finished = f"identical, {step + 1} steps"
 
     def _send_snapshot(self) -> None:
-        snapshot = self._observer.snapshot(
+        snapshot = self._builder.build_snapshot(
             paused=self._pacer.paused,
             speed=self._pacer.speed,
-            achieved=self._pacer.achieved,
+            achieved_speed=self._pacer.achieved_speed,
             recorded_bytes=0 if self._recorder is None else self._recorder.bytes,
             finished=self._finished,
         )
-        self._wanted = False
+        self._snapshot_requested = False
         try:
             self._connection.send(snapshot)
         except OSError:

@@ -30,12 +30,12 @@ class SnapshotBuilder:
         self._restarted = False
         self._episode = 0
         self._involvement = 0
-        self._tallies = EpisodeStatisticsCounter(loop.info)
+        self._statistics = EpisodeStatisticsCounter(loop.info)
         self._obstacles: Floats = NO_OBSTACLES
         self._last: StepRecord | None = None
         self.notice = ""
 
-    def see(self, record: StepRecord) -> None:
+    def add_step(self, record: StepRecord) -> None:
         """Take in one control step."""
         began = record.episode != self._episode or any(event.jumps for event in record.events)
         if began:
@@ -48,7 +48,7 @@ class SnapshotBuilder:
         del self._history[:-_ROWS_KEPT], self._path[:-_ROWS_KEPT]
         keyed = any(event.key for event in record.events)
         self._involvement += keyed
-        self._tallies.add(record.episode, keyed=keyed, cost=record.cost, attributes=record.attributes)
+        self._statistics.add(record.episode, keyed=keyed, cost=record.cost, attributes=record.attributes)
         for event in record.events:
             if event.jumps:
                 self.notice = describe_event(event)
@@ -56,8 +56,8 @@ class SnapshotBuilder:
             self.notice = record.ended
         self._last = record
 
-    def snapshot(
-        self, *, paused: bool, speed: float, achieved: float, recorded_bytes: int, finished: str
+    def build_snapshot(
+        self, *, paused: bool, speed: float, achieved_speed: float, recorded_bytes: int, finished: str
     ) -> DriveSnapshot:
         """What has come since the last call, and the latest of the rest."""
         loop, last = self._loop, self._last
@@ -83,12 +83,12 @@ class SnapshotBuilder:
             restarted=self._restarted,
             paused=paused,
             speed=speed,
-            achieved=achieved,
+            achieved_speed=achieved_speed,
             involvement=self._involvement,
             recorded_bytes=recorded_bytes,
             notice=self.notice,
             finished=finished,
-            tally=self._tallies.of(loop.episode),
+            statistics=self._statistics.of(loop.episode),
             obstacles=self._obstacles if others else None,
         )
         self._history, self._path, self._restarted, self.notice = [], [], False, ""

@@ -15,7 +15,7 @@ from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.headless import drive_keys
+from pdtui.drive.headless_drive import drive_keys
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
@@ -75,7 +75,7 @@ class Trajectory:
         return self.activations[:, parse_unit(address, self.info.layers)]
 
 
-def drive_trajectory(
+def collect_trajectory(
     loop: ControlLoop,
     keys: Mapping[int, str | Sequence[str]],
     steps: int,

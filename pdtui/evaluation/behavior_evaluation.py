@@ -19,7 +19,7 @@ from pdtui.core.intervals import confidence_interval
 from pdtui.core.worker_pool import WorkerPool
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless import build_loop
+from pdtui.drive.loop_builder import build_loop
 from pdtui.evaluation.task_evaluation import TaskEvaluation, TaskRun, run_task, summarise_task
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
 

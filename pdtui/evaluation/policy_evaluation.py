@@ -9,7 +9,7 @@ import numpy as np
 
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless import build_loop
+from pdtui.drive.loop_builder import build_loop
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pdtui.core.events import Event
 from pdtui.core.intervals import confidence_interval
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless import build_loop
+from pdtui.drive.loop_builder import build_loop
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 SETTLED = 100

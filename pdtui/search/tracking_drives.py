@@ -14,7 +14,7 @@ from pdtui.core.events import Event
 from pdtui.core.worker_pool import WorkerPool
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless import build_loop
+from pdtui.drive.loop_builder import build_loop
 from pdtui.search.step_response import StepResponse, measure_step_response
 from pdtui.stimulation.stimulation_map import PidGains
 

@@ -85,7 +85,7 @@ class Latch:
             )
         return tuple(views)
 
-    def press(self, name: str, attributes: Floats) -> None:
+    def latch_behavior(self, name: str, attributes: Floats) -> None:
         """Latch a behavior; those that may not run beside it end. A latched one starts over.
 
         In mode ``pid`` the target starts at the present value; pressing the key again turns it off.
@@ -158,19 +158,19 @@ class Latch:
                 values[unit] = latched.base.get(unit, 0.0) + weight * factor
         return Stimulation.of(values)
 
-    def tick(self) -> None:
+    def end_step(self) -> None:
         """A control step has passed: periods run down, and what is over ends."""
         for latched in self._latched:
             if latched.remaining is not None:
                 latched.remaining -= 1
         self._latched = [latched for latched in self._latched if latched.remaining != 0]
 
-    def save(self) -> list[_Latched]:
-        """A copy of the state, for `load`."""
+    def copy_state(self) -> list[_Latched]:
+        """A copy of the state, for `restore_state`."""
         return [latched.copy() for latched in self._latched]
 
-    def load(self, state: list[_Latched]) -> None:
-        """Return to a state that `save` gave."""
+    def restore_state(self, state: list[_Latched]) -> None:
+        """Return to a state that `copy_state` gave."""
         self._latched = [latched.copy() for latched in state]
 
     def _behavior(self, name: str) -> Behavior:

@@ -38,7 +38,7 @@ class BrailleCanvas:
         self.inks = np.zeros((rows, columns), np.int16)
         self._characters: list[tuple[int, int, str, int]] = []
 
-    def points(self, x: NDArray[Any], y: NDArray[Any], ink: int | NDArray[np.int16]) -> None:
+    def draw_points(self, x: NDArray[Any], y: NDArray[Any], ink: int | NDArray[np.int16]) -> None:
         """Set the dots that points (n,) fall on."""
         column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
         inside = (column >= 0) & (column < self.width) & (row >= 0) & (row < self.height)
@@ -46,7 +46,7 @@ class BrailleCanvas:
         self.dots[row, column] = True
         self.inks[row // DOTS_Y, column // DOTS_X] = ink if isinstance(ink, int) else ink[inside]
 
-    def segments(self, starts: Floats, ends: Floats, ink: int | NDArray[np.int16]) -> None:
+    def draw_segments(self, starts: Floats, ends: Floats, ink: int | NDArray[np.int16]) -> None:
         """Draw lines between points, shapes (n, 2); one ink for all, or one for each, shape (n,)."""
         kept = _near(starts, ends, self.width, self.height)
         starts, ends = starts[kept], ends[kept]
@@ -55,9 +55,9 @@ class BrailleCanvas:
         first = np.cumsum(steps) - steps
         place = (np.arange(len(which)) - first[which]) / np.maximum(steps[which] - 1, 1)
         drawn = starts[which] + (ends - starts)[which] * place[:, None]
-        self.points(drawn[:, 0], drawn[:, 1], ink if isinstance(ink, int) else ink[kept][which])
+        self.draw_points(drawn[:, 0], drawn[:, 1], ink if isinstance(ink, int) else ink[kept][which])
 
-    def capsule(self, start: Floats, end: Floats, radius: float, ink: int, *, halo: float = 0.0) -> None:
+    def draw_capsule(self, start: Floats, end: Floats, radius: float, ink: int, *, halo: float = 0.0) -> None:
         """Fill all dots within `radius` of a line; around it, clear a rim of `halo` dots.
 
         A line whose ends coincide is a disc. The rim keeps a near limb apart from a far one behind it.
@@ -83,7 +83,7 @@ class BrailleCanvas:
         row, column = np.nonzero(filled)
         self.inks[(row + y0) // DOTS_Y, (column + x0) // DOTS_X] = ink
 
-    def text(self, column: int, row: int, text: str, ink: int) -> None:
+    def draw_text(self, column: int, row: int, text: str, ink: int) -> None:
         """Put characters, one cell wide each, over whatever dots are there."""
         if 0 <= row < self.rows:
             start = max(0, -column)
@@ -91,7 +91,7 @@ class BrailleCanvas:
             if cut:
                 self._characters.append((column + start, row, cut, ink))
 
-    def codes(self) -> NDArray[np.uint32]:
+    def cell_codes(self) -> NDArray[np.uint32]:
         """The character of every cell as a code point, shape (rows, columns)."""
         cells = self.dots.reshape(self.rows, DOTS_Y, self.columns, DOTS_X)
         codes: NDArray[np.uint32] = np.einsum("ryct,yt->rc", cells, _BITS, dtype=np.uint32)
@@ -99,9 +99,9 @@ class BrailleCanvas:
         codes[codes == _EMPTY] = _SPACE
         return codes
 
-    def strips(self, styles: Sequence[Style]) -> list[Strip]:
+    def render_strips(self, styles: Sequence[Style]) -> list[Strip]:
         """The canvas as lines; an ink is an index into `styles`."""
-        codes, inks = self.codes(), self.inks.copy()
+        codes, inks = self.cell_codes(), self.inks.copy()
         for column, row, text, ink in self._characters:
             codes[row, column : column + len(text)] = [ord(character) for character in text]
             inks[row, column : column + len(text)] = ink

@@ -14,19 +14,20 @@ from textual.containers import Container
 from textual.reactive import reactive
 
 from pdtui.core.errors import PdtuiError
-from pdtui.drive.drive_protocol import DriveConnection, PaceRequest
+from pdtui.drive.client import DriveConnection
 from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.drive.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import key_name
 from pdtui.tui.help_screen import HelpScreen
-from pdtui.tui.panel import Panel
-from pdtui.tui.screen_keys import BINDINGS, HINTS, map_keys
-from pdtui.tui.size_notice import SizeNotice, is_too_small
+from pdtui.tui.key_bindings import BINDINGS, HINTS, map_keys
+from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
+from pdtui.tui.terminal_size_notice import TerminalSizeNotice, is_too_small
 from pdtui.tui.theme import THEME
+from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
 from pdtui.tui.widgets.attribute_table import AttributeTable
 from pdtui.tui.widgets.behavior_list import BehaviorList
-from pdtui.tui.widgets.heat_strip import HeatStrip
 from pdtui.tui.widgets.path_view import PathView
 from pdtui.tui.widgets.robot_view import RobotView
 from pdtui.tui.widgets.status_lines import KeyLine, NoticeLine, StatusLine
@@ -37,15 +38,15 @@ _ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
 class DriveApp(App[str]):
-    """Polls a drive and draws the newest snapshot; keys go down the link.
+    """Shows the newest snapshot of a drive and passes keys on to it.
 
-    Whoever made the link closes it afterwards. `run` returns None when the user quits; where the drive's
+    The caller closes the connection afterwards. `run` returns None when the user quits; where the drive's
     process fails, it returns the failure's message and `return_code` is 1.
 
     Args:
-        link: the drive.
+        connection: the drive.
         stimulation_map: the behaviors that it was started with.
-        fps: how often the link is polled, per second.
+        fps: how often the connection is polled, per second.
         watching: the drive follows a recording: keys that would change the run are refused.
     """
 
@@ -61,10 +62,15 @@ class DriveApp(App[str]):
     notice: reactive[str] = reactive("", init=False, repaint=False)
 
     def __init__(
-        self, link: DriveConnection, stimulation_map: StimulationMap, *, fps: int = 12, watching: bool = False
+        self,
+        connection: DriveConnection,
+        stimulation_map: StimulationMap,
+        *,
+        fps: int = 12,
+        watching: bool = False,
     ) -> None:
         super().__init__()
-        self.link, self.map, self.fps, self.watching = link, stimulation_map, fps, watching
+        self.connection, self.map, self.fps, self.watching = connection, stimulation_map, fps, watching
         self._map_keys = map_keys(stimulation_map)
         self._notice_until = 0.0
         self._help: HelpScreen | None = None
@@ -72,7 +78,7 @@ class DriveApp(App[str]):
         self.theme = THEME.name
 
     def compose(self) -> ComposeResult:
-        def bound(panel: Panel) -> Panel:
+        def bound(panel: SnapshotWidget) -> SnapshotWidget:
             return panel.data_bind(DriveApp.facts, DriveApp.snapshot)
 
         yield bound(StatusLine(self.map, id="status"))
@@ -85,10 +91,10 @@ class DriveApp(App[str]):
             with Container(id="right"):
                 yield bound(BehaviorList(self.map, id="behaviors"))
                 yield bound(AttributeTable(self.map, id="attributes"))
-        yield bound(HeatStrip(self.map, id="heat"))
+        yield bound(ActivationHeatmap(self.map, id="heat"))
         yield bound(NoticeLine(self.map, id="notice")).data_bind(DriveApp.notice)
         yield KeyLine(self.map, id="keys")
-        yield SizeNotice(id="too-small")
+        yield TerminalSizeNotice(id="too-small")
 
     def on_mount(self) -> None:
         """Begin to poll."""
@@ -118,7 +124,7 @@ class DriveApp(App[str]):
         self.screen_stack[0].set_class(is_too_small(event.size), "-too-small")
 
     def set_keymap(self, keymap: Mapping[str, str]) -> None:
-        """Give bindings other keys, by their ids; see `pdtui.tui.screen_keys`."""
+        """Give bindings other keys, by their ids; see `pdtui.tui.key_bindings`."""
         super().set_keymap(dict(keymap))
         if self.is_running:
             self._show_keys()
@@ -147,7 +153,7 @@ class DriveApp(App[str]):
         if self._notice_until and monotonic() > self._notice_until:
             self._notice_until, self.notice = 0.0, ""
         try:
-            message = self.link.poll()
+            message = self.connection.poll_message()
         except PdtuiError as error:
             self.exit(str(error), return_code=1)
             return
@@ -180,11 +186,11 @@ class DriveApp(App[str]):
         elif self.facts is None:
             self.say("the policy is still loading")
         else:
-            self.link.press(key)
+            self.connection.press_key(key)
 
     def action_pace(self, request: str) -> None:
         """Ask the drive for another pace."""
-        self.link.pace(cast(PaceRequest, request))
+        self.connection.change_pace(cast(PaceRequest, request))
 
     def action_toggle_view(self) -> None:
         """Look from the side, or from above."""
@@ -202,5 +208,5 @@ class DriveApp(App[str]):
         self.push_screen("help")
 
     def action_leave(self) -> None:
-        """Quit; whoever made the link then ends the drive."""
+        """Quit; whoever made the connection then ends the drive."""
         self.exit()

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class PickerRow:
+class MapPickerRow:
     """One map that can be driven, or that cannot and why.
 
     Attributes:
@@ -48,21 +48,21 @@ class PickerRow:
         return self.map_path
 
 
-def picker_rows(maps: Sequence[ListedMap]) -> list[PickerRow]:
+def map_picker_rows(maps: Sequence[ListedMap]) -> list[MapPickerRow]:
     """Rows for maps as they were found; of a broken map only its file's name is known."""
     rows = []
     for listed in maps:
         found = listed.stimulation_map
         if found is None:
-            rows.append(PickerRow("", listed.path.stem, str(listed.path), problem=listed.problem))
+            rows.append(MapPickerRow("", listed.path.stem, str(listed.path), problem=listed.problem))
         else:
             rows.append(
-                PickerRow(found.robot, found.robot, str(listed.path), found.policy, len(found.behaviors))
+                MapPickerRow(found.robot, found.robot, str(listed.path), found.policy, len(found.behaviors))
             )
     return rows
 
 
-class PickerApp(App[PickerRow]):
+class MapPickerApp(App[MapPickerRow]):
     """Arrow keys choose, typing filters, enter drives; the result is the chosen row, or None.
 
     Args:
@@ -79,7 +79,7 @@ class PickerApp(App[PickerRow]):
         Binding("ctrl+c", "quit", "quits without a choice", id="pick_quit", priority=True),
     ]
 
-    def __init__(self, rows: Sequence[PickerRow]) -> None:
+    def __init__(self, rows: Sequence[MapPickerRow]) -> None:
         super().__init__()
         self.rows = tuple(rows)
         self.register_theme(THEME)
@@ -124,7 +124,7 @@ class PickerApp(App[PickerRow]):
         if event.option_id is not None:
             self.exit(self.rows[int(event.option_id)])
 
-    def _list(self, rows: Sequence[PickerRow]) -> None:
+    def _list(self, rows: Sequence[MapPickerRow]) -> None:
         options = self.query_one(OptionList)
         palette = theme_styles(self.theme_variables)
         options.clear_options()
@@ -138,11 +138,11 @@ class PickerApp(App[PickerRow]):
         self.query_one("#none", Static).update("" if rows else none)
 
 
-def _searched(row: PickerRow) -> str:
+def _searched(row: MapPickerRow) -> str:
     return f"{row.robot} {row.title} {row.map_path} {row.policy}".lower()
 
 
-def _prompt(row: PickerRow, palette: ThemeStyles) -> Text:
+def _prompt(row: MapPickerRow, palette: ThemeStyles) -> Text:
     """Two lines: what it is, then how many behaviors, or what is wrong."""
     bad = bool(row.problem)
     text = Text(no_wrap=True, overflow="ellipsis")

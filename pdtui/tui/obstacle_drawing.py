@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from pdtui.tui.braille_canvas import BrailleCanvas
-from pdtui.tui.camera import Camera, Floats
+from pdtui.tui.perspective_camera import Floats, PerspectiveCamera
 
 _LEAST = 1.0
 """Radius of the smallest disc, in dots: larger than a dot of the ground."""
 
 
-def draw_from_above(canvas: BrailleCanvas, camera: Camera, obstacles: Floats, ink: int) -> None:
+def draw_from_above(canvas: BrailleCanvas, camera: PerspectiveCamera, obstacles: Floats, ink: int) -> None:
     """Discs of the obstacles' radii on the ground, each with a rim that the ground does not reach."""
     dots, magnification, before = camera.project(_on_ground(obstacles))
     for dot, scale, radius in zip(dots[before], magnification[before], obstacles[before, 2], strict=True):
-        canvas.capsule(dot, dot, max(_LEAST, float(radius * scale) * camera.zoom), ink, halo=1.0)
+        canvas.draw_capsule(dot, dot, max(_LEAST, float(radius * scale) * camera.zoom), ink, halo=1.0)
 
 
 def draw_from_side(
-    canvas: BrailleCanvas, camera: Camera, obstacles: Floats, ink: int, *, behind: bool
+    canvas: BrailleCanvas, camera: PerspectiveCamera, obstacles: Floats, ink: int, *, behind: bool
 ) -> None:
     """Trunks up to the picture's edge, far ones first; before the robot as two lines, which hide nothing.
 
@@ -38,10 +38,10 @@ def draw_from_side(
     for row in np.flatnonzero(before):
         foot, top = feet[row], np.array([feet[row, 0], min(feet[row, 1], 0.0)])
         if behind:
-            canvas.capsule(foot, top, float(widths[row]), ink, halo=1.0)
+            canvas.draw_capsule(foot, top, float(widths[row]), ink, halo=1.0)
         else:
             sides = np.array([[-widths[row], 0.0], [widths[row], 0.0]])
-            canvas.segments(foot + sides, top + sides, ink)
+            canvas.draw_segments(foot + sides, top + sides, ink)
 
 
 def _on_ground(obstacles: Floats) -> Floats:

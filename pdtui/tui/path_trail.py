@@ -39,7 +39,7 @@ class PathTrail:
             self._stride *= 2
             self.points = self.points[::2]
 
-    def pieces(self, past: bool = False) -> tuple[Floats, Floats, NDArray[np.int16]]:
+    def line_segments(self, past: bool = False) -> tuple[Floats, Floats, NDArray[np.int16]]:
         """Lines of the path: starts (n, 2), ends (n, 2) and the behavior at each end (n,); jumps left out."""
         points = self.past if past else self.points
         starts, ends = points[:-1], points[1:]

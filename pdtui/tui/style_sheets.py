@@ -9,7 +9,7 @@ HEIGHTS = [(0, "-low"), (36, "-tall")]
 DRIVE = """
 Screen { background: $background; overflow: hidden; }
 
-Panel { width: 1fr; height: 1fr; color: $foreground; }
+SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 #status, #notice, #keys { height: 1; }
 #status, #keys { background: $surface; }
 

@@ -24,12 +24,12 @@ from tests.real_viewer import free_port, real_viewer
 PATIENCE = 60.0
 
 
-def _until(link: DriveClient, wanted: Callable[[DriveSnapshot], bool]) -> list[DriveSnapshot]:
+def _until(connection: DriveClient, wanted: Callable[[DriveSnapshot], bool]) -> list[DriveSnapshot]:
     """Poll until a snapshot is as wanted; all snapshots on the way."""
     seen: list[DriveSnapshot] = []
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
-        message = link.poll()
+        message = connection.poll_message()
         if isinstance(message, DriveSnapshot):
             seen.append(message)
             if wanted(message):
@@ -38,10 +38,10 @@ def _until(link: DriveClient, wanted: Callable[[DriveSnapshot], bool]) -> list[D
     raise AssertionError(f"nothing as wanted in {PATIENCE} s; last: {seen[-1:]}")
 
 
-def _briefing(link: DriveClient) -> DriveFacts:
+def _briefing(connection: DriveClient) -> DriveFacts:
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
-        message = link.poll()
+        message = connection.poll_message()
         if message is not None:
             assert isinstance(message, DriveFacts)
             return message
@@ -55,29 +55,29 @@ def recording(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def link(small_map: StimulationMap, recording: Path) -> Iterator[DriveClient]:
-    link = DriveClient(DriveConfig("ant", small_map, 3, recording=str(recording)))
-    yield link
-    link.close()
+def connection(small_map: StimulationMap, recording: Path) -> Iterator[DriveClient]:
+    connection = DriveClient(DriveConfig("ant", small_map, 3, recording=str(recording)))
+    yield connection
+    connection.close()
 
 
-def test_a_drive_through_the_pipe_is_recorded_and_replays(link: DriveClient, recording: Path) -> None:
-    facts = _briefing(link)
+def test_a_drive_through_the_pipe_is_recorded_and_replays(connection: DriveClient, recording: Path) -> None:
+    facts = _briefing(connection)
     assert (facts.title, facts.layers) == ("Ant (MuJoCo)", (16, 16))
-    link.press("w")
-    pushed = _until(link, lambda snapshot: bool(snapshot.active))
+    connection.press_key("w")
+    pushed = _until(connection, lambda snapshot: bool(snapshot.active))
     assert pushed[-1].active[0].name == "push"
     assert {view.unit for view in pushed[-1].units} == {3, 23}
     assert {view.overwritten for view in pushed[-1].units} == {-2.0, 2.0}
-    link.press("z")
-    refused = _until(link, lambda snapshot: bool(snapshot.notice))
+    connection.press_key("z")
+    refused = _until(connection, lambda snapshot: bool(snapshot.notice))
     assert refused[-1].notice == "no behavior has key 'z'"
-    link.press("space")
-    cleared = _until(link, lambda snapshot: not snapshot.active)
+    connection.press_key("space")
+    cleared = _until(connection, lambda snapshot: not snapshot.active)
     histories = [*pushed, *refused, *cleared]
     assert sum(len(snapshot.history) for snapshot in histories) == cleared[-1].step
     assert cleared[-1].involvement == 2
-    assert link.close().startswith("stopped: ")
+    assert connection.close().startswith("stopped: ")
     session = read_session(recording)
     assert [event.key for event in session.events] == ["w", "space"]
     assert session.outcome == "stopped"
@@ -86,56 +86,60 @@ def test_a_drive_through_the_pipe_is_recorded_and_replays(link: DriveClient, rec
     assert result.steps == session.steps
 
 
-def test_pause_single_step_and_speed_are_no_part_of_the_run(link: DriveClient) -> None:
-    _briefing(link)
-    link.pace("pause")
-    paused = _until(link, lambda snapshot: snapshot.paused)[-1].step
-    link.pace("step")
-    assert _until(link, lambda snapshot: snapshot.step > paused)[-1].step == paused + 1
-    link.pace("faster")
-    assert _until(link, lambda snapshot: snapshot.speed == 2.0)[-1].step == paused + 1
+def test_pause_single_step_and_speed_are_no_part_of_the_run(connection: DriveClient) -> None:
+    _briefing(connection)
+    connection.change_pace("pause")
+    paused = _until(connection, lambda snapshot: snapshot.paused)[-1].step
+    connection.change_pace("step")
+    assert _until(connection, lambda snapshot: snapshot.step > paused)[-1].step == paused + 1
+    connection.change_pace("faster")
+    assert _until(connection, lambda snapshot: snapshot.speed == 2.0)[-1].step == paused + 1
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_leaves_a_whole_recording(
-    link: DriveClient, recording: Path, number: signal.Signals
+    connection: DriveClient, recording: Path, number: signal.Signals
 ) -> None:
-    _until(link, lambda snapshot: snapshot.step >= 5)
-    os.kill(link.pid, number)
+    _until(connection, lambda snapshot: snapshot.step >= 5)
+    os.kill(connection.pid, number)
     with pytest.raises(PdtuiError, match=f"ended by {number.name}: "):
-        _until(link, lambda _: False)
+        _until(connection, lambda _: False)
     session = read_session(recording)
     assert session.outcome == f"ended by {number.name}"
     assert replay_session(recording).first_difference is None
 
 
-def test_a_killed_simulation_says_where_the_recording_is(link: DriveClient, recording: Path) -> None:
-    steps = _until(link, lambda snapshot: snapshot.step >= 10)[-1].step
-    os.kill(link.pid, signal.SIGKILL)
+def test_a_killed_simulation_says_where_the_recording_is(connection: DriveClient, recording: Path) -> None:
+    steps = _until(connection, lambda snapshot: snapshot.step >= 10)[-1].step
+    os.kill(connection.pid, signal.SIGKILL)
     with pytest.raises(
         PdtuiError, match=r"was killed by SIGKILL; the recording up to then is in .*drive\.rrd"
     ):
-        _until(link, lambda _: False)
+        _until(connection, lambda _: False)
     session = read_session(recording)
     assert session.steps >= steps - 3
     assert replay_session(recording).first_difference is None
 
 
 def test_what_cannot_be_loaded_comes_up_the_pipe(small_map: StimulationMap, tmp_path: Path) -> None:
-    link = DriveClient(DriveConfig("ant", small_map, 3, policy=str(tmp_path / "gone.safetensors")))
+    connection = DriveClient(DriveConfig("ant", small_map, 3, policy=str(tmp_path / "gone.safetensors")))
     with pytest.raises(PdtuiError, match=r"no policy '.*gone\.safetensors'"):
-        _until(link, lambda _: False)
-    link.close()
+        _until(connection, lambda _: False)
+    connection.close()
 
 
-def test_a_session_can_be_watched(small_map: StimulationMap, link: DriveClient, recording: Path) -> None:
-    _until(link, lambda snapshot: snapshot.step >= 3)
-    link.press("t")
-    _until(link, lambda snapshot: bool(snapshot.active))
-    link.close()
+def test_a_session_can_be_watched(
+    small_map: StimulationMap, connection: DriveClient, recording: Path
+) -> None:
+    _until(connection, lambda snapshot: snapshot.step >= 3)
+    connection.press_key("t")
+    _until(connection, lambda snapshot: bool(snapshot.active))
+    connection.close()
     session = read_session(recording)
     digests = tuple(int(digest) for digest in session.digests)
-    watching = DriveClient(DriveConfig("ant", small_map, 3, script=session.events, digests=digests))
+    watching = DriveClient(
+        DriveConfig("ant", small_map, 3, scripted_events=session.events, expected_digests=digests)
+    )
     last = _until(watching, lambda snapshot: bool(snapshot.finished))[-1]
     watching.close()
     assert last.finished == f"identical, {session.steps} steps"
@@ -146,11 +150,11 @@ def test_a_drive_whose_viewer_is_not_there_says_so_and_goes_on(
     small_map: StimulationMap, recording: Path
 ) -> None:
     nobody = ViewerAddress(port=free_port())
-    link = DriveClient(DriveConfig("ant", small_map, 3, recording=str(recording), viewer=nobody))
+    connection = DriveClient(DriveConfig("ant", small_map, 3, recording=str(recording), viewer=nobody))
     try:
-        seen = _until(link, lambda snapshot: snapshot.step > 20)
+        seen = _until(connection, lambda snapshot: snapshot.step > 20)
     finally:
-        link.close()
+        connection.close()
     assert any(snapshot.notice == nobody.absence for snapshot in seen)
     assert read_session(recording).steps > 20
 
@@ -161,14 +165,14 @@ def test_a_viewer_killed_in_mid_drive_leaves_drive_and_session_whole(
 ) -> None:
     with real_viewer() as viewer:
         address = ViewerAddress(port=viewer.port)
-        link = DriveClient(DriveConfig("ant", small_map, 3, recording=str(recording), viewer=address))
+        connection = DriveClient(DriveConfig("ant", small_map, 3, recording=str(recording), viewer=address))
         try:
             viewer.wait_for(lambda state: any(view.name == "Behaviors" for view in state.views))
-            (last,) = _until(link, lambda snapshot: snapshot.step > 20)[-1:]
+            (last,) = _until(connection, lambda snapshot: snapshot.step > 20)[-1:]
             viewer.kill()
-            _until(link, lambda snapshot: snapshot.step > last.step + 40)
+            _until(connection, lambda snapshot: snapshot.step > last.step + 40)
         finally:
-            outcome = link.close()
-    assert not link.failed
+            outcome = connection.close()
+    assert not connection.failed
     assert outcome.startswith("stopped")
     assert replay_session(recording).identical

@@ -16,15 +16,15 @@ from pdtui.core.errors import PdtuiError
 from pdtui.drive import server
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.ending_signals import ENDING, ending_signals
-from pdtui.drive.headless import build_loop
+from pdtui.drive.ending_signals import ENDING_SIGNALS, catch_ending_signals
+from pdtui.drive.loop_builder import build_loop
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_repair import examine_session
 from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.test_terminal import PATIENCE
 
 
-@pytest.mark.parametrize("number", ENDING)
+@pytest.mark.parametrize("number", ENDING_SIGNALS)
 def test_a_signal_ends_a_drive_without_a_screen_between_two_steps(
     number: signal.Signals, map_path: Path, tmp_path: Path
 ) -> None:
@@ -46,12 +46,12 @@ def test_a_signal_ends_a_drive_without_a_screen_between_two_steps(
 
 
 def test_signals_are_given_back() -> None:
-    before = [signal.getsignal(number) for number in ENDING]
-    with ending_signals() as ended:
+    before = [signal.getsignal(number) for number in ENDING_SIGNALS]
+    with catch_ending_signals() as ended:
         assert ended() == ""
         os.kill(os.getpid(), signal.SIGTERM)
         assert ended() == "ended by SIGTERM"
-    assert [signal.getsignal(number) for number in ENDING] == before
+    assert [signal.getsignal(number) for number in ENDING_SIGNALS] == before
 
 
 def test_an_exception_in_the_simulation_is_told_and_recorded(
@@ -71,7 +71,7 @@ def test_an_exception_in_the_simulation_is_told_and_recorded(
         monkeypatch.setattr(loop.robot, "step", fails)
         return loop
 
-    monkeypatch.setattr("pdtui.drive.server.build_loop", broken)
+    monkeypatch.setattr(server, "build_loop", broken)
     monkeypatch.setattr(signal, "signal", lambda *_: None)  # they are this process's own
     path = tmp_path / "a.rrd"
     ours, theirs = Pipe()
@@ -81,7 +81,8 @@ def test_an_exception_in_the_simulation_is_told_and_recorded(
         messages.append(ours.recv())
     said = str(messages[-1])
     assert isinstance(messages[-1], PdtuiError)
-    assert said.startswith("the simulation failed: ZeroDivisionError: the wheel came off (test_endings.py, ")
+    where = "(test_drive_endings.py, "
+    assert said.startswith(f"the simulation failed: ZeroDivisionError: the wheel came off {where}")
     assert said.endswith(f"7 steps, recorded in {path}")
     assert examine_session(path).whole
     assert "the wheel came off" in read_session(path).outcome

@@ -10,7 +10,7 @@ import pytest
 from pdtui.core.errors import KeystrokeError
 from pdtui.core.events import Event
 from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.keystrokes import key_event, key_meanings, read_keystrokes, run_keys, write_keystrokes
+from pdtui.drive.keystrokes import format_keystrokes, interpret_key, interpret_keys, read_keystrokes, run_keys
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -22,7 +22,7 @@ def loop(policy: Policy, small_map: StimulationMap) -> ControlLoop:
 
 
 def _press(loop: ControlLoop, key: str) -> Event | str:
-    event = key_event(key, loop)
+    event = interpret_key(key, loop)
     loop.advance([event] if isinstance(event, Event) else [])
     return event
 
@@ -51,7 +51,7 @@ def test_keys_mean_what_the_map_and_the_state_say(loop: ControlLoop) -> None:
 
 def test_keys_of_one_step_mean_something_after_each_other(loop: ControlLoop) -> None:
     before = loop.latch.active
-    strengthened, again, cleared, refused = key_meanings(["w", "plus", "plus", "space", "plus"], loop)[1:]
+    strengthened, again, cleared, refused = interpret_keys(["w", "plus", "plus", "space", "plus"], loop)[1:]
     assert (strengthened, again) == (
         Event(0, "factor", "push", 1.25, "plus"),
         Event(0, "factor", "push", 1.25**2, "plus"),
@@ -67,7 +67,7 @@ def test_many_keys_a_step_are_never_more_than_refused(loop: ControlLoop, small_m
     kinds = set()
     for _ in range(300):
         pressed = [drawn.choice(keys) for _ in range(drawn.randrange(8))]
-        events = [one for one in key_meanings(pressed, loop) if isinstance(one, Event)]
+        events = [one for one in interpret_keys(pressed, loop) if isinstance(one, Event)]
         kinds |= {event.kind for event in loop.advance(events).events}
     assert kinds == {"behavior", "default", "target", "factor", "reset", "rewind"}
 
@@ -107,5 +107,5 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path, small_map: Stimulatio
 def test_events_are_written_as_keystrokes(tmp_path: Path, small_map: StimulationMap) -> None:
     events = (Event(3, "behavior", "push", key="w"), Event(5, "reset"), Event(9, "default", key="space"))
     path = tmp_path / "keys.txt"
-    path.write_text(write_keystrokes(events))
+    path.write_text(format_keystrokes(events))
     assert read_keystrokes(path, small_map) == {3: ["w"], 9: ["space"]}

@@ -70,8 +70,8 @@ def read_session_file(path: Path) -> None:
     from rich.console import Console
 
     from pdtui.cli.session_tables import compare_table, show_table
-    from pdtui.drive.keystrokes import write_keystrokes
-    from pdtui.drive.replay import config_of
+    from pdtui.drive.keystrokes import format_keystrokes
+    from pdtui.drive.replay import replay_config
     from pdtui.sessions.session_comparison import compare_sessions
     from pdtui.sessions.session_reader import read_activations, read_session
     from pdtui.sessions.session_repair import examine_session, repair_session
@@ -91,8 +91,8 @@ def read_session_file(path: Path) -> None:
         console = Console(file=nowhere)
         console.print(show_table(session, summarise_session(session)))
         console.print(compare_table(compare_sessions(session, session)))
-    write_keystrokes(session.events)
-    config_of(session, str(path))
+    format_keystrokes(session.events)
+    replay_config(session, str(path))
 
 
 def _reads(map_path: Path) -> dict[str, Callable[[Path], object]]:

@@ -40,9 +40,11 @@ def course(tmp_path_factory: pytest.TempPathFactory) -> Course:
         for step in range(STEPS):
             record = loop.advance(EVENTS.get(step, []))
             recorder.write(record)
-            observer.see(record)
-            snapshot = observer.snapshot(paused=False, speed=1.0, achieved=1.0, recorded_bytes=0, finished="")
-            tallies.append(snapshot.tally)
+            observer.add_step(record)
+            snapshot = observer.build_snapshot(
+                paused=False, speed=1.0, achieved_speed=1.0, recorded_bytes=0, finished=""
+            )
+            tallies.append(snapshot.statistics)
             obstacles.append(record.obstacles)
             assert (snapshot.obstacles is not None) == (step in (0, 12, 18)), step
             if snapshot.obstacles is not None:

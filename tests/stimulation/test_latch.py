@@ -30,42 +30,42 @@ def _names(latch: Latch) -> list[str]:
 
 def test_a_latched_behavior_overwrites_until_the_default_key(latch: Latch) -> None:
     assert latch.stimulate(AT_REST).units == ()
-    latch.press("push", AT_REST)
+    latch.latch_behavior("push", AT_REST)
     for _ in range(100):
         stimulation = latch.stimulate(AT_REST)
         assert dict(zip(stimulation.units, stimulation.values, strict=True)) == {3: -2.0, 16 + 7: 2.0}
-        latch.tick()
+        latch.end_step()
     latch.clear()
     assert latch.stimulate(AT_REST).units == ()
 
 
 def test_another_key_ends_a_behavior(latch: Latch) -> None:
-    latch.press("push", AT_REST)
-    latch.press("hold heading", AT_REST)
+    latch.latch_behavior("push", AT_REST)
+    latch.latch_behavior("hold heading", AT_REST)
     assert _names(latch) == ["hold heading"]
 
 
 def test_behaviors_that_the_map_allows_run_together(latch: Latch) -> None:
-    latch.press("push", AT_REST)
-    latch.press("twitch", AT_REST)
+    latch.latch_behavior("push", AT_REST)
+    latch.latch_behavior("twitch", AT_REST)
     assert _names(latch) == ["push", "twitch"]
     assert set(latch.stimulate(AT_REST).units) == {3, 23, 18}
-    latch.press("push", AT_REST)
+    latch.latch_behavior("push", AT_REST)
     assert _names(latch) == ["twitch", "push"]
 
 
 def test_a_period_ends_a_behavior(latch: Latch) -> None:
-    latch.press("twitch", AT_REST)
+    latch.latch_behavior("twitch", AT_REST)
     seen = []
     while latch.active:
         seen.append(latch.active[0].remaining)
         assert latch.stimulate(AT_REST).units == (18,)
-        latch.tick()
+        latch.end_step()
     assert seen == list(range(10, 0, -1))
 
 
 def test_the_factor_scales_the_outputs(latch: Latch) -> None:
-    latch.press("push", AT_REST)
+    latch.latch_behavior("push", AT_REST)
     latch.set_factor("push", 0.5)
     assert latch.stimulate(AT_REST).values == (-1.0, 1.0)
     with pytest.raises(KeystrokeError, match="'twitch' is not latched"):
@@ -73,19 +73,19 @@ def test_the_factor_scales_the_outputs(latch: Latch) -> None:
 
 
 def test_a_target_starts_at_the_present_value_and_moves(latch: Latch) -> None:
-    latch.press("hold heading", np.array([0.0, 0.7]))
+    latch.latch_behavior("hold heading", np.array([0.0, 0.7]))
     view = latch.active[0]
     assert view.target == 0.7
     latch.set_target("hold heading", 0.7 + 4.0)
     assert latch.active[0].target == pytest.approx(4.7 - 2 * math.pi)
-    latch.press("hold heading", AT_REST)
+    latch.latch_behavior("hold heading", AT_REST)
     assert latch.active == ()
 
 
 def test_errors_name_what_there_is(latch: Latch) -> None:
     with pytest.raises(KeystrokeError, match="no behavior 'fly'; there are push, twitch, hold heading"):
-        latch.press("fly", AT_REST)
-    latch.press("push", AT_REST)
+        latch.latch_behavior("fly", AT_REST)
+    latch.latch_behavior("push", AT_REST)
     with pytest.raises(KeystrokeError, match="'push' holds no target"):
         latch.set_target("push", 1.0)
 
@@ -97,13 +97,13 @@ def test_an_attribute_that_the_robot_lacks_is_named_at_once(small_map: Stimulati
 
 def test_a_saved_state_repeats_itself(latch: Latch) -> None:
     values = np.column_stack([np.zeros(30), np.linspace(0.0, 0.5, 30)])
-    latch.press("hold heading", AT_REST)
+    latch.latch_behavior("hold heading", AT_REST)
     latch.set_target("hold heading", 1.0)
     for row in values[:10]:
         latch.stimulate(row)
-    state = latch.save()
+    state = latch.copy_state()
     first = [latch.stimulate(row) for row in values[10:]]
-    latch.load(state)
+    latch.restore_state(state)
     assert [latch.stimulate(row) for row in values[10:]] == first
 
 
@@ -125,7 +125,7 @@ def test_pid_is_that_of_the_textbook() -> None:
 def test_a_controllers_output_is_added_to_its_base(map_text: str) -> None:
     text = map_text.replace('mode = "pid"', 'mode = "pid"\nbase = { "0:5" = 0.5, "1:1" = -2.0 }')
     latch = Latch(parse_map(text, "m"), (16, 16), ATTRIBUTES, 0.05)
-    latch.press("hold heading", AT_REST)
+    latch.latch_behavior("hold heading", AT_REST)
     assert latch.stimulate(AT_REST) == Stimulation((5, 17), (0.5, -2.0))
     latch.set_target("hold heading", 0.2)
     stimulation = latch.stimulate(AT_REST)

@@ -1,4 +1,4 @@
-"""A recorded drive, and a link that plays it without a process behind it."""
+"""A recorded drive, and a connection that plays it without a process behind it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import PdtuiError
-from pdtui.drive.drive_protocol import PaceRequest
 from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.drive.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.drive_app import DriveApp
 from tests.tui.recorded_snapshots import drive_map, load
@@ -18,7 +18,7 @@ DATA = Path(__file__).parent / "data" / "ant.npz"
 Message = DriveFacts | DriveSnapshot | PdtuiError
 
 
-class ScriptedLink:
+class ScriptedConnection:
     """Gives its messages one a poll, then None; remembers what it was asked."""
 
     def __init__(self, messages: list[Message]) -> None:
@@ -26,7 +26,7 @@ class ScriptedLink:
         self.pressed: list[str] = []
         self.paced: list[PaceRequest] = []
 
-    def poll(self) -> DriveFacts | DriveSnapshot | None:
+    def poll_message(self) -> DriveFacts | DriveSnapshot | None:
         if not self.messages:
             return None
         message = self.messages.pop(0)
@@ -34,10 +34,10 @@ class ScriptedLink:
             raise message
         return message
 
-    def press(self, key: str) -> None:
+    def press_key(self, key: str) -> None:
         self.pressed.append(key)
 
-    def pace(self, request: PaceRequest) -> None:
+    def change_pace(self, request: PaceRequest) -> None:
         self.paced.append(request)
 
     def close(self) -> str:
@@ -55,7 +55,7 @@ def a_map() -> StimulationMap:
     return drive_map()
 
 
-MakeApp = Callable[..., tuple[DriveApp, ScriptedLink]]
+MakeApp = Callable[..., tuple[DriveApp, ScriptedConnection]]
 
 
 @pytest.fixture
@@ -66,11 +66,11 @@ def make_app(drive: tuple[DriveFacts, list[DriveSnapshot]], a_map: StimulationMa
         messages: list[Message] | int = 3,
         stimulation_map: StimulationMap | None = None,
         watching: bool = False,
-    ) -> tuple[DriveApp, ScriptedLink]:
+    ) -> tuple[DriveApp, ScriptedConnection]:
         facts, snapshots = drive
         first = snapshots[:messages] if isinstance(messages, int) else []
         played: list[Message] = [facts, *first] if isinstance(messages, int) else messages
-        link = ScriptedLink(played)
-        return DriveApp(link, stimulation_map or a_map, fps=200, watching=watching), link
+        connection = ScriptedConnection(played)
+        return DriveApp(connection, stimulation_map or a_map, fps=200, watching=watching), connection
 
     return make

@@ -16,7 +16,7 @@ from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUnit
 from pdtui.stimulation.stimulation_map import Behavior, MotorPrimitive, PidGains, StimulationMap
 
 ARRAYS = ("activations", "attributes", "poses", "history", "path")
-ABSENT = ("obstacles", "tally")
+ABSENT = ("obstacles", "statistics")
 """The Ant has none to show."""
 
 
@@ -55,6 +55,8 @@ def save(path: Path, facts: DriveFacts, snapshots: list[DriveSnapshot]) -> None:
         | {"active": [asdict(view) for view in snapshot.active], "units": [asdict(u) for u in snapshot.units]}
         for snapshot in snapshots
     ]
+    for fields in plain:
+        fields["achieved"] = fields.pop("achieved_speed")
     text = json.dumps({"briefing": asdict(facts), "snapshots": plain})
     arrays: dict[str, Any] = {
         f"{name}_{index}": getattr(snapshot, name).astype(np.float16 if name == "activations" else np.float32)
@@ -74,6 +76,7 @@ def load(path: Path) -> tuple[DriveFacts, list[DriveSnapshot]]:
         facts["layers"] = tuple(facts["layers"])
         snapshots = []
         for index, fields in enumerate(stored["snapshots"]):
+            fields["achieved_speed"] = fields.pop("achieved")
             fields["active"] = tuple(ActiveBehavior(**view) for view in fields["active"])
             fields["units"] = tuple(StimulatedUnit(**view) for view in fields["units"])
             arrays = {name: file[f"{name}_{index}"].astype(np.float64) for name in ARRAYS}

@@ -6,16 +6,16 @@ from textual.app import App
 from textual.pilot import Pilot
 from textual.widget import Widget
 
-from tests.tui.conftest import ScriptedLink
+from tests.tui.conftest import ScriptedConnection
 
 
-async def played(pilot: Pilot[str], link: ScriptedLink) -> None:
-    """Wait until the application has drawn everything that its link had to say."""
+async def played(pilot: Pilot[str], connection: ScriptedConnection) -> None:
+    """Wait until the application has drawn everything that its connection had to say."""
     for _ in range(2000):
-        if not link.messages:
+        if not connection.messages:
             break
         await pilot.pause(0.005)
-    assert not link.messages
+    assert not connection.messages
     await pilot.pause(0.02)
 
 

@@ -19,8 +19,8 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 from pdtui.tui.help_screen import HelpScreen
-from pdtui.tui.panel import Panel
-from pdtui.tui.screen_keys import BINDINGS
+from pdtui.tui.key_bindings import BINDINGS
+from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.widgets.robot_view import RobotView
 from tests.tui.conftest import MakeApp
 from tests.tui.recorded_snapshots import drive_map
@@ -47,29 +47,29 @@ async def test_first_frame_shows_the_behaviors_before_the_policy_is_there(make_a
 
 
 async def test_keys_of_the_map_go_to_the_drive(make_app: MakeApp) -> None:
-    app, link = make_app()
+    app, connection = make_app()
     async with app.run_test(size=(80, 24)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         await pilot.press("w", "h", "space")
-        assert link.pressed == ["w", "h", "space"]
+        assert connection.pressed == ["w", "h", "space"]
 
 
 async def test_keys_that_change_the_run_go_to_the_drive(make_app: MakeApp) -> None:
-    app, link = make_app()
+    app, connection = make_app()
     keys = ["up", "down", "left", "right", "plus", "minus", "r", "backspace"]
     async with app.run_test(size=(80, 24)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         await pilot.press(*keys)
-        assert link.pressed == keys
+        assert connection.pressed == keys
 
 
 async def test_keys_of_the_pace_go_to_the_pacer(make_app: MakeApp) -> None:
-    app, link = make_app()
+    app, connection = make_app()
     async with app.run_test(size=(80, 24)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         await pilot.press("p", "n", "comma", "full_stop")
-        assert link.paced == ["pause", "step", "slower", "faster"]
-        assert link.pressed == []
+        assert connection.paced == ["pause", "step", "slower", "faster"]
+        assert connection.pressed == []
 
 
 def test_every_reserved_key_is_bound() -> None:
@@ -79,60 +79,60 @@ def test_every_reserved_key_is_bound() -> None:
 async def test_a_behavior_comes_before_the_applications_own_key(make_app: MakeApp) -> None:
     stimulation_map = drive_map()
     stimulation_map.behaviors["wave"] = Behavior("wave", "v", "waves", {"0:1": 1.0})
-    app, link = make_app(3, stimulation_map)
+    app, connection = make_app(3, stimulation_map)
     async with app.run_test(size=(80, 24)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         await pilot.press("v")
-        assert link.pressed == ["v"]
+        assert connection.pressed == ["v"]
         assert app.query_one(RobotView).view == "side"
         assert "view" not in app.keys_now
 
 
 async def test_a_key_that_nobody_has_is_named(make_app: MakeApp) -> None:
-    app, link = make_app()
+    app, connection = make_app()
     async with app.run_test(size=(80, 24)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         await pilot.press("z")
         assert "no behavior has the key z" in notice(app)
-        assert link.pressed == []
+        assert connection.pressed == []
 
 
 async def test_keys_before_the_policy_is_there_are_refused(make_app: MakeApp) -> None:
-    app, link = make_app([])
+    app, connection = make_app([])
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("w")
         assert "still loading" in notice(app)
-        assert link.pressed == []
+        assert connection.pressed == []
 
 
 async def test_watching_refuses_keys_that_change_the_run(make_app: MakeApp) -> None:
-    app, link = make_app(3, watching=True)
+    app, connection = make_app(3, watching=True)
     async with app.run_test(size=(80, 24)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         await pilot.press("w")
         assert "keys cannot change it" in notice(app)
         await pilot.press("r", "p")
-        assert link.pressed == []
-        assert link.paced == ["pause"]
+        assert connection.pressed == []
+        assert connection.paced == ["pause"]
         assert "watching" in shown(app.query_one("#status"))
 
 
 async def test_a_remapped_key_still_sends_the_original(make_app: MakeApp) -> None:
-    app, link = make_app()
+    app, connection = make_app()
     async with app.run_test(size=(80, 24)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         app.set_keymap({"reset": "f5", "pause": "f6"})
         await pilot.press("f5", "f6")
-        assert (link.pressed, link.paced) == (["r"], ["pause"])
+        assert (connection.pressed, connection.paced) == (["r"], ["pause"])
         await pilot.press("r")
-        assert link.pressed == ["r"]
+        assert connection.pressed == ["r"]
         assert "f6 pause" in shown(app.query_one("#keys"))
 
 
 async def test_the_view_toggles(make_app: MakeApp) -> None:
-    app, link = make_app()
+    app, connection = make_app()
     async with app.run_test(size=(80, 24)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         side = shown(app.query_one("#robot"))
         await pilot.press("v")
         above = shown(app.query_one("#robot"))
@@ -143,9 +143,9 @@ async def test_the_view_toggles(make_app: MakeApp) -> None:
 
 
 async def test_help_lists_all_keys_and_the_drive_goes_on(make_app: MakeApp) -> None:
-    app, link = make_app()
+    app, connection = make_app()
     async with app.run_test(size=(100, 60)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         await pilot.press("question_mark")
         assert isinstance(app.screen, HelpScreen)
         text = str(app.screen.query_one("Static").render())
@@ -154,21 +154,21 @@ async def test_help_lists_all_keys_and_the_drive_goes_on(make_app: MakeApp) -> N
         for binding in BINDINGS:
             assert binding.description in text
         await pilot.press("space")
-        assert link.pressed == ["space"]
+        assert connection.pressed == ["space"]
         await pilot.press("question_mark")
         assert not isinstance(app.screen, HelpScreen)
 
 
 async def test_a_terminal_that_is_too_small_says_so_and_recovers(make_app: MakeApp) -> None:
-    app, link = make_app()
+    app, connection = make_app()
     async with app.run_test(size=(60, 20)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         message = shown(app.query_one("#too-small"))
         assert "need 80 × 24" in message
         assert "have 60 × 20" in message
         assert not app.query_one("#body").display
         await pilot.press("space")
-        assert link.pressed == ["space"]
+        assert connection.pressed == ["space"]
         await pilot.resize_terminal(80, 24)
         await pilot.pause(0.05)
         assert app.query_one("#body").display
@@ -181,14 +181,14 @@ async def test_a_terminal_that_is_too_small_says_so_and_recovers(make_app: MakeA
 async def test_the_end_of_the_drive_stays_on_the_screen(make_app: MakeApp, drive: Drive) -> None:
     facts, snapshots = drive
     last = replace(snapshots[2], finished="the simulation diverged at 3.20 s", notice="fell")
-    app, link = make_app([facts, *snapshots[:2], last])
+    app, connection = make_app([facts, *snapshots[:2], last])
     async with app.run_test(size=(80, 24)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         assert "the drive is over: the simulation diverged at 3.20 s" in notice(app)
         assert "q quits" in notice(app)
         assert "m/s" in shown(app.query_one("#attributes"))
         await pilot.press("w")
-        assert link.pressed == []
+        assert connection.pressed == []
         await pilot.press("q")
     assert app.return_code == 0
 
@@ -206,27 +206,27 @@ async def test_a_failed_drive_ends_the_application_with_its_message(make_app: Ma
 
 @pytest.mark.parametrize("key", ["q", "ctrl+c"])
 async def test_quitting(make_app: MakeApp, key: str) -> None:
-    app, link = make_app()
+    app, connection = make_app()
     async with app.run_test(size=(80, 24)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         await pilot.press(key)
         await pilot.pause()
     assert (app.return_code, app.return_value) == (0, None)
 
 
 async def test_a_notice_of_the_drive_is_shown(make_app: MakeApp, drive: Drive) -> None:
-    app, link = make_app([drive[0], replace(drive[1][0], notice="fell: on its back \x1b[31m[b]x")])
+    app, connection = make_app([drive[0], replace(drive[1][0], notice="fell: on its back \x1b[31m[b]x")])
     async with app.run_test(size=(80, 24)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         assert "fell: on its back \N{REPLACEMENT CHARACTER}[31m[b]x" in notice(app)
 
 
 async def test_text_of_a_map_is_neither_markup_nor_control(make_app: MakeApp) -> None:
     stimulation_map = drive_map()
     stimulation_map.behaviors["odd"] = Behavior("[red]odd\x07", "o", "[link=x]says\x1b[2J", {"0:1": 1.0})
-    app, link = make_app(2, stimulation_map)
+    app, connection = make_app(2, stimulation_map)
     async with app.run_test(size=(160, 48)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         behaviors = shown(app.query_one("#behaviors"))
         assert "[red]odd\N{REPLACEMENT CHARACTER}" in behaviors
         assert "[link=x]says\N{REPLACEMENT CHARACTER}[2J" in behaviors
@@ -243,9 +243,9 @@ async def test_poses_that_are_not_finite_are_said(make_app: MakeApp, drive: Driv
         history=np.full_like(drive[1][0].history, np.nan),
         path=np.full_like(drive[1][0].path, np.nan),
     )
-    app, link = make_app([drive[0], broken])
+    app, connection = make_app([drive[0], broken])
     async with app.run_test(size=(160, 48)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         assert "not finite" in shown(app.query_one("#robot"))
 
 
@@ -254,11 +254,11 @@ async def test_without_colors(
     monkeypatch: pytest.MonkeyPatch, make_app: MakeApp, size: tuple[int, int]
 ) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
-    app, link = make_app(64)
+    app, connection = make_app(64)
     async with app.run_test(size=size) as pilot:
-        await played(pilot, link)
-        for panel in app.query("Panel").results():
-            assert isinstance(panel, Panel)
+        await played(pilot, connection)
+        for panel in app.query("SnapshotWidget").results():
+            assert isinstance(panel, SnapshotWidget)
             for segment in (part for strip in panel.render_lines(panel.outer_size.region) for part in strip):
                 assert segment.style is not None
                 color = segment.style.color
@@ -275,14 +275,16 @@ async def test_a_live_loop_is_drawn(policy: Policy, small_map: StimulationMap, m
     snapshots = []
     for step in range(24):
         events = {4: [Event(4, "behavior", "push", key="w")], 12: [Event(12, "behavior", "twitch", key="t")]}
-        observer.see(loop.advance(events.get(step, [])))
+        observer.add_step(loop.advance(events.get(step, [])))
         if step % 2:
             snapshots.append(
-                observer.snapshot(paused=False, speed=1.0, achieved=1.0, recorded_bytes=0, finished="")
+                observer.build_snapshot(
+                    paused=False, speed=1.0, achieved_speed=1.0, recorded_bytes=0, finished=""
+                )
             )
-    app, link = make_app([facts, *snapshots[:9]], small_map)
+    app, connection = make_app([facts, *snapshots[:9]], small_map)
     async with app.run_test(size=(160, 48)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         behaviors = shown(app.query_one("#behaviors"))
         assert "▌push" in behaviors
         assert "▌twitch" in behaviors

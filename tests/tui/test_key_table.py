@@ -8,7 +8,7 @@ from pdtui.core.errors import MapError
 from pdtui.core.events import Event, describe_event
 from pdtui.core.key_table import EVENT_WORDINGS, FIXED_KEYS, RUN_KEYS, FixedKey
 from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.keystrokes import key_event, run_keys
+from pdtui.drive.keystrokes import interpret_key, run_keys
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.map_reader import parse_map
@@ -39,7 +39,7 @@ def test_a_map_may_not_use_the_key(row: FixedKey, map_text: str) -> None:
 def test_a_key_that_changes_a_run_makes_its_event(
     row: FixedKey, driven: ControlLoop, small_map: StimulationMap
 ) -> None:
-    event = key_event(row.key, driven)
+    event = interpret_key(row.key, driven)
     assert isinstance(event, Event)
     assert (event.kind, event.key, event.step) == (row.event, row.key, driven.step)
     assert row.key in run_keys(small_map)
@@ -53,9 +53,9 @@ def test_every_event_is_worded() -> None:
 
 
 async def test_the_help_lists_every_key_with_its_sentence(make_app: MakeApp) -> None:
-    app, link = make_app()
+    app, connection = make_app()
     async with app.run_test(size=(120, 60)) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         await pilot.press("question_mark")
         assert isinstance(app.screen, HelpScreen)
         lines = [strip.text for strip in app.screen._compositor.render_strips()]

@@ -7,22 +7,24 @@ from pathlib import Path
 from textual.widgets import OptionList
 
 from pdtui.stimulation.map_library import ListedMap
-from pdtui.tui.map_picker import PickerApp, PickerRow, picker_rows
+from pdtui.tui.map_picker import MapPickerApp, MapPickerRow, map_picker_rows
 from tests.tui.recorded_snapshots import drive_map
 
 ROWS = [
-    PickerRow("ant", "", "maps/broken.toml", problem="maps/broken.toml: line 3: [b]behaviors[/b] is missing"),
-    PickerRow("ant", "Ant (MuJoCo)", "maps/ant.toml", "ant_sac", 5),
-    PickerRow("walker", "Walker", "maps/walker.toml", "walker_sac", 1),
+    MapPickerRow(
+        "ant", "", "maps/broken.toml", problem="maps/broken.toml: line 3: [b]behaviors[/b] is missing"
+    ),
+    MapPickerRow("ant", "Ant (MuJoCo)", "maps/ant.toml", "ant_sac", 5),
+    MapPickerRow("walker", "Walker", "maps/walker.toml", "walker_sac", 1),
 ]
 
 
-def listed(app: PickerApp) -> list[str]:
+def listed(app: MapPickerApp) -> list[str]:
     return [str(option.prompt) for option in app.query_one(OptionList).options]
 
 
 async def test_the_first_whole_map_is_marked_and_enter_takes_it() -> None:
-    app = PickerApp(ROWS)
+    app = MapPickerApp(ROWS)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("enter")
     assert app.return_value == ROWS[1]
@@ -30,14 +32,14 @@ async def test_the_first_whole_map_is_marked_and_enter_takes_it() -> None:
 
 
 async def test_arrows_move_past_a_broken_map() -> None:
-    app = PickerApp([ROWS[1], ROWS[0], ROWS[2]])
+    app = MapPickerApp([ROWS[1], ROWS[0], ROWS[2]])
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("down", "enter")
     assert app.return_value == ROWS[2]
 
 
 async def test_a_broken_map_shows_its_error_and_cannot_be_chosen() -> None:
-    app = PickerApp(ROWS[:1])
+    app = MapPickerApp(ROWS[:1])
     async with app.run_test(size=(80, 24)) as pilot:
         assert "line 3: [b]behaviors[/b] is missing" in listed(app)[0]
         await pilot.press("enter")
@@ -47,7 +49,7 @@ async def test_a_broken_map_shows_its_error_and_cannot_be_chosen() -> None:
 
 
 async def test_typing_filters() -> None:
-    app = PickerApp(ROWS)
+    app = MapPickerApp(ROWS)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press(*"walk")
         await pilot.pause()
@@ -57,7 +59,7 @@ async def test_typing_filters() -> None:
 
 
 async def test_a_filter_that_matches_nothing_says_so() -> None:
-    app = PickerApp(ROWS)
+    app = MapPickerApp(ROWS)
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press(*"zzz", "enter")
         await pilot.pause()
@@ -71,6 +73,6 @@ def test_rows_of_maps_as_they_are_found() -> None:
         ListedMap(Path("maps/ant.toml"), drive_map()),
         ListedMap(Path("maps/x.toml"), None, "it is empty"),
     ]
-    good, bad = picker_rows(maps)
+    good, bad = map_picker_rows(maps)
     assert (good.robot, good.policy, good.behaviors, good.problem) == ("ant", "ant_sac", 5, "")
     assert (str(bad), bad.problem) == ("maps/x.toml", "it is empty")

@@ -10,8 +10,8 @@ import pytest
 from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.sessions.episode_statistics import EpisodeStatistics
 from pdtui.tui.braille_canvas import BrailleCanvas
-from pdtui.tui.camera import Camera
 from pdtui.tui.obstacle_drawing import draw_from_above, draw_from_side
+from pdtui.tui.perspective_camera import PerspectiveCamera
 from pdtui.tui.widgets.robot_view import RobotView
 from tests.tui.conftest import MakeApp
 from tests.tui.screens import notice, played, shown
@@ -23,7 +23,7 @@ TALLY = EpisodeStatistics(episode=12, steps=8000, involvement=1400, distance=-12
 
 def test_a_disc_has_the_radius_of_its_obstacle() -> None:
     canvas = BrailleCanvas(40, 20)
-    camera = Camera((0.0, 0.0, 0.0), 90.0, 100.0, 10.0, (40.0, 40.0))
+    camera = PerspectiveCamera((0.0, 0.0, 0.0), 90.0, 100.0, 10.0, (40.0, 40.0))
     canvas.dots[:] = True  # a ground as dense as can be
     draw_from_above(canvas, camera, np.array([[1.0, 2.0, 0.6], [50.0, 0.0, 1.0]]), INK)
     rows, columns = np.nonzero(canvas.inks == INK)
@@ -34,7 +34,7 @@ def test_a_disc_has_the_radius_of_its_obstacle() -> None:
 
 
 def test_a_trunk_before_the_robot_hides_nothing() -> None:
-    camera = Camera((0.0, 0.0, 0.0), 14.0, 1.0, 20.0, (40.0, 40.0))
+    camera = PerspectiveCamera((0.0, 0.0, 0.0), 14.0, 1.0, 20.0, (40.0, 40.0))
     filled = []
     for y in (1.0, -1.0):
         canvas = BrailleCanvas(40, 20)
@@ -53,9 +53,9 @@ async def test_a_drive_among_obstacles_begins_from_above(
     x, y = first.poses[0, :2]
     ahead = np.array([[x + 6.0, y + 0.5, 0.3]])
     messages = [facts, replace(first, obstacles=ahead), *rest[:2]]
-    app, link = make_app(messages)
+    app, connection = make_app(messages)
     async with app.run_test(size=size) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         robot = app.query_one(RobotView)
         assert robot.view == "above"
         palette = robot.palette
@@ -67,8 +67,8 @@ async def test_a_drive_among_obstacles_begins_from_above(
         ]
         assert any(inks), "what is 6 m ahead of an Ant is in the picture"
         await pilot.press("v")
-        link.messages.append(replace(rest[2], obstacles=ahead + 1.0))
-        await played(pilot, link)
+        connection.messages.append(replace(rest[2], obstacles=ahead + 1.0))
+        await played(pilot, connection)
         chosen: str = robot.view
         assert chosen == "side", "what the user chose stays"
 
@@ -78,10 +78,10 @@ async def test_counters_are_whole_at_every_size(
     make_app: MakeApp, drive: Drive, size: tuple[int, int]
 ) -> None:
     facts, snapshots = drive
-    app, link = make_app([facts, replace(snapshots[0], tally=TALLY)])
+    app, connection = make_app([facts, replace(snapshots[0], statistics=TALLY)])
     counters = "episode 12: −123.4 m · 12 collisions · 1400 steps with a key (17.5 %)"
     async with app.run_test(size=size) as pilot:
-        await played(pilot, link)
+        await played(pilot, connection)
         line = notice(app)
         assert line.rstrip().endswith(counters)
         assert len(line) == size[0]
@@ -89,8 +89,10 @@ async def test_counters_are_whole_at_every_size(
         await pilot.pause(0.05)
         assert "what must be read " * 3 in notice(app)
         assert (counters in notice(app)) == (size[0] > 100)
-        link.messages.append(replace(snapshots[1], tally=replace(TALLY, distance=None, collisions=None)))
-        await played(pilot, link)
+        connection.messages.append(
+            replace(snapshots[1], statistics=replace(TALLY, distance=None, collisions=None))
+        )
+        await played(pilot, connection)
         app.notice = ""
         await pilot.pause(0.05)
         assert f"{snapshots[1].involvement} steps with a key" in notice(app)

@@ -10,8 +10,8 @@ import pytest
 from textual.pilot import Pilot
 
 from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
-from pdtui.tui.map_picker import PickerApp
-from tests.tui.conftest import MakeApp, ScriptedLink
+from pdtui.tui.map_picker import MapPickerApp
+from tests.tui.conftest import MakeApp, ScriptedConnection
 from tests.tui.screens import played
 from tests.tui.test_map_picker import ROWS
 
@@ -19,9 +19,9 @@ Compare = Callable[..., bool]
 SMALL, LARGE = (80, 24), (160, 48)
 
 
-def after(link: ScriptedLink, *keys: str) -> Callable[[Pilot[Any]], Awaitable[None]]:
+def after(connection: ScriptedConnection, *keys: str) -> Callable[[Pilot[Any]], Awaitable[None]]:
     async def run(pilot: Pilot[Any]) -> None:
-        await played(pilot, link)
+        await played(pilot, connection)
         await pilot.press(*keys)
         await pilot.pause(0.05)
 
@@ -37,13 +37,13 @@ def test_loading(snap_compare: Compare, make_app: MakeApp, size: tuple[int, int]
 @pytest.mark.parametrize("size", [SMALL, LARGE], ids=["small", "large"])
 @pytest.mark.parametrize("snapshots", [64, 120], ids=["period", "controller"])
 def test_driving(snap_compare: Compare, make_app: MakeApp, size: tuple[int, int], snapshots: int) -> None:
-    app, link = make_app(snapshots)
-    assert snap_compare(app, terminal_size=size, run_before=after(link))
+    app, connection = make_app(snapshots)
+    assert snap_compare(app, terminal_size=size, run_before=after(connection))
 
 
 def test_from_above(snap_compare: Compare, make_app: MakeApp) -> None:
-    app, link = make_app(64)
-    assert snap_compare(app, terminal_size=LARGE, run_before=after(link, "v"))
+    app, connection = make_app(64)
+    assert snap_compare(app, terminal_size=LARGE, run_before=after(connection, "v"))
 
 
 def test_over(
@@ -51,19 +51,19 @@ def test_over(
 ) -> None:
     facts, snapshots = drive
     last = replace(snapshots[40], finished="the simulation diverged", paused=True)
-    app, link = make_app([facts, *snapshots[:40], last])
-    assert snap_compare(app, terminal_size=SMALL, run_before=after(link))
+    app, connection = make_app([facts, *snapshots[:40], last])
+    assert snap_compare(app, terminal_size=SMALL, run_before=after(connection))
 
 
 def test_help(snap_compare: Compare, make_app: MakeApp) -> None:
-    app, link = make_app(4)
-    assert snap_compare(app, terminal_size=SMALL, run_before=after(link, "question_mark"))
+    app, connection = make_app(4)
+    assert snap_compare(app, terminal_size=SMALL, run_before=after(connection, "question_mark"))
 
 
 def test_too_small(snap_compare: Compare, make_app: MakeApp) -> None:
-    app, link = make_app(4)
-    assert snap_compare(app, terminal_size=(70, 20), run_before=after(link))
+    app, connection = make_app(4)
+    assert snap_compare(app, terminal_size=(70, 20), run_before=after(connection))
 
 
 def test_picker(snap_compare: Compare) -> None:
-    assert snap_compare(PickerApp(ROWS), terminal_size=SMALL)
+    assert snap_compare(MapPickerApp(ROWS), terminal_size=SMALL)

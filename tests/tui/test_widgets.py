@@ -8,17 +8,17 @@ from rich import filesize
 
 from pdtui.core.printable_text import make_printable
 from pdtui.core.step_record import ActiveBehavior
-from pdtui.tui.camera import Camera, round_length
 from pdtui.tui.cell_text import fit_cells, format_number, format_signed, wrap_text
 from pdtui.tui.path_trail import MOST_POINTS, PathTrail
+from pdtui.tui.perspective_camera import PerspectiveCamera, round_length_down
 from pdtui.tui.sparkline import AttributeHistory, draw_sparklines
 from pdtui.tui.unit_owners import unit_owners
-from pdtui.tui.widgets.heat_strip import UnitGrid, shares
+from pdtui.tui.widgets.activation_heatmap import UnitGrid, layer_rows
 from tests.tui.recorded_snapshots import drive_map
 
 
 def test_from_the_side_x_is_right_and_z_is_up() -> None:
-    camera = Camera((1.0, 2.0, 0.5), 0.0, 1.0, 10.0, (50.0, 20.0))
+    camera = PerspectiveCamera((1.0, 2.0, 0.5), 0.0, 1.0, 10.0, (50.0, 20.0))
     dots, magnification, before = camera.project(
         np.array([[1.0, 2.0, 0.5], [2.0, 2.0, 0.5], [1.0, 2.0, 1.5]])
     )
@@ -28,13 +28,13 @@ def test_from_the_side_x_is_right_and_z_is_up() -> None:
 
 
 def test_from_above_x_is_right_and_y_is_up() -> None:
-    camera = Camera((0.0, 0.0, 0.0), 90.0, 1.0, 10.0, (50.0, 20.0))
+    camera = PerspectiveCamera((0.0, 0.0, 0.0), 90.0, 1.0, 10.0, (50.0, 20.0))
     dots, _, _ = camera.project(np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
     assert dots.ravel() == pytest.approx([60.0, 20.0, 50.0, 10.0])
 
 
 def test_what_is_farther_away_is_smaller_and_what_is_behind_is_left_out() -> None:
-    camera = Camera((0.0, 0.0, 0.0), 0.0, 1.0, 10.0, (0.0, 0.0))
+    camera = PerspectiveCamera((0.0, 0.0, 0.0), 0.0, 1.0, 10.0, (0.0, 0.0))
     dots, magnification, before = camera.project(np.array([[1.0, 6.0, 0.0], [1.0, -7.0, 0.0]]))
     assert magnification[0] == pytest.approx(0.5)
     assert dots[0, 0] == pytest.approx(5.0)
@@ -44,7 +44,7 @@ def test_what_is_farther_away_is_smaller_and_what_is_behind_is_left_out() -> Non
 
 @pytest.mark.parametrize(("length", "rounded"), [(1.0, 1.0), (1.9, 1.0), (2.0, 2.0), (49.0, 20.0)])
 def test_round_lengths(length: float, rounded: float) -> None:
-    assert round_length(length) == pytest.approx(rounded)
+    assert round_length_down(length) == pytest.approx(rounded)
 
 
 def walk(first: int, last: int) -> np.ndarray:
@@ -69,16 +69,16 @@ def test_a_restart_begins_a_new_path_and_keeps_the_old_one() -> None:
     trail = PathTrail()
     trail.extend(walk(0, 5), restarted=False)
     trail.extend(walk(100, 103), restarted=True)
-    starts, ends, _ = trail.pieces()
+    starts, ends, _ = trail.line_segments()
     assert starts[:, 0] == pytest.approx([10.0, 10.1])
     assert ends[:, 0] == pytest.approx([10.1, 10.2])
-    assert len(trail.pieces(past=True)[0]) == 4
+    assert len(trail.line_segments(past=True)[0]) == 4
 
 
 def test_a_jump_is_not_drawn() -> None:
     trail = PathTrail()
     trail.extend(np.array([[0, 0, 0], [0.5, 0, 0], [9, 0, 1], [9.5, 0, 1]], float), restarted=False)
-    starts, _, rows = trail.pieces()
+    starts, _, rows = trail.line_segments()
     assert starts[:, 0].tolist() == [0.0, 9.0]
     assert rows.tolist() == [0, 1]
 
@@ -141,9 +141,9 @@ def test_a_unit_is_where_its_mark_is(units: int) -> None:
 
 
 def test_lines_are_shared_out_between_layers() -> None:
-    assert shares(2, 2) == [(0, 1), (1, 1)]
-    assert shares(2, 8) == [(0, 4), (4, 4)]
-    assert shares(3, 2) == [(0, 1), (1, 1), (2, 0)]
+    assert layer_rows(2, 2) == [(0, 1), (1, 1)]
+    assert layer_rows(2, 8) == [(0, 4), (4, 4)]
+    assert layer_rows(3, 2) == [(0, 1), (1, 1), (2, 0)]
 
 
 def test_the_behavior_latched_last_owns_a_shared_unit() -> None:

@@ -15,7 +15,7 @@ from pdtui.core.errors import PdtuiError, PolicyError, SessionError
 from pdtui.core.worker_pool import WorkerPool
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless import build_loop
+from pdtui.drive.loop_builder import build_loop
 from pdtui.paper.forest.forest_episode import (
     FOREST,
     ROUGH,

@@ -12,8 +12,8 @@ from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import SessionError
 from pdtui.core.events import Event
 from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.headless import key_events
-from pdtui.drive.keystrokes import write_keystrokes
+from pdtui.drive.headless_drive import key_events
+from pdtui.drive.keystrokes import format_keystrokes
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
 from pdtui.paper.forest.scripted_operator import DEFAULT, ScriptedOperator, operator_keys
 from pdtui.robots.legged.terrain import AHEAD
@@ -106,7 +106,7 @@ def record_forest_episode(
         raise SessionError(f"{path}: exists already; a drive is recorded into a new file")
     with SessionRecorder(path, replace(loop.info, activations=activations)) as recorder:
         run, events = drive_forest_episode(loop, steps, operator, recorder)
-    write_file(path.with_suffix(".keys"), write_keystrokes(events), SessionError)
+    write_file(path.with_suffix(".keys"), format_keystrokes(events), SessionError)
     return run
 
 

@@ -11,7 +11,7 @@ from textual.strip import Strip
 from pdtui.core.printable_text import make_printable
 from pdtui.drive.drive_snapshot import DriveSnapshot
 from pdtui.tui.cell_text import ScreenRow, format_number
-from pdtui.tui.panel import Panel
+from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.sparkline import AttributeHistory, draw_sparklines
 
 _SECONDS = 12.0
@@ -20,7 +20,7 @@ _VALUE, _UNIT, _TARGET = 7, 5, 10
 _FORCES = ("N", "N m", "Nm")
 
 
-class AttributeTable(Panel):
+class AttributeTable(SnapshotWidget):
     """One attribute a line; where there is no room for all, forces and torques go first."""
 
     _history: AttributeHistory | None = None

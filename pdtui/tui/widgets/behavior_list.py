@@ -10,7 +10,7 @@ from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
 from pdtui.tui.cell_text import ScreenRow, format_number, format_signed, key_name, wrap_text
-from pdtui.tui.panel import Panel
+from pdtui.tui.snapshot_widget import SnapshotWidget
 
 if TYPE_CHECKING:
     from pdtui.core.step_record import ActiveBehavior
@@ -20,7 +20,7 @@ _BAR = 10
 _BLOCKS = " ▏▎▍▌▋▊▉"
 
 
-class BehaviorList(Panel):
+class BehaviorList(SnapshotWidget):
     """Two lines a behavior where there is room, else one; latched ones are always in sight."""
 
     def on_mount(self) -> None:

@@ -10,17 +10,17 @@ from textual.strip import Strip
 from pdtui.drive.drive_snapshot import DriveSnapshot
 from pdtui.robots.geometry import root_body, rotate
 from pdtui.tui.braille_canvas import BrailleCanvas
-from pdtui.tui.camera import Floats, round_length
 from pdtui.tui.cell_text import format_number
-from pdtui.tui.panel import Panel
 from pdtui.tui.path_trail import PathTrail
+from pdtui.tui.perspective_camera import Floats, round_length_down
+from pdtui.tui.snapshot_widget import SnapshotWidget
 
 _ARROWS = "→↗↑↖←↙↓↘"
 _LEAST_SIZE = 2.0
 _PAST, _NONE, _MARK, _LABEL, _FIRST_BEHAVIOR = range(5)
 
 
-class PathView(Panel):
+class PathView(SnapshotWidget):
     """North is +y, right is +x; the whole of the present path is always in the picture."""
 
     def on_mount(self) -> None:
@@ -50,17 +50,19 @@ class PathView(Panel):
             dots: Floats = centre + (world - middle) * np.array([zoom, -zoom])
             return dots
 
-        old_starts, old_ends, _ = self.trail.pieces(past=True)
-        canvas.segments(place(old_starts), place(old_ends), _PAST)
-        starts, ends, rows = self.trail.pieces()
+        old_starts, old_ends, _ = self.trail.line_segments(past=True)
+        canvas.draw_segments(place(old_starts), place(old_ends), _PAST)
+        starts, ends, rows = self.trail.line_segments()
         count = len(self.palette.behaviors)
         inks = np.where(rows < 0, _NONE, _FIRST_BEHAVIOR + rows % count).astype(np.int16)
-        canvas.segments(place(starts), place(ends), inks)
+        canvas.draw_segments(place(starts), place(ends), inks)
         self._mark(canvas, place(points[0, :2]), "○")
         self._mark(canvas, place(self._here), _ARROWS[round(self._heading / (pi / 4)) % 8])
         self._draw_scale(canvas, zoom)
         palette = self.palette
-        return canvas.strips([palette.faint, palette.text, palette.accent, palette.muted, *palette.behaviors])
+        return canvas.render_strips(
+            [palette.faint, palette.text, palette.accent, palette.muted, *palette.behaviors]
+        )
 
     def _frame(self, canvas: BrailleCanvas, points: Floats) -> tuple[Floats, float]:
         """Middle of the picture in m, and dots per m.
@@ -77,10 +79,10 @@ class PathView(Panel):
         return middle, zoom
 
     def _mark(self, canvas: BrailleCanvas, dot: Floats, character: str) -> None:
-        canvas.text(int(dot[0]) // 2, int(dot[1]) // 4, character, _MARK)
+        canvas.draw_text(int(dot[0]) // 2, int(dot[1]) // 4, character, _MARK)
 
     def _draw_scale(self, canvas: BrailleCanvas, zoom: float) -> None:
-        length = round_length(max(canvas.columns // 3, 4) * 2 / zoom)
+        length = round_length_down(max(canvas.columns // 3, 4) * 2 / zoom)
         cells = max(2, round(length * zoom / 2))
         label = format_number(length).removesuffix(".00") + " m"
-        canvas.text(0, canvas.rows - 1, "├" + "─" * (cells - 2) + "┤ " + label, _LABEL)
+        canvas.draw_text(0, canvas.rows - 1, "├" + "─" * (cells - 2) + "┤ " + label, _LABEL)

@@ -13,10 +13,10 @@ from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.drive.drive_snapshot import DriveSnapshot
 from pdtui.robots.geometry import capsule_ends, place_links, root_body, rotate
 from pdtui.tui.braille_canvas import BrailleCanvas
-from pdtui.tui.camera import Camera, Floats, round_length
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.obstacle_drawing import draw_from_above, draw_from_side
-from pdtui.tui.panel import Panel
+from pdtui.tui.perspective_camera import Floats, PerspectiveCamera, round_length_down
+from pdtui.tui.snapshot_widget import SnapshotWidget
 
 View = Literal["side", "above"]
 _ELEVATION: dict[View, float] = {"side": 14.0, "above": 90.0}
@@ -33,7 +33,7 @@ _ARROW = 0.5
 _BOX_EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1]
 
 
-class RobotView(Panel):
+class RobotView(SnapshotWidget):
     """The robot from the side (x to the right, z up) or from above (x to the right, y up).
 
     Among obstacles, the view from above is the first, reaches farther and shows more of what is ahead.
@@ -75,8 +75,8 @@ class RobotView(Panel):
         placed = place_links(self.facts.links, self.snapshot.poses)
         ends = capsule_ends(self.facts.links, placed)
         if not np.isfinite(ends).all():
-            canvas.text(1, height // 2, "the robot's pose is not finite", _LABEL)
-            return canvas.strips(self._styles())
+            canvas.draw_text(1, height // 2, "the robot's pose is not finite", _LABEL)
+            return canvas.render_strips(self._styles())
         root = self.snapshot.poses[root_body(self.facts.links)]
         camera = self._camera(canvas, root, ends)
         self._draw_ground(canvas, camera, root)
@@ -91,8 +91,8 @@ class RobotView(Panel):
             draw_from_side(canvas, camera, self._obstacles, _OBSTACLE, behind=False)
         x, y, z = (format_number(float(value)) for value in root[:3])
         place = f"x {x}  y {y}  z {z} m"
-        canvas.text(width - len(place), height - 1, place, _LABEL)
-        return canvas.strips(self._styles())
+        canvas.draw_text(width - len(place), height - 1, place, _LABEL)
+        return canvas.render_strips(self._styles())
 
     def _loading(self, width: int, height: int) -> list[Strip]:
         blank = [Strip.blank(width)] * max(0, height // 2 - 1)
@@ -121,7 +121,7 @@ class RobotView(Panel):
             *palette.depth,
         ]
 
-    def _camera(self, canvas: BrailleCanvas, root: Floats, ends: Floats) -> Camera:
+    def _camera(self, canvas: BrailleCanvas, root: Floats, ends: Floats) -> PerspectiveCamera:
         """Far enough away for the widest stretch that the robot has shown so far."""
         assert self.facts is not None
         radii = np.array([_radius(link.size) for link in self.facts.links])
@@ -132,18 +132,20 @@ class RobotView(Panel):
             zoom = min(canvas.width / _AHEAD, canvas.height / _ASIDE) / extent
             seen = np.array([canvas.width, canvas.height]) / zoom
             x, y = root[:2] + _FORWARD * seen * self._ahead
-            return Camera((float(x), float(y), 0.0), 90.0, _AHEAD / 2 * extent, zoom, centre)
+            return PerspectiveCamera((float(x), float(y), 0.0), 90.0, _AHEAD / 2 * extent, zoom, centre)
         if self.view == "above":
             zoom = min(canvas.width, canvas.height) / (2.5 * extent)
             middle = (float(root[0]), float(root[1]), 0.0)
-            return Camera(middle, 90.0, extent, zoom, centre)
+            return PerspectiveCamera(middle, 90.0, extent, zoom, centre)
         zoom = min(canvas.width / (2.15 * extent), canvas.height / (1.5 * extent))
         middle = (float(root[0]), float(root[1]), 0.45 * extent)
-        return Camera(middle, _ELEVATION["side"], extent, zoom, (canvas.width / 2, canvas.height * 0.47))
+        return PerspectiveCamera(
+            middle, _ELEVATION["side"], extent, zoom, (canvas.width / 2, canvas.height * 0.47)
+        )
 
-    def _draw_ground(self, canvas: BrailleCanvas, camera: Camera, root: Floats) -> None:
+    def _draw_ground(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
         """A grid fixed to the world, so that its lines pass when the robot moves."""
-        cell = round_length(camera.extent)
+        cell = round_length_down(camera.extent)
         reach = 9 if self.view == "side" else 6
         middle = np.round(root[:2] / cell)
         lines = np.arange(-reach, reach + 1)
@@ -157,15 +159,15 @@ class RobotView(Panel):
             before &= magnification > _FARTHEST
             ink = np.where(np.isclose(fixed, 0.0), _AXIS, _GROUND).astype(np.int16)
             inks = np.broadcast_to(ink[:, None], before.shape)[before]
-            canvas.points(dots[before][:, 0], dots[before][:, 1], inks)
+            canvas.draw_points(dots[before][:, 0], dots[before][:, 1], inks)
 
-    def _draw_shadow(self, canvas: BrailleCanvas, camera: Camera, ends: Floats) -> None:
+    def _draw_shadow(self, canvas: BrailleCanvas, camera: PerspectiveCamera, ends: Floats) -> None:
         flat = ends * np.array([1.0, 1.0, 0.0])
         dots, _, before = camera.project(flat)
         kept = before.all(axis=-1)
-        canvas.segments(dots[kept, 0], dots[kept, 1], _SHADOW)
+        canvas.draw_segments(dots[kept, 0], dots[kept, 1], _SHADOW)
 
-    def _draw_heading(self, canvas: BrailleCanvas, camera: Camera, root: Floats) -> None:
+    def _draw_heading(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
         """Where the robot's own x axis points, as an arrow on the ground."""
         x, y = _heading(root)
         if not (x or y):
@@ -179,9 +181,11 @@ class RobotView(Panel):
         lines = np.array([[tail, tip], [tip, barbs[0]], [tip, barbs[1]]])
         dots, _, before = camera.project(lines)
         if before.all():
-            canvas.segments(dots[:, 0], dots[:, 1], _HEADING)
+            canvas.draw_segments(dots[:, 0], dots[:, 1], _HEADING)
 
-    def _draw_links(self, canvas: BrailleCanvas, camera: Camera, placed: Floats, ends: Floats) -> None:
+    def _draw_links(
+        self, canvas: BrailleCanvas, camera: PerspectiveCamera, placed: Floats, ends: Floats
+    ) -> None:
         """Far links first and darker, near ones over them."""
         assert self.facts is not None
         dots, magnification, before = camera.project(ends)
@@ -196,16 +200,21 @@ class RobotView(Panel):
                 self._draw_box(canvas, camera, placed[row], link.size, ink)
                 continue
             thick = link.size[0] * float(magnification[row].mean()) * camera.zoom
-            canvas.capsule(dots[row, 0], dots[row, 1], thick, ink, halo=1.0)
+            canvas.draw_capsule(dots[row, 0], dots[row, 1], thick, ink, halo=1.0)
 
     def _draw_box(
-        self, canvas: BrailleCanvas, camera: Camera, pose: Floats, size: tuple[float, ...], ink: int
+        self,
+        canvas: BrailleCanvas,
+        camera: PerspectiveCamera,
+        pose: Floats,
+        size: tuple[float, ...],
+        ink: int,
     ) -> None:
         signs = np.array([[(corner >> axis & 1) * 2 - 1 for axis in range(3)] for corner in range(8)])
         dots, _, before = camera.project(pose[:3] + rotate(pose[3:], signs * np.array(size)))
         if before.all():
             edges = np.array(_BOX_EDGES)
-            canvas.segments(dots[edges[:, 0]], dots[edges[:, 1]], ink)
+            canvas.draw_segments(dots[edges[:, 0]], dots[edges[:, 1]], ink)
 
 
 def _heading(root: Floats) -> Floats:

@@ -13,13 +13,13 @@ from textual.strip import Strip
 from pdtui.core.printable_text import make_printable
 from pdtui.sessions.episode_statistics import NO_STATISTICS
 from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number
-from pdtui.tui.panel import Panel
+from pdtui.tui.snapshot_widget import SnapshotWidget
 
 _NAME = 40
 Part = tuple[str, Style]
 
 
-class StatusLine(Panel):
+class StatusLine(SnapshotWidget):
     """Robot on the left, state of the drive on the right; what matters less is left out first."""
 
     watching: reactive[bool] = reactive(False, init=False, repaint=False)
@@ -79,11 +79,14 @@ class StatusLine(Panel):
         asked = f"{snapshot.speed:g}×"
         if snapshot.paused:
             return f"{kind}⏸ paused at {asked}", palette.warn
-        slow = snapshot.achieved < 0.93 * snapshot.speed
-        return f"{kind}▶ {asked} ({format_number(snapshot.achieved)})", palette.warn if slow else palette.good
+        slow = snapshot.achieved_speed < 0.93 * snapshot.speed
+        return (
+            f"{kind}▶ {asked} ({format_number(snapshot.achieved_speed)})",
+            palette.warn if slow else palette.good,
+        )
 
 
-class NoticeLine(Panel):
+class NoticeLine(SnapshotWidget):
     """What the user should read now; the end of the drive stays."""
 
     notice: reactive[str] = reactive("", init=False, repaint=False)
@@ -117,15 +120,15 @@ class NoticeLine(Panel):
 
     def _counters(self) -> str:
         """How the episode stands, for a robot with a way to go or obstacles to run into."""
-        tally = self.snapshot.tally if self.snapshot is not None else NO_STATISTICS
-        shown = [] if tally.distance is None else [f"{format_number(tally.distance)} m"]
-        if tally.collisions is not None:
-            shown.append(f"{tally.collisions:g} collision{'' if tally.collisions == 1.0 else 's'}")
+        statistics = self.snapshot.statistics if self.snapshot is not None else NO_STATISTICS
+        shown = [] if statistics.distance is None else [f"{format_number(statistics.distance)} m"]
+        if statistics.collisions is not None:
+            shown.append(f"{statistics.collisions:g} collision{'' if statistics.collisions == 1.0 else 's'}")
         if not shown:
             return ""
-        steps = "1 step" if tally.involvement == 1 else f"{tally.involvement} steps"
-        keyed = f"{steps} with a key ({100.0 * tally.share:.1f} %)"
-        return f"episode {tally.episode}: {' · '.join([*shown, keyed])}"
+        steps = "1 step" if statistics.involvement == 1 else f"{statistics.involvement} steps"
+        keyed = f"{steps} with a key ({100.0 * statistics.share:.1f} %)"
+        return f"episode {statistics.episode}: {' · '.join([*shown, keyed])}"
 
     def _summary(self) -> str:
         """What is there to say when nothing happened."""
@@ -140,7 +143,7 @@ class NoticeLine(Panel):
         return f"seed {facts.seed} · episode {self.snapshot.episode} · {keyed} · {place}"
 
 
-class KeyLine(Panel):
+class KeyLine(SnapshotWidget):
     """The application's own keys, as far as there is room."""
 
     keys: reactive[tuple[tuple[str, str], ...]] = reactive((), init=False, repaint=False)

@@ -8,14 +8,14 @@ from textual.strip import Strip
 from pdtui.core.printable_text import make_printable
 from pdtui.core.units import format_unit
 from pdtui.tui.cell_text import ScreenRow, format_number
-from pdtui.tui.panel import Panel
+from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.unit_owners import unit_owners
 
 _NUMBER = 8
 _ADDRESS = 8
 
 
-class UnitTable(Panel):
+class UnitTable(SnapshotWidget):
     """One unit a line, in the colour of the behavior that overwrites it."""
 
     def on_mount(self) -> None:

@@ -15,8 +15,9 @@ from pdtui.cli import main
 from pdtui.core.errors import MapError, PdtuiError, SessionError, WorkerError
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless import build_loop, drive_headless
+from pdtui.drive.headless_drive import drive_headless
 from pdtui.drive.keystrokes import read_keystrokes
+from pdtui.drive.loop_builder import build_loop
 from pdtui.drive.replay import replay_session
 from pdtui.paper.forest.forest_conditions import PERSON, REPEATS, evaluate_forest
 from pdtui.paper.forest.forest_episode import (

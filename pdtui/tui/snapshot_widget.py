@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Sides = tuple[Strip, Strip, Color, Style]
 
 
-class Panel(Widget, can_focus=False, inherit_bindings=False):
+class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
     """Paints whole lines and repaints only those that changed, without ever touching the layout.
 
     Args:

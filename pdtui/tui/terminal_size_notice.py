@@ -17,7 +17,7 @@ def is_too_small(size: Size) -> bool:
     return size.width < LEAST.width or size.height < LEAST.height
 
 
-class SizeNotice(Widget, can_focus=False):
+class TerminalSizeNotice(Widget, can_focus=False):
     """Says what size is needed and what there is; the drive goes on meanwhile."""
 
     def render_line(self, y: int) -> Strip:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -18,14 +17,7 @@ from pdtui.core.errors import (
 from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
 from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.keystrokes import key_meanings
-from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.runtime.policy_fit import check_fit
-from pdtui.policies.weights.import_options import WorldSpaces
-from pdtui.policies.weights.policy_loading import load_policy
-from pdtui.robots import make_robot
-from pdtui.robots.robot import Robot
+from pdtui.drive.keystrokes import interpret_keys
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 
@@ -48,25 +40,6 @@ class DriveSummary:
     mean: dict[str, float]
 
 
-def build_loop(config: DriveConfig, robot: Robot | None = None, policy: Policy | None = None) -> ControlLoop:
-    """Load robot and policy, where they are not given, and set the loop at step 0.
-
-    Raises:
-        PdtuiError: the robot, the policy or the map cannot be had, or they do not fit each other.
-    """
-    robot, wanted = robot or make_robot(config.robot), config.stimulation_map
-    policy = policy or load_policy(
-        config.policy or wanted.policy,
-        config.robot,
-        import_options=wanted.import_options,
-        spaces=WorldSpaces.of_world(robot),
-        folders=(Path(wanted.source).parent,),
-    )
-    wanted.check(config.robot, policy.layers, policy.sha256, force=config.force)
-    check_fit(policy, robot, config.robot)
-    return ControlLoop(robot, policy, wanted, config.seed, stochastic=config.stochastic, start=config.start)
-
-
 def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:
     """The events of keys pressed before the loop's next step.
 
@@ -74,7 +47,7 @@ def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:
         EventError: a key means nothing in the present state.
     """
     events = []
-    for key, meaning in zip(keys, key_meanings(keys, loop), strict=True):
+    for key, meaning in zip(keys, interpret_keys(keys, loop), strict=True):
         if isinstance(meaning, str):
             raise KeystrokeError(f"step {loop.step}: key '{key}': {meaning}")
         events.append(meaning)

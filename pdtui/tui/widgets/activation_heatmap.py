@@ -16,14 +16,14 @@ from textual.strip import Strip
 from pdtui.core.units import format_unit, locate_unit
 from pdtui.drive.drive_snapshot import DriveSnapshot, StimulatedUnit
 from pdtui.tui.cell_text import ScreenRow, format_number
-from pdtui.tui.panel import Panel
+from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import HEAT_LEVELS
 from pdtui.tui.unit_owners import unit_owners
 
 _LABEL = 4
 
 
-class HeatStrip(Panel):
+class ActivationHeatmap(SnapshotWidget):
     """Half-blocks, two rows of pixels a line. Cold is negative, warm positive, dark is zero.
 
     The lines are shared out between the layers. Within its rows a layer runs down, then right; where a layer
@@ -55,7 +55,7 @@ class HeatStrip(Panel):
             return []
         columns = width - _LABEL
         lines = max(1, height - 1)
-        places = shares(len(self.facts.layers), lines * 2)
+        places = layer_rows(len(self.facts.layers), lines * 2)
         pixels = np.zeros((lines * 2, columns), np.int64)
         first = 0
         for layer, units in enumerate(self.facts.layers):
@@ -130,7 +130,7 @@ def _style(upper: Color | None, lower: Color | None) -> Style:
     )
 
 
-def shares(layers: int, rows: int) -> list[tuple[int, int]]:
+def layer_rows(layers: int, rows: int) -> list[tuple[int, int]]:
     """First pixel row and number of pixel rows of each layer; layers that find no room get none."""
     each = max(1, rows // layers)
     return [(layer * each, each if (layer + 1) * each <= rows else 0) for layer in range(layers)]

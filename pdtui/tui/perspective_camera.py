@@ -15,7 +15,7 @@ _NEAREST = 0.15
 
 
 @dataclass(frozen=True)
-class Camera:
+class PerspectiveCamera:
     """A perspective camera whose picture has world x to the right.
 
     Attributes:
@@ -63,7 +63,7 @@ class Camera:
         return away
 
 
-def round_length(length: float) -> float:
+def round_length_down(length: float) -> float:
     """The largest of 1, 2 or 5 times a power of ten that is not longer."""
     power = 10.0 ** np.floor(np.log10(length))
     for factor in (5.0, 2.0):
