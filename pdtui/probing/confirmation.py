@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from pdtui.core.attributes import Floats
 from pdtui.probing.effect_probe import EffectCurves, bootstrap_interval
@@ -170,11 +171,9 @@ def matching_hit_rate(
 
 def rank_correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Spearman's rank correlation, ties at their mean rank; NaN where one side does not vary."""
-    from scipy.stats import rankdata
-
     if len(a) < 2 or np.ptp(a) == 0 or np.ptp(b) == 0:
         return float("nan")
-    return float(np.corrcoef(rankdata(a), rankdata(b))[0, 1])
+    return float(stats.spearmanr(a, b).statistic)
 
 
 def exceeds_random(effect: float, value: float, column: int, screen: EffectCurves) -> bool:

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
-from pdtui.probing.rollout_journal import RolloutJournal, state_fingerprint
+from pdtui.probing.rollout_journal import RolloutJournal, fingerprint_start
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, RolloutPlan
 from pdtui.spectra.monitor import StartState, StepProgress
@@ -72,7 +73,7 @@ class EffectProber:
             WorkerError: a worker process died.
         """
         first = steps // 2 if measure_from is None else measure_from
-        keys = [(state_fingerprint(start), steps, first) for start in starts]
+        keys = [(fingerprint_start(start), steps, first) for start in starts]
         missing = [index for index, key in enumerate(keys) if key not in self._unperturbed]
         jobs: list[RolloutJob] = [(NO_STIMULATION, index) for index in missing]
         jobs += [(plan, index) for plan in plans for index in range(len(starts))]
@@ -224,6 +225,7 @@ def bootstrap_interval(
     known = known[np.isfinite(known)]
     if known.size < 2:
         return float("nan"), float("nan")
-    picks = np.random.default_rng(seed).integers(known.size, size=(draws, known.size))
-    low, high = np.quantile(known[picks].mean(axis=1), [(1 - level) / 2, (1 + level) / 2])
-    return float(low), float(high)
+    drawn = stats.bootstrap(
+        (known,), np.mean, n_resamples=draws, confidence_level=level, method="percentile", rng=seed
+    ).confidence_interval
+    return float(drawn.low), float(drawn.high)

@@ -1,4 +1,4 @@
-"""Roll-outs that were done, on disk: an interrupted dissection goes on where it was, without loss."""
+"""A file of finished roll-outs, from which an interrupted dissection goes on without loss."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from pdtui.core.closable import Closable
 from pdtui.core.errors import PdtuiError, RobotError
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome
+from pdtui.robots.simulators.python_state import digest_of
 from pdtui.spectra.monitor import StartState
 
 _SCHEMA = "CREATE TABLE IF NOT EXISTS rollouts (key BLOB PRIMARY KEY, outcome BLOB NOT NULL) WITHOUT ROWID"
@@ -60,7 +61,7 @@ class RolloutJournal(Closable):
         self, jobs: Sequence[RolloutJob], starts: Sequence[StartState], steps: int, measure_from: int
     ) -> list[bytes]:
         """One key a job."""
-        prints = [state_fingerprint(start) for start in starts]
+        prints = [fingerprint_start(start) for start in starts]
         length = f"{steps} {measure_from}".encode()
         return [
             blake2b(
@@ -78,7 +79,10 @@ class RolloutJournal(Closable):
         return found
 
     def write(self, keys: Sequence[bytes], outcomes: Sequence[RolloutOutcome]) -> None:
-        """Remember outcomes; they are on disk when this returns.
+        """Remember outcomes.
+
+        When this returns they survive the death of this process, but not of the machine: SQLite hands them to
+        the operating system and does not wait for the disk.
 
         Raises:
             PdtuiError: the disk is full or the file is gone.
@@ -91,12 +95,9 @@ class RolloutJournal(Closable):
             raise PdtuiError(f"{self.path}: cannot be written: {error}") from error
 
 
-def state_fingerprint(start: StartState) -> bytes:
-    """Hash of the state that a roll-out begins with."""
-    digest = blake2b(start.snapshot.state.tobytes(), digest_size=16)
-    for array in (*start.snapshot.extras, *start.policy_state):
-        digest.update(array.tobytes())
-    return digest.digest()
+def fingerprint_start(start: StartState) -> bytes:
+    """Return a hash of the whole state that a roll-out begins with: the robot's and the policy's."""
+    return digest_of(start.snapshot, start.policy_state).to_bytes(8, "little")
 
 
 def _encode(outcome: RolloutOutcome) -> bytes:

@@ -9,19 +9,15 @@ import numpy as np
 import scipy.fft
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.signal import get_window
 
 from pdtui.core.attributes import Floats
 
 Complexes = NDArray[np.complex128]
 Window = Literal["blackman", "hann", "hamming", "rectangular"]
 
-# Coefficients of the cosine terms; a constant fills as many bins from frequency 0 up.
-_COSINES: dict[Window, tuple[float, ...]] = {
-    "blackman": (0.42, -0.5, 0.08),
-    "hann": (0.5, -0.5),
-    "hamming": (0.54, -0.46),
-    "rectangular": (1.0,),
-}
+# A window is a sum of so many cosines, and a constant fills as many bins from frequency 0 up.
+_COSINE_TERMS: dict[Window, int] = {"blackman": 3, "hann": 2, "hamming": 2, "rectangular": 1}
 
 
 @dataclass(frozen=True)
@@ -69,9 +65,7 @@ class MatchingPreset:
     @property
     def weights(self) -> Floats:
         """The window divided by its sum, shape (length,)."""
-        angle = 2 * np.pi * np.arange(self.length) / self.length
-        terms = [part * np.cos(k * angle) for k, part in enumerate(_COSINES[self.window])]
-        window: Floats = np.sum(terms, axis=0)
+        window: Floats = get_window(self.window, self.length)
         window /= window.sum()
         return window
 
@@ -83,7 +77,7 @@ class MatchingPreset:
     @property
     def level_bins(self) -> int:
         """How many bins, from frequency 0 up, a constant fills with this window."""
-        return len(_COSINES[self.window])
+        return _COSINE_TERMS[self.window]
 
     @property
     def first_bin(self) -> int:
@@ -99,11 +93,6 @@ class MatchingPreset:
         """Frequency of each bin in Hz, shape (F,), for samples `dt` seconds apart."""
         frequencies: Floats = np.asarray(np.fft.rfftfreq(self.length, dt), np.float64)
         return frequencies
-
-
-def windows_of(steps: int, preset: MatchingPreset) -> int:
-    """How many whole windows lie in a series of so many samples."""
-    return max(0, (steps - preset.length) // preset.hop + 1)
 
 
 def short_time_transform(series: NDArray[Any], preset: MatchingPreset) -> Complexes:

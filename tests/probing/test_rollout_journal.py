@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,15 @@ def test_what_is_known_is_not_run_again_and_anything_else_is(policy_file: Path, 
         assert len(journal) == known + 2
         EffectProber(crew, journal).probe([plan], starts, steps=11)
         assert len(journal) == known + 6
+
+
+def test_starts_that_differ_only_in_their_random_generator_are_two(policy_file: Path, tmp_path: Path) -> None:
+    with RolloutPool("ant", policy_file, 1) as crew, RolloutJournal(tmp_path / "rollouts", "one") as journal:
+        (start,) = collect_start_states(crew.robot, crew.policy, 1000, 1, at=5, survive=20)
+        rng = np.random.default_rng(1).bit_generator.state
+        other = replace(start, snapshot=replace(start.snapshot, rng=rng))
+        EffectProber(crew, journal).probe([Stimulation((3,), (2.0,))], [start, other], steps=10)
+        assert len(journal) == crew.rollouts == 4
 
 
 def test_outcomes_keep_every_bit(tmp_path: Path) -> None:
