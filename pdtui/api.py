@@ -241,7 +241,7 @@ def replay(
         session: the file.
         robot: where the session's is not known by its name.
         policy: where the session's is not where its map says.
-        judging: `strict`, `tolerance`, `horizon`, `force`; see `pdtui.drive.replay.replay_session`.
+        judging: `strict`, `tolerance`, `required_steps`, `force`; see `pdtui.drive.replay.replay_session`.
 
     Raises:
         PdtuiError: the session cannot be read, or robot or policy cannot be had.
