@@ -1,15 +1,19 @@
-"""pdtui from Python: load a policy, dissect it, drive it, replay it. Each function is a room's own."""
+"""The Python API: load a policy, dissect it, drive it, and replay a session."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 from torch import nn
 
 from pdtui.core.errors import SessionError
-from pdtui.dissection import dissect as dissection
+from pdtui.dissection.dissect import dissect as run_dissection
+from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_settings import QUICK_DISSECTION, DissectionSettings
 from pdtui.drive.drive_config import DriveConfig
@@ -24,7 +28,7 @@ from pdtui.policies.torchscript import is_torchscript, read_torchscript
 from pdtui.policies.weights import policy_loading
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, WorldSpaces
 from pdtui.policies.weights.weights_file import hash_file
-from pdtui.robots import make_robot
+from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_library import find_map
@@ -45,6 +49,26 @@ __all__ = [
     "replay",
 ]
 
+Fields = ParamSpec("Fields")
+Config = TypeVar("Config")
+Result = TypeVar("Result")
+
+
+def _takes_fields_of(
+    make_config: Callable[Fields, Config],
+) -> Callable[[Callable[[Config], Result]], Callable[Fields, Result]]:
+    """Let a function of a dataclass be called with the fields of that dataclass instead."""
+
+    def decorate(function: Callable[[Config], Result]) -> Callable[Fields, Result]:
+        @wraps(function)
+        def call(*args: Fields.args, **kwargs: Fields.kwargs) -> Result:
+            return function(make_config(*args, **kwargs))
+
+        call.__dict__["__signature__"] = inspect.signature(make_config)
+        return call
+
+    return decorate
+
 
 def load_policy(
     policy: str | Path | nn.Module,
@@ -58,7 +82,7 @@ def load_policy(
     initial_state: Any = None,
     name: str = "",
 ) -> Policy:
-    """A policy whose hidden units can be read and overwritten, from a file or a live network.
+    """Load a policy whose hidden units can be read and overwritten, from a file or a network in memory.
 
     >>> import numpy as np, pdtui
     >>> policy = pdtui.load_policy("ant")
@@ -68,7 +92,7 @@ def load_policy(
     >>> step.action.shape, step.activations.shape
     ((8,), (512,))
 
-    A network in memory needs the robot that it is for, or the shape of its observation:
+    A network in memory needs the robot that it drives, or the shape of its observation:
 
     >>> from torch import nn
     >>> network = nn.Sequential(nn.Linear(27, 16), nn.Tanh(), nn.Linear(16, 8))
@@ -76,94 +100,67 @@ def load_policy(
     (16,)
 
     Args:
-        policy: a weights file, the name of a shipped policy, a `torch.nn.Module`, which is copied, or a
-            TorchScript file, which is read as data (see `pdtui.policies.torchscript`).
-        robot: that it is for; gives the bounds of actions that somebody else's file may lack.
-        import_options: what somebody else's file leaves open; see `pdtui.policies.importers`.
-        observations, hidden, decode, batched, initial_state, name: of a live or TorchScript network; see
-            `pdtui.policies.runtime.live_network.policy_from_network`.
+        policy: A weights file, the name of a shipped policy, a TorchScript file, which is read as data (see
+            `pdtui.policies.torchscript`), or a `torch.nn.Module`, which is copied.
+        robot: The robot that the policy drives. It gives the shapes and the bounds of actions that a file
+            may lack.
+        import_options: Answers to what the weights file does not state; see `pdtui.policies.importers`.
+        observations, hidden, decode, batched, initial_state, name: For a network in memory or a TorchScript
+            file; see `pdtui.policies.runtime.live_network.policy_from_network`.
 
     Raises:
-        PdtuiError: it cannot be had, or is for another robot.
+        PdtuiError: The policy cannot be loaded, or is for another robot.
     """
     sha256 = ""
     if not isinstance(policy, nn.Module) and is_torchscript(Path(policy)):
         name, sha256 = name or Path(policy).stem, hash_file(Path(policy))
         policy = read_torchscript(Path(policy))
-    world = make_robot(robot) if isinstance(robot, str) else robot
-    if not isinstance(policy, nn.Module):
-        if world is None:
-            return policy_loading.load_policy(policy, import_options=import_options)
-        return policy_loading.load_policy(
-            policy, world.name, import_options=import_options, spaces=WorldSpaces.of_world(world)
+    with ExitStack() as stack:
+        world = None if robot is None else stack.enter_context(open_robot(robot))
+        if not isinstance(policy, nn.Module):
+            return policy_loading.load_policy(
+                policy,
+                None if world is None else world.name,
+                import_options=import_options,
+                spaces=None if world is None else WorldSpaces.of_world(world),
+            )
+        return policy_from_network(
+            policy,
+            None if world is None else world.observation_space,
+            None if world is None else world.action_space,
+            observations=observations,
+            hidden=hidden,
+            decode=decode,
+            batched=batched,
+            initial_state=initial_state,
+            name=name,
+            sha256=sha256,
         )
-    return policy_from_network(
-        policy,
-        world.observation_space if world is not None else None,
-        world.action_space if world is not None else None,
-        observations=observations,
-        hidden=hidden,
-        decode=decode,
-        batched=batched,
-        initial_state=initial_state,
-        name=name,
-        sha256=sha256,
-    )
 
 
-def dissect(
-    robot: str | Robot,
-    policy: str | Path | nn.Module | Policy,
-    *,
-    import_options: ImportOptions = NO_OPTIONS,
-    preset: str = "paper",
-    settings: Sequence[str] = (),
-    episodes: int = 5,
-    seed: int = 1000,
-    budget_minutes: float | None = None,
-    workers: int = 2,
-    effort: DissectionSettings | None = None,
-    progress: dissection.StageProgress | None = None,
-    journal: Path | None = None,
-) -> Dissection:
+@_takes_fields_of(DissectionConfig)
+def dissect(config: DissectionConfig) -> Dissection:
     """Find out which hidden units move what: monitor, match, probe, and search for behaviors.
 
-    A robot and a policy that are given by name are dissected by `workers` processes, which load them again.
-    An object stays where it is, in this process; the result is the same.
+    The arguments are the fields of `pdtui.dissection.dissection_config.DissectionConfig`. A robot and a
+    policy given by name are dissected by `workers` processes, which load them again. An object stays in this
+    process; the result is the same.
 
     >>> import pdtui
     >>> from torch import nn
     >>> network = nn.Sequential(nn.Linear(27, 4), nn.Tanh(), nn.Linear(4, 8))
     >>> _ = nn.init.constant_(network[2].weight, 0.01)
-    >>> found = pdtui.dissect("ant", network, episodes=1, effort=pdtui.QUICK_DISSECTION, budget_minutes=0.0)
+    >>> quick = pdtui.QUICK_DISSECTION
+    >>> found = pdtui.dissect("ant", network, episodes=1, settings=quick, budget_minutes=0.0)
     >>> found.screen.effects.shape[0], found.matching.discrepancy.shape[1]  # a row, a column for each unit
     (4, 4)
     >>> found.to_map().robot
     'ant'
 
-    Args:
-        robot: its name, or a `Robot`.
-        policy: a weights file, a shipped name, a live network, or a `Policy`.
-        import_options, preset, settings, episodes, seed, budget_minutes, workers, effort, progress,
-            journal: as for `pdtui.dissection.dissect.dissect`.
-
     Raises:
-        PdtuiError: what is wrong with robot or policy.
+        PdtuiError: What is wrong with the robot, the policy, or the map to start from.
     """
-    return dissection.dissect(
-        robot,
-        load_policy(policy, robot) if isinstance(policy, nn.Module) else policy,
-        import_options=import_options,
-        preset=preset,
-        settings=settings,
-        episodes=episodes,
-        seed=seed,
-        budget_minutes=budget_minutes,
-        workers=workers,
-        effort=effort,
-        progress=progress,
-        journal=journal,
-    )
+    return run_dissection(config)
 
 
 def drive(
@@ -180,7 +177,7 @@ def drive(
     record: str | Path | None = None,
     force: bool = False,
 ) -> Trajectory:
-    """Drive without a screen, as fast as it goes.
+    """Drive without a screen, as fast as the machine allows.
 
     >>> import pdtui
     >>> drive = pdtui.drive("ant", keys={50: "x"}, steps=150)
@@ -190,35 +187,36 @@ def drive(
     True
 
     Args:
-        robot: its name, or a `Robot`.
-        stimulation_map: a map, or its name or file; by default the one named as the robot.
-        policy: instead of the map's; a live network's has to be the one that the map was made for.
-        import_options: what the weights file leaves open, over what the map says.
-        keys: one key or several, by the control step before which they are pressed; or a keystroke file.
-        steps: control steps.
-        seed: of the reset and of every random number.
-        stochastic: draw actions from the policy's distribution instead of taking its mean.
-        start: state in which episodes start, for a robot with several.
-        record: a new session file.
-        force: drive although the map was made for another policy.
+        robot: The robot's name, or a `Robot`.
+        stimulation_map: A map, or its name or file. By default, the map that has the robot's name.
+        policy: The policy to use instead of the map's. A network in memory has to be the one that the map
+            was made for.
+        import_options: Answers to what the weights file does not state, in preference to the map's.
+        keys: One key or several for each control step before which they are pressed; or a keystroke file.
+        steps: Control steps.
+        seed: Seed of the reset and of every random number.
+        stochastic: Draw actions from the policy's distribution instead of taking its mean.
+        start: State in which episodes start, for a robot with several.
+        record: File of a new session.
+        force: Drive even if the map was made for another policy.
 
     Raises:
-        PdtuiError: robot, map or policy cannot be had, do not fit each other, or a key means nothing.
+        PdtuiError: The robot, the map or the policy cannot be loaded, they do not fit each other, or a key
+            means nothing.
     """
     name = robot.name if isinstance(robot, Robot) else robot
     if not isinstance(stimulation_map, StimulationMap):
         stimulation_map = load_map(find_map(str(stimulation_map or name)))
-    live = load_policy(policy, robot) if isinstance(policy, nn.Module) else policy
-    given = live if isinstance(live, Policy) else None
-    named = "" if given is not None or live is None else str(live)
+    named = str(policy) if isinstance(policy, str | Path) else ""
     stimulation_map = resolve_map_policy(stimulation_map, named, import_options)
     config = DriveConfig(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
-    loop = build_loop(config, robot if isinstance(robot, Robot) else None, given)
-    presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
-    if record is not None and Path(record).exists():
-        raise SessionError(f"{record}: exists already; a drive is recorded into a new file")
-    recorder = SessionRecorder(Path(record), loop.info) if record is not None else None
-    return collect_trajectory(loop, presses, steps, recorder)
+    with open_robot(robot) as world:
+        loop = build_loop(config, world, None if isinstance(policy, str | Path) else policy)
+        presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
+        if record is not None and Path(record).exists():
+            raise SessionError(f"{record}: exists already; a drive is recorded into a new file")
+        recorder = SessionRecorder(Path(record), loop.info) if record is not None else None
+        return collect_trajectory(loop, presses, steps, recorder)
 
 
 def replay(
@@ -238,15 +236,14 @@ def replay(
     None
 
     Args:
-        session: the file.
-        robot: where the session's is not known by its name.
-        policy: where the session's is not where its map says.
-        judging: `strict`, `tolerance`, `required_steps`, `force`; see `pdtui.drive.replay.replay_session`.
+        session: File of the session.
+        robot: The robot, if the session's cannot be built from its name.
+        policy: The policy, if the session's is not where its map says.
+        judging: ``strict``, ``tolerance``, ``horizon`` and ``force``, as for
+            `pdtui.drive.replay.replay_session`.
 
     Raises:
-        PdtuiError: the session cannot be read, or robot or policy cannot be had.
+        PdtuiError: The session cannot be read, or the robot or the policy cannot be loaded.
     """
-    if isinstance(policy, nn.Module):
-        policy = load_policy(policy, robot)
-    given = policy if isinstance(policy, Policy) else str(policy or "")
+    given = str(policy or "") if policy is None or isinstance(policy, str | Path) else policy
     return replay_session(Path(session), policy=given, robot=robot, **judging)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pdtui.dissection.dissect import dissect
+from pdtui.api import dissect
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.file_search import FOLDERS
@@ -72,4 +72,4 @@ def policy_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def dissection(policy_file: Path) -> Dissection:
     """What was found about it."""
-    return dissect("ant", policy_file, episodes=2, workers=2, effort=SMALL)
+    return dissect("ant", policy_file, episodes=2, workers=2, settings=SMALL)

@@ -6,7 +6,9 @@ import doctest
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from torch import nn
@@ -92,7 +94,7 @@ def test_a_recorded_drive_of_a_live_network_replays_bit_for_bit_with_a_rewind(
 def test_a_live_network_is_dissected(world: object) -> None:
     assert callable(world)
     robot, policy, _ = world()
-    found = pdtui.dissect(robot, policy, episodes=2, effort=pdtui.QUICK_DISSECTION)
+    found = pdtui.dissect(robot, policy, episodes=2, settings=pdtui.QUICK_DISSECTION)
     assert found.screen.effects.shape[:2] == (policy.units, 2)
     assert np.abs(np.nan_to_num(found.screen.effects)).max() > 0
     assert repr(found).startswith(f"<Dissection of {policy.name} on {robot.name}: {policy.units} units")
@@ -101,6 +103,56 @@ def test_a_live_network_is_dissected(world: object) -> None:
     assert names <= {"features.0", "fc", "lstm"}
     proposed = found.to_map()
     proposed.check(robot.name, policy.layers, policy.sha256)
+
+
+class CountedWorld(gymnasium.Env[Any, Any]):
+    """Counts how often it is built, and how many of it are not closed."""
+
+    observation_space = gymnasium.spaces.Box(-1.0, 1.0, (3,))
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,))
+    built = 0
+    open = 0
+
+    def __init__(self, **_: Any) -> None:
+        CountedWorld.built += 1
+        CountedWorld.open += 1
+        self._open = True
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed, options=options)
+        return np.zeros(3), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        return np.full(3, action[0]), 0.0, False, False, {}
+
+    def close(self) -> None:
+        CountedWorld.open -= self._open
+        self._open = False
+
+
+def test_worlds_are_built_once_and_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = "CountedWorld-v0"
+    monkeypatch.setitem(gymnasium.registry, name, gymnasium.envs.registration.EnvSpec(name, CountedWorld))
+    network = nn.Sequential(nn.Linear(3, 4), nn.Tanh(), nn.Linear(4, 2))
+    policy = pdtui.load_policy(network, name)
+    once, CountedWorld.built = CountedWorld.built, 0
+    stimulation_map = parse_map(
+        _MAP.format(robot=name, policy="live", sha256=policy.sha256, unit="0:1"), "map"
+    )
+    path = tmp_path / "drive.rrd"
+    drive = pdtui.drive(name, stimulation_map, policy=policy, steps=3)
+    driven, CountedWorld.built = CountedWorld.built, 0
+    again = pdtui.drive(name, stimulation_map, policy=network, steps=3, record=path)
+    np.testing.assert_array_equal(again.actions, drive.actions)
+    assert CountedWorld.built == driven
+    assert pdtui.replay(path, policy=network).identical
+    CountedWorld.built = 0
+    with pytest.raises(MapError, match="no map 'nothing'"):
+        pdtui.dissect(name, network, start_from="nothing")
+    assert CountedWorld.built == once
+    with pytest.raises(PolicyError, match="no policy 'nothing'"):
+        pdtui.dissect(name, "nothing")
+    assert CountedWorld.open == 0
 
 
 def test_arrays_are_addressed_by_name() -> None:

@@ -30,7 +30,7 @@ from pdtui.policies.weights.import_options import ImportOptions
 @click.option("--preset", type=click.Choice(["paper", "authors"]), default="paper", show_default=True)
 @click.option(
     "--set",
-    "settings",
+    "preset_changes",
     multiple=True,
     metavar="NAME=VALUE",
     help="Change a choice of the preset, such as window=hann or length=32; a wrong name lists all.",
@@ -70,7 +70,7 @@ def dissect(
     policy: str,
     import_options: ImportOptions,
     preset: str,
-    settings: tuple[str, ...],
+    preset_changes: tuple[str, ...],
     episodes: int,
     seed: int,
     output: Path | None,
@@ -83,12 +83,13 @@ def dissect(
     workers: int | None,
     as_json: bool,
 ) -> None:
-    """Find the units that steer ROBOT: match, then probe, then write a map and a report.
+    """Find the units of ROBOT's policy that move something, and write a map and a report.
 
-    Interrupted, the same line goes on where it was.
+    An interrupted dissection continues where it stopped when the same command is run again.
     """
     from pdtui.dissection.dissect_into_map import dissect_into_map
-    from pdtui.dissection.dissection_settings import QUICK_DISSECTION
+    from pdtui.dissection.dissection_config import DissectionConfig
+    from pdtui.dissection.dissection_settings import QUICK_DISSECTION, DissectionSettings
     from pdtui.pictures.picture_outputs import PictureOutputs
     from pdtui.robots import check_robot, file_stem, trust_module
 
@@ -98,26 +99,29 @@ def dissect(
     trust_module(name)
     check_robot(name)
     output = output or Path("maps") / f"{file_stem(name)}-dissected.toml"
-    wanted = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite)
-    wanted.check()
+    outputs = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite)
+    outputs.check()
     with progress_bar_or_none("dissecting", quiet=as_json) as advance:
-        result = dissect_into_map(
+
+        def show_progress(stage: str, done: int, total: int) -> None:
+            if advance is not None:
+                advance(done, total, stage)
+
+        config = DissectionConfig(
             name,
             policy or name,
-            output,
             import_options=import_options,
-            overwrite=overwrite,
             preset=preset,
-            settings=settings,
+            preset_changes=preset_changes,
+            settings=QUICK_DISSECTION if quick else DissectionSettings(),
             episodes=episodes,
             seed=seed,
-            workers=core_count(workers),
-            budget_minutes=budget,
             start_from=start_from,
-            effort=QUICK_DISSECTION if quick else None,
-            progress=advance,
+            budget_minutes=budget,
+            workers=core_count(workers),
+            progress=show_progress,
         )
-    written = [str(path) for path in wanted.draw(result.dissection)]
-    show_result({**result.as_dict(), "pictures": written}, as_json, result.table)
+        result = dissect_into_map(config, output, overwrite=overwrite, draw=outputs.draw)
+    show_result(result.as_dict(), as_json, result.table)
     if not as_json:
-        click.echo(f"wrote {', '.join(written)}")
+        click.echo(f"wrote {', '.join(map(str, result.pictures))}")

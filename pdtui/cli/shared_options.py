@@ -100,7 +100,7 @@ def judging_options(command: Callable[..., Any]) -> Callable[..., Any]:
             type=click.FloatRange(0),
             metavar="SPREADS",
             help="On another machine or other versions, attributes may be off by this many standard "
-            "deviations of the session in its first 5 control steps.  [default: 5e-06]",
+            "deviations of the session in its first 2 s.  [default: 1e-06]",
         ),
     ):
         judged = option(judged)

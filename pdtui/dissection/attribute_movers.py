@@ -90,7 +90,7 @@ def find_attribute_movers(
     screen: EffectCurves,
     refined: EffectCurves,
     starts: Sequence[StartState],
-    plan: DissectionSettings,
+    settings: DissectionSettings,
     progress: StepProgress | None = None,
 ) -> tuple[AttributeMover, ...]:
     """Up and down for each attribute that a confirmed unit moves.
@@ -106,22 +106,22 @@ def find_attribute_movers(
         refined: the units to choose from.
         starts: that neither sweep saw. The first half decides between units, the other half gives the
             figures.
-        plan: how much to try, and how long.
+        settings: How many units to try, and for how long.
         progress: called with (directions done, directions).
     """
     found = []
-    half, steps = len(starts) // 2, plan.mover_steps
+    half, steps = len(starts) // 2, settings.mover_steps
     asked = [(column, sign) for column in columns for sign in (1, -1)]
 
     def probe(plans: Sequence[Stimulation], some: Sequence[StartState]) -> PlanEffects:
         return prober.probe(plans, some, steps=steps, measure_from=steps // 3)
 
     for done, (column, sign) in enumerate(asked, start=1):
-        singles = _singles(column, sign, screen, refined, plan.mover_singles)
+        singles = _singles(column, sign, screen, refined, settings.mover_singles)
         lasting = _lasting(probe(singles, starts[:half]), column, sign) if singles else None
         if lasting is not None:
             single = singles[lasting]
-            pairs = _cancelling(single, column, sign, columns, spread, refined)[: plan.mover_pairs]
+            pairs = _cancelling(single, column, sign, columns, spread, refined)[: settings.mover_pairs]
             plans = [single, *pairs]
             best = _choose(probe(plans, starts[:half]), column, sign, columns, spread) if pairs else 0
             chosen = [single] if best == 0 else [plans[best], single]

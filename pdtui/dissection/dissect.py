@@ -1,114 +1,95 @@
-"""The whole method, from a weights file to behaviors that were measured."""
+"""The whole method, from a policy to behaviors that were measured."""
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from torch import nn
 
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
+from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_searches import DissectionSearches, TimeBudget
-from pdtui.dissection.dissection_settings import DissectionSettings
 from pdtui.dissection.probe_starts import gather_probe_starts
 from pdtui.dissection.sample_episode import pick_sample_episode
+from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.confirmation import draw_controls, select_units
 from pdtui.probing.effect_probe import EffectProber
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.probing.rollout_pool import RolloutPool
-from pdtui.robots.robot import Robot
+from pdtui.robots import open_robot
 from pdtui.sessions.environment_versions import collect_versions
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_preset
 from pdtui.spectra.monitor import StepProgress, monitor_episodes
 from pdtui.spectra.phase_correlation import correlate_phases
+from pdtui.stimulation.map_library import find_map
+from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stimulation_map import StimulationMap
 
-StageProgress = Callable[[str, int, int], None]
 
-
-def dissect(
-    robot: str | Robot,
-    policy: str | Path | Policy,
-    *,
-    import_options: ImportOptions = NO_OPTIONS,
-    preset: str = "paper",
-    settings: Sequence[str] = (),
-    episodes: int = 5,
-    seed: int = 1000,
-    budget_minutes: float | None = None,
-    workers: int = 2,
-    effort: DissectionSettings | None = None,
-    progress: StageProgress | None = None,
-    journal: Path | None = None,
-    start_from: StimulationMap | None = None,
-) -> Dissection:
-    """Dissect a policy: monitor, match, probe, and search for behaviors.
-
-    With no time budget the result depends only on the arguments, not on the machine's speed or the number of
-    workers. Monitored episodes take the seeds from `seed` on, starts those from ``seed + 100`` on.
-
-    Args:
-        robot: name of the robot, or a robot.
-        policy: weights file, name of a shipped policy, or a policy.
-        import_options: what the weights file leaves open.
-        preset: ``paper`` or ``authors``.
-        settings: choices of the preset to change, ``NAME=VALUE`` each; see `pdtui.spectra.matching_presets`.
-        episodes: monitored (the paper: 5).
-        seed: of everything.
-        budget_minutes: the searches end, with the best so far, when this is over; screening always completes.
-        workers: processes; one, this one, where robot or policy is given as an object.
-        effort: how much to do.
-        progress: called with (stage, done, of).
-        journal: remembers roll-outs, so that a run that was interrupted goes on here; removed at the end.
-        start_from: a map whose fixed behaviors the searches begin from, too: they can only get better.
+def dissect(config: DissectionConfig) -> Dissection:
+    """Dissect a policy: monitor it, match and probe its units, and search for behaviors.
 
     Raises:
-        PdtuiError: an unknown robot, policy or preset, or a policy that falls too often to be dissected.
+        PdtuiError: The robot, the policy, the preset or the map to start from cannot be had, or the policy
+            falls too often to be dissected.
     """
-    spectrum, plan, began = find_preset(preset, settings), effort or DissectionSettings(), time.monotonic()
+    if isinstance(config.policy, nn.Module):
+        with open_robot(config.robot) as robot:
+            policy = policy_from_network(config.policy, robot.observation_space, robot.action_space)
+            return dissect(replace(config, robot=robot, policy=policy))
+    began, seed, settings = time.monotonic(), config.seed, config.settings
+    preset = find_preset(config.preset, config.preset_changes)
+    first_map = config.start_from
+    if isinstance(first_map, str | Path):
+        first_map = load_map(find_map(str(first_map)))
 
     def stage(name: str) -> StepProgress | None:
-        return None if progress is None else lambda done, of: progress(name, done, of)
+        report = config.progress
+        return None if report is None else lambda done, total: report(name, done, total)
 
-    with RolloutPool(robot, policy, workers, import_options) as crew, ExitStack() as stack:
-        remembered = None
-        if journal is not None:
-            remembered = stack.enter_context(RolloutJournal(journal, _identity(crew)))
-        world, network, prober = crew.robot, crew.policy, EffectProber(crew, remembered)
-        known = _behaviors_of(start_from, network) if start_from is not None else ()
-        recorded = monitor_episodes(
-            world, network, range(seed, seed + episodes), plan.steps, stage("monitor")
+    with ExitStack() as stack:
+        pool = stack.enter_context(
+            RolloutPool(config.robot, config.policy, config.workers, config.import_options)
         )
-        matching = match_units(recorded, world.attributes, spectrum)
-        phase = correlate_phases(recorded, world.attributes, spectrum)
-        starts = gather_probe_starts(crew, plan, seed + 100)
-        plan = starts.plan
+        robot, network, journal = pool.robot, pool.policy, None
+        if config.journal is not None:
+            journal = stack.enter_context(RolloutJournal(config.journal, _identity(pool)))
+        prober = EffectProber(pool, journal)
+        known = _fixed_behaviors(first_map, network) if first_map is not None else ()
+        episodes = monitor_episodes(
+            robot, network, range(seed, seed + config.episodes), settings.steps, stage("monitor")
+        )
+        matching = match_units(episodes, robot.attributes, preset)
+        phase = correlate_phases(episodes, robot.attributes, preset)
+        starts = gather_probe_starts(pool, settings, seed + 100)
+        settings = starts.settings
         screen = prober.sweep(
             range(network.units),
-            plan.screen_values,
+            settings.screen_values,
             starts.screen,
-            steps=plan.screen_steps,
+            steps=settings.screen_steps,
             progress=stage("screen every unit"),
         )
-        chosen = select_units(screen, matching, range(len(world.attributes)), plan.refine_keep)
-        controls = draw_controls(screen, plan.controls, seed)
+        chosen = select_units(screen, matching, range(len(robot.attributes)), settings.refine_keep)
+        controls = draw_controls(screen, settings.controls, seed)
         refined = prober.sweep(
             sorted({*chosen, *controls}),
-            plan.refine_values,
+            settings.refine_values,
             starts.refine,
-            steps=plan.refine_steps,
+            steps=settings.refine_steps,
             progress=stage("refine the best"),
         )
-        spread = np.concatenate([episode.attributes for episode in recorded]).std(axis=0)
-        columns = movable_columns(world.attributes, recorded)
+        spread = np.concatenate([episode.attributes for episode in episodes]).std(axis=0)
+        columns = movable_columns(robot.attributes, episodes)
         movers = find_attribute_movers(
             prober,
             columns,
@@ -116,28 +97,26 @@ def dissect(
             screen,
             refined,
             starts.searches.held_out,
-            plan,
+            settings,
             stage("up and down"),
         )
         searches = DissectionSearches(
-            prober, world, plan, seed, TimeBudget(began, budget_minutes), stage, known
+            prober, robot, settings, seed, TimeBudget(began, config.budget_minutes), stage, known
         )
         behaviors, controllers = searches.run(screen, refined, starts.searches)
-        if remembered is not None:
-            remembered.remove()
         return Dissection(
-            robot=robot if isinstance(robot, str) else robot.name,
-            policy=policy.name if isinstance(policy, Policy) else str(policy),
+            robot=config.robot if isinstance(config.robot, str) else robot.name,
+            policy=network.name if isinstance(config.policy, Policy) else str(config.policy),
             policy_hash=network.sha256,
             layers=network.layers,
-            attributes=world.attributes,
-            goals=world.goals,
-            dt=world.control_dt,
-            preset=spectrum,
+            attributes=robot.attributes,
+            goals=robot.goals,
+            dt=robot.control_dt,
+            preset=preset,
             seed=seed,
             matching=matching,
             phase=phase,
-            sample_episode=pick_sample_episode(recorded, world.attributes, matching, spectrum),
+            sample_episode=pick_sample_episode(episodes, robot.attributes, matching, preset),
             screen=screen,
             refined=refined,
             controls=controls,
@@ -146,24 +125,24 @@ def dissect(
             attribute_movers=movers,
             behaviors=behaviors,
             controllers=controllers,
-            rollouts=crew.rollouts,
-            control_steps=crew.steps_run,
+            rollouts=pool.rollouts,
+            control_steps=pool.steps_run,
             minutes=(time.monotonic() - began) / 60,
-            import_options=import_options,
+            import_options=config.import_options,
             shortened=starts.shortened,
         )
 
 
-def _identity(crew: RolloutPool) -> str:
-    """What a roll-out's outcome depends on besides its start and plan."""
-    return json.dumps([crew.robot.name, crew.policy.sha256, collect_versions()])
+def _identity(pool: RolloutPool) -> str:
+    """Return what the outcome of a roll-out depends on besides its start and plan."""
+    return json.dumps([pool.robot.name, pool.policy.sha256, collect_versions()])
 
 
-def _behaviors_of(stimulation_map: StimulationMap, policy: Policy) -> tuple[Stimulation, ...]:
-    """What the map's behaviors of fixed magnitude overwrite.
+def _fixed_behaviors(stimulation_map: StimulationMap, policy: Policy) -> tuple[Stimulation, ...]:
+    """Return what the map's behaviors of fixed magnitude overwrite.
 
     Raises:
-        MapError: a unit does not exist in the policy.
+        MapError: A unit does not exist in the policy.
     """
     stimulation_map.check(stimulation_map.robot, policy.layers, policy.sha256, force=True)
     return tuple(

@@ -1,9 +1,9 @@
-"""What `pdtui dissect` runs: dissect, then write the map."""
+"""Dissect a policy into a map, as `pdtui dissect` does."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,88 +13,76 @@ from rich.text import Text
 from pdtui.core.atomic_file import check_writable, write_file
 from pdtui.core.errors import MapError
 from pdtui.dissection.dissect import dissect
+from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_settings import DissectionSettings
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.dissection.dissection_tables import render_dissection
 from pdtui.dissection.draft_map import draft_map
-from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
-from pdtui.stimulation.map_library import find_map
-from pdtui.stimulation.map_reader import load_map, parse_map
+from pdtui.stimulation.map_reader import parse_map
 
 
 @dataclass(frozen=True)
 class WrittenDissection:
-    """A dissection and the map that was written from it."""
+    """A dissection, and the files that were written from it.
+
+    Attributes:
+        dissection: What was found.
+        output: File of the map.
+        behaviors: Names of the map's behaviors.
+        pictures: Files of the report and the figures.
+    """
 
     dissection: Dissection
     output: Path
     behaviors: tuple[str, ...]
+    pictures: tuple[Path, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """The form that ``--json`` prints."""
-        return {**summarise_dissection(self.dissection), "map": str(self.output)}
+        """Return the form that ``--json`` prints."""
+        written = {"map": str(self.output), "pictures": [str(path) for path in self.pictures]}
+        return {**summarise_dissection(self.dissection), **written}
 
     def table(self) -> RenderableType:
-        """What the command prints."""
-        names = ", ".join(self.behaviors) or "no behavior: none reached what was asked of it"
+        """Return what the command prints."""
+        names = ", ".join(self.behaviors) or "no behaviors, because none reached its goal"
         return Group(render_dissection(self.dissection), Text(f"wrote {self.output}: {names}"))
 
 
 def dissect_into_map(
-    robot: str,
-    policy: str,
+    config: DissectionConfig,
     output: Path,
     *,
-    import_options: ImportOptions = NO_OPTIONS,
-    overwrite: bool,
-    preset: str,
-    settings: Sequence[str] = (),
-    episodes: int,
-    seed: int,
-    workers: int,
-    budget_minutes: float | None,
-    start_from: str | None = None,
-    effort: DissectionSettings | None = None,
-    progress: Callable[..., None] | None = None,
+    overwrite: bool = False,
+    draw: Callable[[Dissection], Sequence[Path]] = lambda _: (),
 ) -> WrittenDissection:
-    """Dissect a policy and write the map that its measurements propose.
+    """Dissect a policy, and write the map that its measurements propose.
 
-    Killed on the way, the same call goes on where it was: its roll-outs are in `journal_path` the map.
+    Roll-outs are kept in `journal_path` until the map and the pictures are written, so that the same call
+    continues where an interrupted one stopped.
+
+    Args:
+        config: What to dissect. Its journal is not used.
+        output: File of the map.
+        overwrite: Whether to replace a map that exists.
+        draw: Draws the pictures, and returns their files.
 
     Raises:
-        MapError: the map exists already or cannot be written; seen before the work starts.
-        PdtuiError: as `dissect`.
+        MapError: The map exists already or cannot be written. Found out before the work starts.
+        PdtuiError: As `dissect` and `draw` do.
     """
     if output.exists() and not overwrite:
         raise MapError(f"{output}: exists already; --overwrite replaces it, -o writes elsewhere")
     check_writable(output, MapError)
-
-    def advance(stage: str, done: int, total: int) -> None:
-        if progress is not None:
-            progress(done, total, stage)
-
-    dissection = dissect(
-        robot,
-        policy,
-        import_options=import_options,
-        preset=preset,
-        settings=settings,
-        episodes=episodes,
-        seed=seed,
-        workers=workers,
-        budget_minutes=budget_minutes,
-        effort=effort,
-        progress=advance,
-        journal=journal_path(output),
-        start_from=None if start_from is None else load_map(find_map(start_from)),
-    )
+    journal = journal_path(output)
+    dissection = dissect(replace(config, journal=journal))
     text = draft_map(dissection)
-    stimulation_map = parse_map(text, str(output))
+    behaviors = tuple(parse_map(text, str(output)).behaviors)
     write_file(output, text, MapError)
-    return WrittenDissection(dissection, output, tuple(stimulation_map.behaviors))
+    pictures = tuple(draw(dissection))
+    journal.unlink(missing_ok=True)
+    return WrittenDissection(dissection, output, behaviors, pictures)
 
 
 def journal_path(output: Path) -> Path:
-    """Where the roll-outs of an unfinished dissection are kept: beside the map."""
+    """Return the file beside the map that keeps the roll-outs of an unfinished dissection."""
     return output.with_name(f".{output.stem}.rollouts")

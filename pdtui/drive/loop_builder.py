@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from torch import nn
+
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
+from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_fit import check_fit
 from pdtui.policies.weights.import_options import WorldSpaces
@@ -14,13 +17,17 @@ from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot
 
 
-def build_loop(config: DriveConfig, robot: Robot | None = None, policy: Policy | None = None) -> ControlLoop:
-    """Load robot and policy, where they are not given, and set the loop at step 0.
+def build_loop(
+    config: DriveConfig, robot: Robot | None = None, policy: Policy | nn.Module | None = None
+) -> ControlLoop:
+    """Load the robot and the policy, unless they are given, and set the loop to step 0.
 
     Raises:
         PdtuiError: the robot, the policy or the map cannot be had, or they do not fit each other.
     """
     robot, wanted = robot or make_robot(config.robot), config.stimulation_map
+    if isinstance(policy, nn.Module):
+        policy = policy_from_network(policy, robot.observation_space, robot.action_space)
     policy = policy or load_policy(
         config.policy or wanted.policy,
         config.robot,

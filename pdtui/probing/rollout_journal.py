@@ -52,11 +52,6 @@ class RolloutJournal(Closable):
         """Leave the file as it is."""
         self._database.close()
 
-    def remove(self) -> None:
-        """Close and delete the file: the work is finished."""
-        self.close()
-        self.path.unlink(missing_ok=True)
-
     def keys(
         self, jobs: Sequence[RolloutJob], starts: Sequence[StartState], steps: int, measure_from: int
     ) -> list[bytes]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,7 @@ from pdtui.policies.runtime.policy_fit import check_fit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, WorldSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, roll_out
-from pdtui.robots import make_robot
+from pdtui.robots import make_robot, open_robot
 from pdtui.robots.robot import Robot
 from pdtui.spectra.monitor import StartState, StepProgress
 
@@ -83,9 +84,11 @@ class RolloutPool(Closable):
         import_options: ImportOptions = NO_OPTIONS,
     ) -> None:
         # Built here too: the caller needs both, and what is wrong with them is raised in this process.
-        self.robot = make_robot(robot) if isinstance(robot, str) else robot
-        self.policy = policy if isinstance(policy, Policy) else _load(policy, self.robot, import_options)
-        check_fit(self.policy, self.robot, self.robot.name)
+        with ExitStack() as stack:
+            self.robot = stack.enter_context(open_robot(robot))
+            self.policy = policy if isinstance(policy, Policy) else _load(policy, self.robot, import_options)
+            check_fit(self.policy, self.robot, self.robot.name)
+            self._resources = stack.pop_all()
         named = isinstance(robot, str) and not isinstance(policy, Policy)
         self._pool = WorkerPool(
             f"roll-outs of {self.robot.name}",
@@ -98,8 +101,9 @@ class RolloutPool(Closable):
         self.rollouts = 0
 
     def close(self) -> None:
-        """End the worker processes; a later `run` starts new ones."""
+        """End the worker processes, and close the robot if it was built here."""
         self._pool.close()
+        self._resources.close()
 
     def run(
         self,

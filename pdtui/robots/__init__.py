@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from pdtui.robots.registry import check_robot, file_stem, make_robot, robot_names, trust_module
+from pdtui.robots.registry import check_robot, file_stem, make_robot, open_robot, robot_names, trust_module
 
-__all__ = ["check_robot", "file_stem", "make_robot", "robot_names", "trust_module"]
+__all__ = ["check_robot", "file_stem", "make_robot", "open_robot", "robot_names", "trust_module"]

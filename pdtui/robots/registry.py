@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -85,6 +87,20 @@ def make_robot(name: str, **options: Any) -> Robot:
     if entry is not None:
         return _from_entry(entry, options)
     return _from_environment(_registered(name), name)
+
+
+@contextmanager
+def open_robot(robot: str | Robot) -> Iterator[Robot]:
+    """Yield a robot; one that is given by its name is built here, and closed when the block ends.
+
+    Raises:
+        RobotError: As `make_robot` does.
+    """
+    if not isinstance(robot, str):
+        yield robot
+        return
+    with closing(make_robot(robot)) as built:
+        yield built
 
 
 def file_stem(name: str) -> str:

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from pdtui.api import dissect
 from pdtui.core.errors import MapError
 from pdtui.core.units import Stimulation
-from pdtui.dissection.dissect import dissect
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_searches import DissectionSearches, TimeBudget
 from pdtui.dissection.dissection_summary import summarise_dissection
@@ -44,7 +44,7 @@ def test_every_unit_is_screened_and_every_goal_has_a_candidate(dissection: Disse
 
 
 def test_the_result_does_not_depend_on_the_workers(dissection: Dissection, policy_file: Path) -> None:
-    again = dissect("ant", policy_file, episodes=2, workers=1, effort=SMALL)
+    again = dissect("ant", policy_file, episodes=2, workers=1, settings=SMALL)
     np.testing.assert_array_equal(again.screen.effects, dissection.screen.effects)
     assert again.behaviors == dissection.behaviors
     assert again.controllers == dissection.controllers
@@ -155,7 +155,7 @@ def test_a_primitive_carries_what_was_measured(dissection: Dissection) -> None:
 
 
 def test_a_budget_that_is_over_still_screens(policy_file: Path) -> None:
-    quick = dissect("ant", policy_file, episodes=1, workers=1, effort=SMALL, budget_minutes=0.0)
+    quick = dissect("ant", policy_file, episodes=1, workers=1, settings=SMALL, budget_minutes=0.0)
     assert len(quick.screen.units) == 16
     assert len(quick.behaviors) == len(GOALS)
     assert quick.controllers == ()
@@ -195,7 +195,7 @@ def test_rank_correlation() -> None:
     assert np.isnan(rank_correlation(a, np.zeros(4)))
 
 
-def test_searches_begin_from_a_maps_behaviors(policy_file: Path) -> None:
+def test_searches_begin_from_a_maps_behaviors(policy_file: Path, tmp_path: Path) -> None:
     text = f"""
 schema = 1
 robot = "ant"
@@ -218,9 +218,10 @@ magnitudes = {{ "0:3" = 9.5, "1:7" = -9.5 }}
             EffectProber(crew), crew.robot, effort, 1000, TimeBudget(0.0, None), lambda _: None, (known,)
         )
         assert known in searches.pool(SearchStartStates(tuple(starts), (), ())).plans
-    beginning = parse_map(text, "mine")
-    quick = partial(dissect, "ant", policy_file, episodes=1, workers=1, effort=effort, budget_minutes=0.0)
-    found, alone = quick(start_from=beginning), quick()
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    quick = partial(dissect, "ant", policy_file, episodes=1, workers=1, settings=effort, budget_minutes=0.0)
+    found, alone = quick(start_from=str(path)), quick()
     assert found.rollouts > alone.rollouts
     with pytest.raises(MapError, match="unit 1:70 does not exist"):
-        dissect("ant", policy_file, effort=effort, start_from=parse_map(text.replace("1:7", "1:70"), "mine"))
+        quick(start_from=parse_map(text.replace("1:7", "1:70"), "mine"))

@@ -118,6 +118,9 @@ class GymnasiumRobot(Robot):
         rate = self.world.metadata.get("render_fps")
         return 1.0 / float(rate) if isinstance(rate, int | float) and rate > 0 else _USUAL_DT
 
+    def close(self) -> None:
+        self.env.close()
+
     def observe(self) -> Floats:
         return self._observation
 
