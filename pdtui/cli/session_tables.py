@@ -1,4 +1,4 @@
-"""The tables of `pdtui sessions`. Text from files goes into them as it is, with nothing to obey in it."""
+"""The tables of `pdtui sessions`. Text from files is shown literally: no markup, no control characters."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from rich.text import Text
 
 from pdtui.core.events import describe_event
 from pdtui.core.printable_text import make_printable
+from pdtui.core.text_tables import list_facts, new_table
 from pdtui.sessions.session_comparison import AttributeDeviation, SessionComparison
 from pdtui.sessions.session_reader import Session
 from pdtui.sessions.session_summary import SessionSummary
 
 _KEPT = {
-    "all": "of every unit, in every step",
-    "half": "of every unit, in every step, as float16",
-    "off": "not recorded; a replay computes them again",
+    "all": "every unit, every step",
+    "half": "every unit, every step, as float16",
+    "off": "not recorded; a replay computes them",
 }
 
 
@@ -28,17 +29,10 @@ def _cell(text: object, style: str = "") -> Text:
     return Text(make_printable(str(text)), style)
 
 
-def _table(*columns: str, left: Sequence[str] = ()) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for column in columns:
-        table.add_column(column, justify="left" if column in left else "right", overflow="fold")
-    return table
-
-
 def list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
-    """One row a file; a broken one says why, across the other columns."""
-    table = _table(
-        "session", "robot", "length", "keys", "size", "outcome", left=("session", "robot", "outcome")
+    """Return one row per file; that of a broken file says what is wrong."""
+    table = new_table(
+        "", "session", "robot", "length", "keys", "size", "outcome", left=("session", "robot", "outcome")
     )
     for row in rows:
         name, size = _cell(Path(row["path"]).relative_to(folder)), filesize.decimal(row["bytes"])
@@ -57,10 +51,9 @@ def list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
 
 
 def show_table(session: Session, summary: SessionSummary) -> Any:
-    """Who drove what, key by key, and what it came to."""
+    """Return everything about a session: facts, figures, attributes, episodes and events."""
     info = session.info
-    facts = Table(box=None, pad_edge=False, show_header=False)
-    for name, value in (
+    facts = [
         ("session", session.path),
         ("robot", info.robot),
         ("policy", f"{info.policy}, SHA-256 {info.policy_hash[:12]}…"),
@@ -68,35 +61,38 @@ def show_table(session: Session, summary: SessionSummary) -> Any:
         ("activations", _KEPT[info.activations]),
         ("map", f"{len(info.map_text.splitlines())} lines, inside the session"),
         *([("start", info.start)] if info.start else []),
-        ("seed", f"{info.seed}{', actions drawn at random' if info.stochastic else ''}"),
+        ("seed", f"{info.seed}{', with action noise' if info.stochastic else ''}"),
         ("driven", session.created),
-        ("outcome", session.outcome or "none: the file was cut off"),
+        ("outcome", session.outcome or "none: the file is cut off"),
         *session.versions.items(),
-    ):
-        facts.add_row(Text(make_printable(str(name)), "dim"), _cell(value))
-    figures = Table(box=None, pad_edge=False, show_header=False)
-    for name, value in (
+    ]
+    figures = [
         ("length", f"{summary.steps} steps, {summary.seconds:g} s"),
         ("episodes", f"{summary.episodes}, of which {summary.falls} ended by themselves"),
         ("human involvement", _keyed(summary.involvement, summary.steps)),
         ("stimulated", f"{summary.stimulated} steps"),
         ("return", f"{summary.total_reward:.2f}"),
         ("collisions" if info.obstacles else "cost", f"{summary.total_cost:.{0 if info.obstacles else 2}f}"),
-    ):
-        figures.add_row(Text(name, "dim"), value)
-    attributes = _table("attribute", "mean", "std", "unit", left=("attribute", "unit"))
+    ]
+    attributes = new_table("", "attribute", "mean", "std", "unit", left=("attribute", "unit"))
     for row in summary.attributes:
         attributes.add_row(_cell(row.attribute), f"{row.mean:.3f}", f"{row.std:.3f}", _cell(row.unit))
-    parts: list[Any] = [facts, figures, attributes, *_episodes(summary), _happened(session)]
+    parts: list[Any] = [
+        list_facts((make_printable(name), _cell(value)) for name, value in facts),
+        list_facts(figures),
+        attributes,
+        *_episodes(summary),
+        _happened(session),
+    ]
     return Group(parts[0], *(one for part in parts[1:] for one in ("", part)))
 
 
 def _keyed(involvement: int, steps: int) -> str:
-    return f"{involvement} steps with a key ({100.0 * involvement / max(1, steps):.1f} %)"
+    return f"{involvement} steps with a key press ({100.0 * involvement / max(1, steps):.1f} %)"
 
 
 def _episodes(summary: SessionSummary) -> list[Table]:
-    """One row an episode, as the screen counted it; for a robot with a way to go or obstacles."""
+    """Return one row per episode, where the robot has a distance or obstacles."""
     tallies = summary.tallies
     far, hits = (
         any(getattr(tally, name) is not None for tally in tallies) for name in ("distance", "collisions")
@@ -104,7 +100,7 @@ def _episodes(summary: SessionSummary) -> list[Table]:
     if not (far or hits):
         return []
     columns = ["distance"] * far + ["collisions"] * hits
-    table = _table("episode", "steps", *columns, "human involvement")
+    table = new_table("", "episode", "steps", *columns, "human involvement")
     for tally in tallies:
         cells = [f"{tally.distance:.2f} m"] * far + [f"{tally.collisions:g}"] * hits
         table.add_row(str(tally.episode), str(tally.steps), *cells, _keyed(tally.involvement, tally.steps))
@@ -112,8 +108,8 @@ def _episodes(summary: SessionSummary) -> list[Table]:
 
 
 def _happened(session: Session) -> Table:
-    """Events and endings in the order of their steps."""
-    table = _table("time", "step", "key", "what", left=("key", "what"))
+    """Return events and ends of episodes in the order of their steps."""
+    table = new_table("", "time", "step", "key", "what", left=("key", "what"))
     rows = [(event.step, 0, event.key, describe_event(event)) for event in session.events]
     rows += [(step, 1, "", f"episode ended: {reason}") for step, reason in session.endings.items()]
     for step, _, key, what in sorted(rows, key=lambda row: row[:2]):
@@ -122,8 +118,8 @@ def _happened(session: Session) -> Table:
 
 
 def deviation_table(deviations: Sequence[AttributeDeviation]) -> Table:
-    """One row an attribute that differs."""
-    table = _table("attribute", "at first", "mean", "largest", "step", "unit", left=("attribute", "unit"))
+    """Return one row per attribute that differs."""
+    table = new_table("", "attribute", "first", "mean", "largest", "step", "unit", left=("attribute", "unit"))
     for row in deviations:
         table.add_row(
             _cell(row.attribute),
@@ -137,7 +133,7 @@ def deviation_table(deviations: Sequence[AttributeDeviation]) -> Table:
 
 
 def compare_table(result: SessionComparison) -> Any:
-    """The first step that differs, and how far attributes are apart after it."""
+    """Return the first step that differs, and how far the attributes are apart from there on."""
     parts: list[Any] = [_cell(compare_line(result))]
     if result.first_event:
         parts.append(_cell(result.first_event))

@@ -8,6 +8,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from pdtui.core.text_tables import new_table
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.probing.confirmation import BEST
@@ -32,16 +33,9 @@ def dissection_tables(summary: dict[str, Any]) -> list[Table]:
     return found
 
 
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold")
-    for number, column in enumerate(columns):
-        table.add_column(column, justify="left" if number == 0 else "right")
-    return table
-
-
 def _matching_table(summary: dict[str, Any]) -> Table:
     title = f"Matching ({' '.join([summary['preset'], *summary['settings_changed']])}): nearest units"
-    table = _table(title, "attribute", "at Hz", "unit", "discrepancy", "mean level", "ρ", "ρ circular")
+    table = new_table(title, "attribute", "at Hz", "unit", "discrepancy", "mean level", "ρ", "ρ circular")
     for attribute in summary["attributes"]:
         for number, one in enumerate(attribute["matches"][:_MATCHES]):
             label = attribute["name"] if number == 0 else ""
@@ -62,7 +56,7 @@ def _matching_table(summary: dict[str, Any]) -> Table:
 
 
 def _probing_table(summary: dict[str, Any]) -> Table:
-    table = _table(
+    table = new_table(
         "Probing: what units do",
         "attribute",
         "best unit",
@@ -96,7 +90,7 @@ def _probing_table(summary: dict[str, Any]) -> Table:
 
 
 def _steered_table(summary: dict[str, Any]) -> Table:
-    table = _table(
+    table = new_table(
         "Up and down, on starts that chose nothing",
         "attribute",
         "units",
@@ -119,7 +113,7 @@ def _steered_table(summary: dict[str, Any]) -> Table:
 
 
 def _behavior_table(summary: dict[str, Any]) -> Table:
-    table = _table(
+    table = new_table(
         "Behaviors, on held-out starts",
         "behavior",
         "units",
@@ -143,7 +137,7 @@ def _behavior_table(summary: dict[str, Any]) -> Table:
 
 
 def _hold_table(summary: dict[str, Any]) -> Table:
-    table = _table(
+    table = new_table(
         "Controllers, on held-out starts", "attribute", "units", "kp / ki / limit", "error", "falls"
     )
     for one in summary["holds"]:

@@ -70,6 +70,23 @@ def drive_keys(loop: ControlLoop, presses: Mapping[int, Sequence[str]], steps: i
             raise SimulationDiverged(f"step {record.step}: {record.ended}")
 
 
+def run_episode(
+    loop: ControlLoop, steps: int, events_before: Callable[[int], Sequence[Event]] = lambda _: ()
+) -> Iterator[StepRecord]:
+    """Drive from the loop's present step until the episode ends, and at most so many steps.
+
+    Args:
+        loop: the drive.
+        steps: control steps at most.
+        events_before: given the number of a control step, returns the events before it.
+    """
+    for _ in range(steps):
+        record = loop.advance(events_before(loop.step))
+        yield record
+        if record.ended:
+            return
+
+
 def drive_headless(
     loop: ControlLoop,
     presses: Mapping[int, Sequence[str]],

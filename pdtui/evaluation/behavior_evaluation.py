@@ -19,6 +19,7 @@ from pdtui.core.intervals import confidence_interval
 from pdtui.core.worker_pool import WorkerPool
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless_drive import run_episode
 from pdtui.drive.loop_builder import build_loop
 from pdtui.evaluation.task_evaluation import TaskEvaluation, TaskRun, run_task, summarise_task
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
@@ -87,7 +88,14 @@ class MapEvaluation:
 
 
 @dataclass(frozen=True)
-class _Run:
+class BehaviorRun:
+    """One episode.
+
+    Attributes:
+        mean: mean of each attribute over the measured steps, shape (J,).
+        fell: whether the episode ended before its time.
+    """
+
     mean: Floats
     fell: bool
 
@@ -140,26 +148,28 @@ _Job = tuple[str, int, str]
 """A behavior's name, a seed, and what to run: ``aim``, ``task`` or ``untouched``."""
 
 
-def _run_job(loop: ControlLoop, job: _Job) -> _Run | TaskRun:
+def _run_job(loop: ControlLoop, job: _Job) -> BehaviorRun | TaskRun:
     name, seed, kind = job
     if kind == "aim":
         return run_behavior(loop, name, seed)
     return run_task(loop, loop.map.behaviors[name], seed, untouched=kind == "untouched")
 
 
-def run_behavior(built: ControlLoop, name: str, seed: int) -> _Run:
-    """One episode; an empty name drives the default. A fallen robot's figures end where it fell."""
+def run_behavior(built: ControlLoop, name: str, seed: int) -> BehaviorRun:
+    """Run one episode with a behavior, or with the policy alone where the name is empty.
+
+    If the robot falls, the mean is over the steps from `STIMULATED_FROM` to the fall.
+    """
     loop = ControlLoop(built.robot, built.policy, built.map, seed)
-    rows: list[Floats] = []
-    for step in range(STEPS):
-        events = [Event(step, "behavior", name)] if name and step == STIMULATED_FROM else []
-        record = loop.advance(events)
-        rows.append(record.attributes)
-        if record.ended:
-            break
-    fell = len(rows) < STEPS
-    window = rows[-WINDOW:] if not fell else rows[min(STIMULATED_FROM, len(rows) - 1) :]
-    return _Run(np.mean(window, axis=0), fell)
+
+    def press(step: int) -> list[Event]:
+        return [Event(step, "behavior", name)] if name and step == STIMULATED_FROM else []
+
+    records = list(run_episode(loop, STEPS, press))
+    rows = [record.attributes for record in records]
+    fell = bool(records[-1].ended)
+    window = rows[min(STIMULATED_FROM, len(rows) - 1) :] if fell else rows[-WINDOW:]
+    return BehaviorRun(np.mean(window, axis=0), fell)
 
 
 def _summarise(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Group
 from rich.table import Table
 
-from pdtui.core.text_tables import new_table, seed_range
+from pdtui.core.text_tables import mean_with_interval, new_table, seed_range
 from pdtui.evaluation.behavior_evaluation import MapEvaluation
 from pdtui.evaluation.policy_evaluation import PolicyEvaluation
 
@@ -50,7 +50,7 @@ def _aim_table(result: MapEvaluation) -> Table:
             row.measure,
             f"{row.value:.2f}",
             f"{row.default:.2f}",
-            f"{row.effect:+.2f} [{row.low:+.2f}, {row.high:+.2f}]",
+            mean_with_interval(row.effect, row.low, row.high, "+.2f"),
             f"{row.right_sign}/{count}",
             f"{row.falls}/{count}",
         )

@@ -9,6 +9,7 @@ import numpy as np
 
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless_drive import run_episode
 from pdtui.drive.loop_builder import build_loop
 
 
@@ -54,20 +55,18 @@ def evaluate_policy(
     speeds, net_speeds, returns, finished = [], [], [], 0
     for done, seed in enumerate(seeds, start=1):
         loop = ControlLoop(built.robot, built.policy, built.map, seed, start=config.start)
-        total, ended = 0.0, ""
+        total = 0.0
         start = loop.robot.read_poses()[:1, :2]
-        for _ in range(steps):
-            record = loop.advance()
+        for record in run_episode(loop, steps):
             total += record.reward
             if column is not None:
                 speeds.append(float(record.attributes[column]))
-            ended = record.ended
-            if ended or record.finished:
+            if record.finished:
                 break
         seconds = loop.step * loop.robot.control_dt
         net_speeds += (np.linalg.norm(record.poses[:1, :2] - start, axis=1) / seconds).tolist()
         returns.append(total)
-        finished += not ended
+        finished += not record.ended
         if progress is not None:
             progress(done, len(seeds))
     return PolicyEvaluation(

@@ -10,6 +10,7 @@ import numpy as np
 from pdtui.core.attributes import Floats, unwrap_angles
 from pdtui.core.events import Event
 from pdtui.drive.control_loop import ControlLoop
+from pdtui.drive.headless_drive import run_episode
 from pdtui.robots.task import RunTrace, Task, TaskVerdict, mean_figures
 from pdtui.search.task_rollout import walk_steps
 from pdtui.stimulation.stimulation_map import Behavior
@@ -57,15 +58,14 @@ def run_task(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bo
     task = built.robot.find_task(behavior.task)
     loop = ControlLoop(built.robot, built.policy, built.map, seed, start=task.start)
     walk = walk_steps(task, seed)
-    rows: list[Floats] = [loop.attributes]
-    fell = False
-    for step in range(walk + task.steps):
-        pressed = step == walk and not untouched
-        record = loop.advance([Event(step, "behavior", behavior.name)] if pressed else [])
-        rows.append(record.attributes)
-        fell = bool(record.ended)
-        if fell:
-            break
+
+    def press(step: int) -> list[Event]:
+        return [Event(step, "behavior", behavior.name)] if step == walk and not untouched else []
+
+    before = loop.attributes
+    records = list(run_episode(loop, walk + task.steps, press))
+    rows = [before, *(record.attributes for record in records)]
+    fell = bool(records[-1].ended)
     if len(rows) <= walk + 1:
         return TaskRun(TaskVerdict(False, 0.0, {}), True)
     return TaskRun(_judge(task, loop, np.array(rows), walk, fell), fell)

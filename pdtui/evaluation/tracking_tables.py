@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rich.console import Group
 from rich.table import Table
 
-from pdtui.core.text_tables import new_table, seed_range
+from pdtui.core.text_tables import mean_with_interval, new_table, seed_range
 from pdtui.search.gain_tuning import TunedGains
 from pdtui.search.step_response import StepResponseSummary
 from pdtui.search.tracking_summary import TrackingSummary
@@ -61,7 +61,7 @@ def add_tracking_figures(table: Table, columns: Sequence[TrackingSummary]) -> No
 
 
 def _with_interval(figures: TrackingSummary) -> str:
-    return f"{figures.error:.3f} [{figures.low:.3f}, {figures.high:.3f}]"
+    return mean_with_interval(figures.error, figures.low, figures.high, ".3f")
 
 
 def _rise(answers: StepResponseSummary) -> str:

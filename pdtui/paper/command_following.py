@@ -13,6 +13,7 @@ from pdtui.core.events import Event
 from pdtui.core.intervals import confidence_interval
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.headless_drive import run_episode
 from pdtui.drive.loop_builder import build_loop
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
@@ -84,18 +85,13 @@ def evaluate_command_following(
         rng = np.random.default_rng(seed)
         wanted = np.array([rng.uniform(one.low, one.high) for one in ranges.values()])
         loop = ControlLoop(robot, policy, _asking(built.map, dict(zip(ranges, wanted, strict=True))), seed)
-        values, ended = [], ""
-        for step in range(robot.episode_steps):
-            record = loop.advance([Event(0, "behavior", _ASKED)] if step == 0 else [])
-            values.append(record.attributes[columns])
-            ended = record.ended
-            if ended:
-                break
+        records = list(run_episode(loop, robot.episode_steps, _ask_at_start))
+        values = [record.attributes[columns] for record in records]
         settled = np.array(values[SETTLED:] or values[-1:])
         asked.append(wanted)
         errors.append(np.abs(settled - wanted).mean(axis=0))
         biases.append(np.abs(settled.mean(axis=0) - wanted))
-        finished += not ended
+        finished += not records[-1].ended
         if progress is not None:
             progress(done, len(seeds))
     rows = []
@@ -114,6 +110,10 @@ def evaluate_command_following(
     return CommandFollowingResult(
         robot.name, policy.name, tuple(seeds), robot.episode_steps, tuple(rows), finished
     )
+
+
+def _ask_at_start(step: int) -> list[Event]:
+    return [Event(0, "behavior", _ASKED)] if step == 0 else []
 
 
 def _asking(shipped: StimulationMap, commands: dict[str, float]) -> StimulationMap:

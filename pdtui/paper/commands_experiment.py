@@ -39,7 +39,7 @@ def run_commands_experiment(request: ExperimentRequest) -> ExperimentReport:
 
 def commands_table(result: CommandFollowingResult) -> Table:
     """Return a table with one row per command."""
-    from pdtui.core.text_tables import new_table, seed_range
+    from pdtui.core.text_tables import mean_with_interval, new_table, seed_range
 
     table = new_table(
         f"{result.robot}, policy {result.policy}, {seed_range(result.seeds)}, {result.steps} steps each",
@@ -50,7 +50,7 @@ def commands_table(result: CommandFollowingResult) -> Table:
         table.add_row(
             f"{row.command} ({row.unit})",
             f"{min(row.asked):+.2f} to {max(row.asked):+.2f}",
-            f"{row.error:.3f} [{row.low:.3f}, {row.high:.3f}]",
+            mean_with_interval(row.error, row.low, row.high, ".3f"),
             f"{row.bias:.3f}",
             f"{count - result.finished}/{count}",
         )

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import multiprocessing
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from rich.console import Console
 from scipy import stats
 
+from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError, WorkerError
 from pdtui.core.intervals import confidence_interval
+from pdtui.core.text_tables import mean_with_interval
 from pdtui.core.units import Stimulation
+from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
-from pdtui.evaluation.behavior_evaluation import evaluate_map
+from pdtui.evaluation.behavior_evaluation import STEPS, evaluate_map, run_behavior
 from pdtui.evaluation.policy_evaluation import evaluate_policy
 from pdtui.evaluation.target_tracking import evaluate_tracking, holding_behavior
+from pdtui.evaluation.tracking_tables import tracking_table
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.deadline import deadline
+from tests.turning_robot import Vehicle, turning_loop
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +78,42 @@ def test_the_interval_is_students() -> None:
     expected = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
     assert confidence_interval(values) == pytest.approx((expected.low, expected.high))
     assert confidence_interval(values[:1]) == (float("-inf"), float("inf"))
+
+
+class _Tipping(Vehicle):
+    """Tips over in a given control step of each episode."""
+
+    def __init__(self, step: int) -> None:
+        super().__init__()
+        self.tips_in, self.steps = step, 0
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Floats, dict[str, Any]]:
+        self.steps = 0
+        return super().reset(seed=seed, options=options)
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+        self.steps += 1
+        observation, reward, _, truncated, info = super().step(action)
+        return observation, reward, self.steps == self.tips_in, truncated, info
+
+
+@pytest.mark.parametrize(("step", "fell"), [(STEPS - 1, True), (STEPS, True), (STEPS + 1, False)])
+def test_a_fall_counts_up_to_the_last_step(step: int, fell: bool) -> None:
+    standing = turning_loop()
+    loop = ControlLoop(_Tipping(step), standing.policy, standing.map, 0)
+    assert run_behavior(loop, "turn", 1).fell == fell
+    assert run_behavior(loop, "", 1).fell == fell
+
+
+def test_one_seed_gives_a_mean_without_an_interval(config: DriveConfig) -> None:
+    result = evaluate_tracking(config, "yaw", [100], targets=(0.5,))
+    console = Console(width=120)
+    with console.capture() as shown:
+        console.print(tracking_table(result))
+    assert "inf" not in shown.get()
+    assert f"{result.error:.3f}" in shown.get()
+    assert mean_with_interval(1.0, 0.5, 1.25) == "1.00 [0.50, 1.25]"
+    assert mean_with_interval(1.0, float("-inf"), float("inf"), "+.1f") == "+1.0"
 
 
 def test_tracking_measures_the_wrapped_error(config: DriveConfig) -> None:

@@ -12,7 +12,7 @@ from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import SessionError
 from pdtui.core.events import Event
 from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.headless_drive import key_events
+from pdtui.drive.headless_drive import key_events, run_episode
 from pdtui.drive.keystrokes import format_keystrokes
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
 from pdtui.paper.forest.scripted_operator import DEFAULT, ScriptedOperator, operator_keys
@@ -73,25 +73,26 @@ def drive_forest_episode(
     column = loop.robot.attribute_index("distance")
     yaw = loop.robot.attribute_index("yaw")
     keys = operator_keys(loop.map) if operator is not None else {}
-    place = loop.robot.read_poses()[0]
-    rewards, costs, distances, events, fell = [], [], [], [], False
-    for _ in range(steps):
-        pressed: list[Event] = []
-        if operator is not None:
-            name = operator.look(float(place[0]), float(place[1]), float(loop.attributes[yaw]))
-            pressed = key_events([keys[name]] if name else [], loop)
-        record = loop.advance(pressed)
+
+    def press(_: int) -> list[Event]:
+        if operator is None:
+            return []
+        x, y = loop.robot.read_poses()[0, :2].tolist()
+        name = operator.look(x, y, float(loop.attributes[yaw]))
+        return key_events([keys[name]] if name else [], loop)
+
+    rewards, costs, distances = [], [], []
+    events: list[Event] = []
+    for record in run_episode(loop, steps, press):
         if recorder is not None:
             recorder.write(record)
-        place = record.poses[0]
         rewards.append(record.reward)
         costs.append(record.cost)
         distances.append(float(record.attributes[column]))
-        events += pressed
-        fell = bool(record.ended)
-        if fell or distances[-1] >= AHEAD:
+        events += record.events
+        if distances[-1] >= AHEAD:
             break
-    return _sum_up(loop.seed, rewards, costs, distances, events, fell), tuple(events)
+    return _sum_up(loop.seed, rewards, costs, distances, events, bool(record.ended)), tuple(events)
 
 
 def record_forest_episode(
