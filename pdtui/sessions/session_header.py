@@ -14,7 +14,7 @@ from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.drive_info_codec import decode_drive_info
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
+from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
 
 
 @dataclass(frozen=True)
@@ -53,21 +53,22 @@ class SessionHeader:
 
 
 def read_session_header(path: Path | str) -> SessionHeader:
-    """Read a session's heading; the rest is skipped as it streams by.
+    """Read the header of a session without decoding, or even reading, the data of its control steps.
 
     Raises:
-        SessionError: no such file, not a session, torn, or incomplete; the message names the file.
+        SessionError: no such file, not a session, torn, or incomplete; the message names the file. Damage
+            within the data of control steps is not noticed.
     """
     path = Path(path)
-    file = RrdContents(path, only=(DIGEST_EPISODE,))
+    file = RrdContents(path, entities=(EVENTS, ENDINGS))
     try:
-        return decode_header(file, path)
+        return decode_header(file, path, file.skipped_rows[DRIVE])
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
 
 
-def decode_header(file: RrdContents, path: Path) -> SessionHeader:
-    """The heading of an open session.
+def decode_header(file: RrdContents, path: Path, steps: int) -> SessionHeader:
+    """Return the header of a session of which properties, events and endings were read.
 
     Raises:
         SessionError: a part is missing or not what it should be; the message does not name the file.
@@ -79,7 +80,7 @@ def decode_header(file: RrdContents, path: Path) -> SessionHeader:
         versions={name: str(values[0]) for name, values in file.properties(VERSIONS).items() if values},
         created=created,
         events=_events(file.rows(EVENTS)),
-        steps=count_steps(file.rows(DRIVE)),
+        steps=steps,
         endings=_endings(file.rows(ENDINGS)),
         outcome=_outcome(file),
     )

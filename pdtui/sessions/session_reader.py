@@ -69,8 +69,9 @@ def read_session(path: Path | str) -> Session:
     path = Path(path)
     file = RrdContents(path, skip=("activations",))
     try:
-        heading = decode_header(file, path)
-        drive, info = file.rows(DRIVE), heading.info
+        drive = file.rows(DRIVE)
+        heading = decode_header(file, path, count_steps(drive))
+        info = heading.info
         gains = drive.block(REWARD_COST_ACTION, np.float64)
         if heading.steps and gains.shape[1] < 2:
             raise SessionError(f"stream '{DRIVE}/{REWARD_COST_ACTION}': expected reward and cost first")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +15,9 @@ from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.drive_info_codec import decode_drive_info
-from pdtui.sessions.rrd.rrd_contents import ChunkStream, RrdContents
-from pdtui.sessions.session_header import SessionHeader, read_session_header
+from pdtui.sessions.rrd.chunk_stream import ChunkStream
+from pdtui.sessions.rrd.rrd_contents import RrdContents
+from pdtui.sessions.session_header import SessionHeader, count_steps, decode_header
 from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, INFO, OUTCOME, STEP
 from pdtui.sessions.writer.rerun_recording import name_file_in_errors, open_recording, send_property
 
@@ -80,11 +81,12 @@ def repair_session(path: Path, output: Path) -> SessionHeader:
         raise SessionError(f"{output}: cannot be written: the folder does not exist")
     with name_file_in_errors(output), replace_file(output, SessionError) as partial:
         _rewrite(path, partial, condition)
-        repaired = read_session_header(partial)
+        contents = RrdContents(partial, only=(DIGEST_EPISODE,))
+        repaired = decode_header(contents, output, count_steps(contents.rows(DRIVE)))
         if repaired.steps != condition.steps:
             raise SessionError(f"{path}: {condition.steps} steps were there, {repaired.steps} were rescued")
         partial.chmod(path.stat().st_mode & 0o777)
-    return replace(repaired, path=output)
+    return repaired
 
 
 def _rewrite(path: Path, output: Path, condition: SessionCondition) -> None:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from pdtui.core.errors import PdtuiError
@@ -73,10 +74,13 @@ def read_session_file(path: Path) -> None:
     from pdtui.drive.keystrokes import format_keystrokes
     from pdtui.drive.replay import replay_config
     from pdtui.sessions.session_comparison import compare_sessions
+    from pdtui.sessions.session_header import read_session_header
     from pdtui.sessions.session_reader import read_activations, read_session
     from pdtui.sessions.session_repair import examine_session, repair_session
     from pdtui.sessions.session_summary import summarise_session
 
+    with suppress(PdtuiError):
+        read_session_header(path)
     output = path.with_name("repaired.rrd")
     try:
         session = read_session(path)

@@ -27,7 +27,9 @@ _SIZED = (
     pa.types.is_binary,
     pa.types.is_large_binary,
 )
-_HEADER, _COMPRESSION = 2, 3  # fields of a message, and of a record batch
+_HEADER_TYPE, _HEADER = 1, 2  # fields of a message
+_LENGTH, _COMPRESSION = 0, 3  # fields of a record batch
+_RECORD_BATCH = 3  # type of a header
 
 
 def read_record_batch(data: pa.Buffer) -> pa.RecordBatch:
@@ -102,18 +104,41 @@ def _check_type(kind: pa.DataType, depth: int) -> None:
         _check_type(one, depth - 1)
 
 
+def count_rows(metadata: memoryview) -> int:
+    """Return the number of rows of a record batch, from the metadata of its message.
+
+    Raises:
+        ValueError: the metadata are damaged or belong to another kind of message.
+    """
+    try:
+        (root,) = struct.unpack_from("<I", metadata, 0)
+        kind, length = _field(metadata, root, _HEADER_TYPE), _field(metadata, _header(metadata), _LENGTH)
+        if kind is None or metadata[kind] != _RECORD_BATCH:
+            raise ValueError("expected the metadata of a record batch")
+        rows = 0 if length is None else struct.unpack_from("<q", metadata, length)[0]
+    except (struct.error, IndexError) as error:
+        raise ValueError(f"a message whose header is damaged: {error}") from error
+    if not 0 <= rows <= MAX_ROWS:
+        raise ValueError(f"expected at most {MAX_ROWS} rows, found {rows}")
+    return int(rows)
+
+
 def _is_compressed(metadata: pa.Buffer) -> bool:
     """Whether a record batch names a codec; only its flatbuffer says so before the buffers are unpacked."""
     view = memoryview(metadata)
     try:
-        (root,) = struct.unpack_from("<I", view, 0)
-        header = _field(view, root, _HEADER)
-        if header is None:
-            raise ValueError("a message without a header")
-        (offset,) = struct.unpack_from("<I", view, header)
-        return _field(view, header + offset, _COMPRESSION) is not None
+        return _field(view, _header(view), _COMPRESSION) is not None
     except struct.error as error:
         raise ValueError(f"a message whose header is damaged: {error}") from error
+
+
+def _header(view: memoryview) -> int:
+    """Where the header of a message begins."""
+    (root,) = struct.unpack_from("<I", view, 0)
+    header = _field(view, root, _HEADER)
+    if header is None:
+        raise ValueError("a message without a header")
+    return int(header + struct.unpack_from("<I", view, header)[0])
 
 
 def _field(view: memoryview, table: int, number: int) -> int | None:

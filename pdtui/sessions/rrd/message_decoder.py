@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import pyarrow as pa
 
@@ -15,7 +17,8 @@ MAX_MESSAGE = 256 << 20
 _LZ4_RATIO = 255  # no LZ4 block grows more than by this
 _PLAIN, _LZ4 = (0, 1), 2
 _ARROW_IPC = 1
-_PATH, _KIND, _INDEX = b"rerun:entity_path", b"rerun:kind", b"index"
+ENTITY_PATH = b"rerun:entity_path"
+_KIND, _INDEX = b"rerun:kind", b"index"
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ def decode_store_info(payload: memoryview) -> StoreInfo:
     Raises:
         ValueError: the message is damaged.
     """
-    return _store(bytes_field(read_fields(bytes_field(read_fields(payload), 2)), 2))
+    return _decode_store(bytes(bytes_field(read_fields(bytes_field(read_fields(payload), 2)), 2)))
 
 
 def decode_chunk(payload: memoryview) -> tuple[StoreInfo, EntityChunk]:
@@ -63,30 +66,59 @@ def decode_chunk(payload: memoryview) -> tuple[StoreInfo, EntityChunk]:
         ValueError, pyarrow.ArrowException: the message is damaged, or would unpack to more than is bearable.
     """
     message = read_fields(payload)
-    store = _store(bytes_field(message, 1))
+    store = decode_store(message)
     if number_field(message, 4) != _ARROW_IPC:
         raise ValueError("expected rows in Arrow's format")
-    batch = read_record_batch(_unpacked(message))
+    batch = read_record_batch(unpack_payload(message, decompress_whole))
     metadata = batch.schema.metadata or {}
-    if _PATH not in metadata:
+    if ENTITY_PATH not in metadata:
         raise ValueError("rows of no entity")
     timelines = tuple(field.name for field in batch.schema if (field.metadata or {}).get(_KIND) == _INDEX)
-    return store, EntityChunk(metadata[_PATH].decode(), timelines, batch)
+    return store, EntityChunk(metadata[ENTITY_PATH].decode(), timelines, batch)
 
 
-def _store(message: memoryview) -> StoreInfo:
-    found = read_fields(message)
+def decode_store(chunk_message: dict[int, Value]) -> StoreInfo:
+    """Return the store that a chunk belongs to.
+
+    Raises:
+        ValueError: the message is damaged.
+    """
+    return _decode_store(bytes(bytes_field(chunk_message, 1)))
+
+
+@lru_cache(maxsize=32)
+def _decode_store(store: bytes) -> StoreInfo:
+    found = read_fields(memoryview(store))
     application = text_field(read_fields(bytes_field(found, 3)), 1)
     return StoreInfo(number_field(found, 1) == 1, text_field(found, 2), application)
 
 
-def _unpacked(message: dict[int, Value]) -> pa.Buffer:
+def unpack_payload(
+    message: dict[int, Value], decompress: Callable[[memoryview, int], pa.Buffer]
+) -> pa.Buffer:
+    """Return the rows of a chunk's message as an Arrow IPC stream.
+
+    Args:
+        message: the fields of the message.
+        decompress: decompresses an LZ4 block, given its bytes and the size that the message claims.
+
+    Raises:
+        ValueError, pyarrow.ArrowException: the message is damaged.
+    """
     packed, compression = bytes_field(message, 5), number_field(message, 2)
     if compression in _PLAIN:
         return pa.py_buffer(bytes(packed))
     if compression != _LZ4:
         raise ValueError(f"unknown compression {compression}")
-    size = number_field(message, 3)
+    return decompress(packed, number_field(message, 3))
+
+
+def decompress_whole(packed: memoryview, size: int) -> pa.Buffer:
+    """Decompress an LZ4 block.
+
+    Raises:
+        ValueError, pyarrow.ArrowException: it is damaged or too large.
+    """
     if size > min(MAX_MESSAGE, _LZ4_RATIO * len(packed)):
         raise ValueError(f"{len(packed)} bytes cannot unpack to {size}, or must not")
     return pa.decompress(packed, size, codec="lz4_raw")

@@ -7,10 +7,12 @@ _VARINT_BYTES = 10
 Value = int | memoryview
 
 
-def read_fields(message: memoryview) -> dict[int, Value]:
-    """The fields of a message by their numbers; of one that is repeated, the last.
+def read_fields(message: memoryview, *, cut: bool = False) -> dict[int, Value]:
+    """Return the fields of a message by their numbers; of a repeated field, the last.
 
-    Numbers are given as they are, everything else as the bytes that it has.
+    Args:
+        message: its bytes. Numbers are decoded; every other field is returned as its bytes.
+        cut: whether only the start of the message is there, so that the last field may be incomplete.
 
     Raises:
         ValueError: the bytes are no such message.
@@ -29,7 +31,7 @@ def read_fields(message: memoryview) -> dict[int, Value]:
             length = 8 if kind == _EIGHT else 4
         else:
             raise ValueError(f"unknown wire type {kind}")
-        if place + length > len(message):
+        if place + length > len(message) and not cut:
             raise ValueError(f"a field of {length} bytes, {len(message) - place} are left")
         found[tag >> 3] = message[place : place + length]
         place += length

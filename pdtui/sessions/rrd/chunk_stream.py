@@ -1,0 +1,141 @@
+"""The chunks of an .rrd file, one after the other; an error names the byte at which the file is damaged."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import BinaryIO, TypeVar
+
+import pyarrow as pa
+
+from pdtui.core.errors import SessionError
+from pdtui.core.untrusted_file import open_regular_file
+from pdtui.sessions.rrd.chunk_head import read_chunk_head
+from pdtui.sessions.rrd.message_decoder import (
+    MAX_MESSAGE,
+    EntityChunk,
+    StoreInfo,
+    decode_chunk,
+    decode_store_info,
+)
+from pdtui.sessions.rrd.message_framing import (
+    CHUNK,
+    LAST,
+    RESCUE,
+    STORE,
+    MessageFrame,
+    check_end,
+    check_start,
+    read_message_frames,
+)
+from pdtui.sessions.session_schema import APP
+
+T = TypeVar("T")
+_MAX_STORES = 16
+_DAMAGED = (ValueError, OverflowError, EOFError, OSError, MemoryError, pa.ArrowException)
+
+
+class ChunkStream:
+    """The chunks of a recording in the order of the file; never more than one is in memory.
+
+    Args:
+        path: the file.
+        needed: tells by its entity whether a chunk is decoded; of the others only the heads are read. By
+            default every message is decoded and checked.
+
+    Attributes:
+        skipped_rows: number of rows in the chunks that were not decoded, by entity.
+        store: of the recording, once its announcement was read.
+        complete: whether every message was read.
+        finished: whether the index at the file's end was, too.
+    """
+
+    def __init__(self, path: Path, needed: Callable[[str], bool] | None = None) -> None:
+        self._path, self._needed = path, needed
+        self._stores: list[StoreInfo] = []
+        self.store: StoreInfo | None = None
+        self.complete = self.finished = False
+        self.skipped_rows: Counter[str] = Counter()
+
+    def __iter__(self) -> Iterator[EntityChunk]:
+        """Read from the beginning.
+
+        Raises:
+            SessionError: no such file, not a recording, another program's, or torn: raised after the chunks
+                before the damage were given. The message names file and byte.
+        """
+        try:
+            with open_regular_file(self._path) as file:
+                yield from self._chunks(file)
+        except FileNotFoundError:
+            raise SessionError(f"{self._path}: no such file") from None
+        except OSError as error:
+            raise SessionError(f"{self._path}: cannot be read: {error.strerror}") from error
+        except SessionError as error:
+            raise SessionError(f"{self._path}: {error}") from error
+        self.found()
+        self.complete = True
+
+    def found(self) -> StoreInfo:
+        """The store of the recording.
+
+        Raises:
+            SessionError: the file announces none.
+        """
+        if self.store is None:
+            raise SessionError(f"{self._path}: holds no recording")
+        return self.store
+
+    def _chunks(self, file: BinaryIO) -> Iterator[EntityChunk]:
+        check_start(file)
+        for frame in read_message_frames(file, os.fstat(file.fileno()).st_size):
+            if frame.kind == LAST:
+                check_end(file, frame)
+                self.finished = True
+            elif frame.kind == STORE:
+                self._announced(_decoded(file, frame, decode_store_info))
+            elif frame.kind == CHUNK and (chunk := self._read_chunk(file, frame)) is not None:
+                yield chunk
+
+    def _read_chunk(self, file: BinaryIO, frame: MessageFrame) -> EntityChunk | None:
+        head = None if self._needed is None else read_chunk_head(file, frame, self.store)
+        if head is None or self._needed is None or (head.store == self.store and self._needed(head.entity)):
+            store, chunk = _decoded(file, frame, decode_chunk)
+        else:
+            store, chunk = head.store, None
+            self.skipped_rows[head.entity] += head.rows
+        if store not in self._stores:
+            raise SessionError(f"byte {frame.start}: rows of a recording that the file does not announce")
+        return chunk if store == self.store else None
+
+    def _announced(self, store: StoreInfo) -> None:
+        if store in self._stores:
+            return
+        if len(self._stores) == _MAX_STORES:
+            raise SessionError(f"expected at most {_MAX_STORES} recordings and layouts, there are more")
+        if store.application_id != APP:
+            raise SessionError(f"expected a recording of {APP}, found one of '{store.application_id[:60]}'")
+        self._stores.append(store)
+        if self.store is None and store.drive:
+            self.store = store
+
+
+def _decoded(file: BinaryIO, frame: MessageFrame, read: Callable[[memoryview], T]) -> T:
+    """What a message says.
+
+    Raises:
+        SessionError: it is damaged or too large.
+    """
+    if frame.length > MAX_MESSAGE:
+        raise SessionError(f"byte {frame.start}: expected a message of at most {MAX_MESSAGE >> 20} MiB")
+    file.seek(frame.start)
+    payload = file.read(frame.length)
+    if len(payload) < frame.length:
+        raise SessionError("the file became shorter while it was read")
+    try:
+        return read(memoryview(payload))
+    except _DAMAGED as error:
+        why = " ".join(str(error).split())[:200]
+        raise SessionError(f"byte {frame.start}: a message is damaged: {why}; {RESCUE}") from error

@@ -1,0 +1,63 @@
+"""The header of a session: it is read without the numbers of the steps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pyarrow as pa
+import pytest
+
+from pdtui.core.errors import SessionError
+from pdtui.sessions.rrd.chunk_head import decompress_start
+from pdtui.sessions.rrd.message_framing import CHUNK, read_message_frames
+from pdtui.sessions.session_header import read_session_header
+from pdtui.sessions.session_reader import read_session
+from tests.sessions.conftest import Recorded
+
+SAMPLES = Path(__file__).parents[2] / "sessions" / "samples"
+
+
+@pytest.mark.parametrize("sample", ["a1", "ant", "bipedal_walker", "walker"])
+def test_the_header_says_what_the_whole_session_says(sample: str) -> None:
+    path = SAMPLES / f"{sample}.rrd"
+    header, session = read_session_header(path), read_session(path)
+    assert vars(header) == {name: getattr(session, name) for name in vars(header)}
+    assert header.steps == len(session.digests) > 0
+
+
+def test_the_data_of_the_steps_is_not_read_for_the_header(tmp_path: Path) -> None:
+    """All of a long message but its beginning is overwritten: only a reader of the steps notices."""
+    sample = SAMPLES / "ant.rrd"
+    data = bytearray(sample.read_bytes())
+    blanked = 0
+    with sample.open("rb") as file:
+        for frame in read_message_frames(file, len(data)):
+            if frame.kind == CHUNK and frame.length > 20_000:
+                data[frame.start + 4096 : frame.end] = bytes(frame.length - 4096)
+                blanked += frame.length - 4096
+    path = tmp_path / "ant.rrd"
+    path.write_bytes(data)
+    assert blanked > 0.6 * len(data)
+    assert vars(read_session_header(path)) == {**vars(read_session_header(sample)), "path": path}
+    with pytest.raises(SessionError, match="a message is damaged"):
+        read_session(path)
+
+
+def test_a_damaged_head_of_a_chunk_is_named(recorded: Recorded, tmp_path: Path) -> None:
+    data = bytearray(recorded[0].read_bytes())
+    with recorded[0].open("rb") as file:
+        frames = [frame for frame in read_message_frames(file, len(data)) if frame.kind == CHUNK]
+    path = tmp_path / "a.rrd"
+    for frame in frames[:: len(frames) // 12]:
+        path.write_bytes(data[: frame.start] + b"\xff" * 64 + data[frame.start + 64 :])
+        with pytest.raises(SessionError, match=rf"a\.rrd: byte {frame.start}: a message is damaged"):
+            read_session_header(path)
+
+
+@pytest.mark.parametrize("cut", [40, 500, 3000, 10**6])
+def test_the_start_of_a_block_is_decompressed_from_its_start(cut: int) -> None:
+    content = b"".join(b"%d, %d, " % (number % 77, number * number) for number in range(3000)) + bytes(70_000)
+    packed = pa.compress(content, codec="lz4_raw", asbytes=True)
+    start = decompress_start(memoryview(packed)[:cut], len(content)).to_pybytes()
+    assert content.startswith(start)
+    assert len(start) >= min(cut - 300, 8192)
