@@ -13,6 +13,7 @@ from pdtui.cli.command_group import LazyCommandGroup
 COMMANDS = {
     "drive": ("pdtui.cli.drive_commands:drive", "Drive a robot with the keys of its map."),
     "replay": ("pdtui.cli.drive_commands:replay", "Repeat a session and compare every step."),
+    "guide": ("pdtui.cli.guide_command:guide", "Read the guide."),
     "sessions": ("pdtui.cli.sessions_command:sessions", "List, inspect, verify, repair and export sessions."),
     "evaluate": ("pdtui.cli.evaluate_command:evaluate", "Measure what the behaviors of a map do."),
     "dissect": ("pdtui.cli.dissect_command:dissect", "Find the units that steer a robot; write a map."),

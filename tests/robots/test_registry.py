@@ -13,7 +13,7 @@ import pytest
 from pdtui.core.errors import RobotError
 from pdtui.robots import check_robot, file_stem, make_robot
 
-GUIDE = Path(__file__).parents[2] / "pdtui" / "robots" / "README.md"
+GUIDE = Path(__file__).parents[2] / "pdtui" / "guide" / "your-world.md"
 MODULE = """\
 import pathlib
 import gymnasium

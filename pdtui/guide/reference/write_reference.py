@@ -1,0 +1,22 @@
+"""Write the generated pages of the guide: `python -m pdtui.guide.reference.write_reference`."""
+
+from __future__ import annotations
+
+from pdtui import api
+from pdtui.cli import main
+from pdtui.guide.guide_pages import GUIDE_FOLDER
+from pdtui.guide.reference.command_reference import command_reference
+from pdtui.guide.reference.python_reference import python_reference
+
+
+def generate_pages() -> dict[str, str]:
+    """Return the text of the generated pages, by topic."""
+    return {
+        "commands": command_reference(main, "pdtui"),
+        "python": python_reference(api),
+    }
+
+
+if __name__ == "__main__":
+    for topic, text in generate_pages().items():
+        (GUIDE_FOLDER / f"{topic}.md").write_text(text, encoding="utf-8")
