@@ -17,12 +17,12 @@ from pdtui.core.errors import PdtuiError
 from pdtui.core.units import Stimulation
 from pdtui.core.worker_pool import WorkerProcess
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.probing.start_states import collect_start_states
 from pdtui.probing.stimulated_rollout import RolloutJob
 from pdtui.spectra.matching import Discrepancies, match_units
-from pdtui.spectra.matching_presets import find_preset
-from pdtui.spectra.monitor import MonitoredEpisode, collect_start_states, monitor_episodes
+from pdtui.spectra.matching_presets import MatchingPreset, find_preset
+from pdtui.spectra.monitor import MonitoredEpisode, monitor_episodes
 from pdtui.spectra.phase_correlation import correlate_phases
-from pdtui.spectra.spectrogram import MatchingPreset
 
 Progress = Callable[[int, int, str], None]
 _SHIFT = 37
@@ -176,22 +176,22 @@ def bench_dissection(
 
 
 def record_episodes(
-    crew: RolloutPool, plan: BenchmarkSizes
+    pool: RolloutPool, plan: BenchmarkSizes
 ) -> tuple[list[MonitoredEpisode], tuple[Attribute, ...]]:
     """Unstimulated episodes, with as many columns as asked for.
 
     Raises:
         PdtuiError: an episode ended early: the sizes would not be those that are reported.
     """
-    recorded = monitor_episodes(crew.robot, crew.policy, range(1000, 1000 + plan.episodes), plan.steps)
+    recorded = monitor_episodes(pool.robot, pool.policy, range(1000, 1000 + plan.episodes), plan.steps)
     for episode in recorded:
         if episode.steps < plan.steps:
             raise PdtuiError(
-                f"{crew.robot.name}: expected {plan.steps} steps, but the episode of seed {episode.seed} "
+                f"{pool.robot.name}: expected {plan.steps} steps, but the episode of seed {episode.seed} "
                 f"ended after {episode.steps}: {episode.ended}"
             )
     episodes = [widen_episode(episode, plan.units, plan.attributes) for episode in recorded]
-    known = crew.robot.attributes
+    known = pool.robot.attributes
     attributes = tuple(
         replace(known[column % len(known)], name=f"{known[column % len(known)].name} {column}")
         for column in range(plan.attributes)
@@ -247,7 +247,7 @@ def same_ranking(found: Discrepancies, reference: Floats) -> tuple[bool, int]:
     """
     same, ties = True, 0
     for row, distances in enumerate(reference):
-        ours = found.ranked(row)
+        ours = found.ranked_units(row)
         in_our_order = distances[ours]
         rounding = _ROUNDING * distances.max()
         ties += int((np.diff(np.sort(distances)) <= rounding).sum())
@@ -327,10 +327,10 @@ def probing_rate(one: RolloutPool, two: RolloutPool, plan: BenchmarkSizes) -> Fl
     ]
     two.run(jobs, starts, 1, 0)  # the worker processes start
 
-    def rate(crew: RolloutPool) -> float:
-        before = crew.steps_run
-        seconds = _seconds(lambda: crew.run(jobs, starts, plan.probe_steps, 0))
-        return (crew.steps_run - before) / seconds
+    def rate(pool: RolloutPool) -> float:
+        before = pool.steps_run
+        seconds = _seconds(lambda: pool.run(jobs, starts, plan.probe_steps, 0))
+        return (pool.steps_run - before) / seconds
 
     return np.array([[rate(one), rate(two)] for _ in range(plan.rounds)])
 

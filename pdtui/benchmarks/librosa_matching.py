@@ -10,8 +10,8 @@ from scipy.signal import get_window
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PdtuiError
+from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.monitor import MonitoredEpisode
-from pdtui.spectra.spectrogram import MatchingPreset
 
 
 def load_librosa() -> Any:

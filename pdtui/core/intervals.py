@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from pdtui.core.attributes import Floats
@@ -14,3 +17,27 @@ def confidence_interval(values: Floats) -> tuple[float, float]:
         return float("-inf"), float("inf")
     half = float(stats.t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values)))
     return float(values.mean()) - half, float(values.mean()) + half
+
+
+def bootstrap_interval(
+    samples: NDArray[Any], seed: int, *, level: float = 0.95, draws: int = 2000
+) -> tuple[float, float]:
+    """Percentile bootstrap interval of a mean.
+
+    Args:
+        samples: shape (K,); NaN (a fall before the measured steps) is left out.
+        seed: of the draws.
+        level: coverage.
+        draws: resamples.
+
+    Returns:
+        low and high; NaN for fewer than two samples, which say nothing about spread.
+    """
+    known = np.asarray(samples, np.float64)
+    known = known[np.isfinite(known)]
+    if known.size < 2:
+        return float("nan"), float("nan")
+    drawn = stats.bootstrap(
+        (known,), np.mean, n_resamples=draws, confidence_level=level, method="percentile", rng=seed
+    ).confidence_interval
+    return float(drawn.low), float(drawn.high)

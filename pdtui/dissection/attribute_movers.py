@@ -8,11 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.intervals import bootstrap_interval
 from pdtui.core.units import Stimulation
 from pdtui.dissection.dissection_settings import DissectionSettings
-from pdtui.probing.confirmation import exceeds_random
-from pdtui.probing.effect_probe import EffectCurves, EffectProber, PlanEffects, bootstrap_interval
-from pdtui.spectra.monitor import MonitoredEpisode, StartState, StepProgress
+from pdtui.probing.confirmation import exceeds_random_units
+from pdtui.probing.effect_probe import EffectProbe, PlanEffects
+from pdtui.probing.start_states import StartState
+from pdtui.probing.unit_effects import UnitEffects
+from pdtui.spectra.monitor import MonitoredEpisode, StepProgress
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
 _KEPT = 0.7
@@ -84,11 +87,11 @@ def _runs_on(series: Floats) -> bool:
 
 
 def find_attribute_movers(
-    prober: EffectProber,
+    prober: EffectProbe,
     columns: Sequence[int],
     spread: Floats,
-    screen: EffectCurves,
-    refined: EffectCurves,
+    screen: UnitEffects,
+    refined: UnitEffects,
     starts: Sequence[StartState],
     settings: DissectionSettings,
     progress: StepProgress | None = None,
@@ -114,7 +117,7 @@ def find_attribute_movers(
     asked = [(column, sign) for column in columns for sign in (1, -1)]
 
     def probe(plans: Sequence[Stimulation], some: Sequence[StartState]) -> PlanEffects:
-        return prober.probe(plans, some, steps=steps, measure_from=steps // 3)
+        return prober.measure_plans(plans, some, steps=steps, measure_from=steps // 3)
 
     for done, (column, sign) in enumerate(asked, start=1):
         singles = _singles(column, sign, screen, refined, settings.mover_singles)
@@ -134,19 +137,19 @@ def find_attribute_movers(
 
 
 def _singles(
-    column: int, sign: int, screen: EffectCurves, refined: EffectCurves, count: int
+    column: int, sign: int, screen: UnitEffects, refined: UnitEffects, count: int
 ) -> list[Stimulation]:
     """The units, each at its best output, that move the attribute that way most surely.
 
     Only inside the units' safe ranges, and only those that move it more than units drawn at random.
     """
-    robust = refined.robust(column, float(sign)).copy()
+    robust = refined.robust_effects(column, float(sign)).copy()
     for row, unit in enumerate(refined.units):
-        alive = refined.survived(unit)
+        alive = refined.safe_magnitude(unit)
         for dose, value in enumerate(refined.values):
             sure = robust[row, dose] > 0 and abs(value) <= alive
             effect = float(np.nanmean(refined.effects[row, dose, :, column])) if sure else 0.0
-            if not sure or not exceeds_random(effect, value, column, screen):
+            if not sure or not exceeds_random_units(effect, value, column, screen):
                 robust[row, dose] = 0.0
     furthest = robust.max(axis=1)
     rows = [int(row) for row in np.argsort(-furthest, kind="stable")[:count] if furthest[row] > 0]
@@ -164,7 +167,7 @@ def _lasting(result: PlanEffects, column: int, sign: int) -> int | None:
 
 
 def _cancelling(
-    single: Stimulation, column: int, sign: int, columns: Sequence[int], spread: Floats, refined: EffectCurves
+    single: Stimulation, column: int, sign: int, columns: Sequence[int], spread: Floats, refined: UnitEffects
 ) -> list[Stimulation]:
     """Second units that, if effects add up, keep most of the main effect and undo the side effects."""
     mean = np.nan_to_num(refined.effects).mean(axis=2) / np.where(spread > 0, spread, 1.0)

@@ -20,8 +20,8 @@ from pdtui.dissection.probe_starts import gather_probe_starts
 from pdtui.dissection.sample_episode import pick_sample_episode
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
-from pdtui.probing.confirmation import draw_controls, select_units
-from pdtui.probing.effect_probe import EffectProber
+from pdtui.probing.confirmation import draw_control_units, select_units_to_refine
+from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots import open_robot
@@ -63,7 +63,7 @@ def dissect(config: DissectionConfig) -> Dissection:
         robot, network, journal = pool.robot, pool.policy, None
         if config.journal is not None:
             journal = stack.enter_context(RolloutJournal(config.journal, _identity(pool)))
-        prober = EffectProber(pool, journal)
+        prober = EffectProbe(pool, journal)
         known = _fixed_behaviors(first_map, network) if first_map is not None else ()
         episodes = monitor_episodes(
             robot, network, range(seed, seed + config.episodes), settings.steps, stage("monitor")
@@ -72,16 +72,16 @@ def dissect(config: DissectionConfig) -> Dissection:
         phase = correlate_phases(episodes, robot.attributes, preset)
         starts = gather_probe_starts(pool, settings, seed + 100)
         settings = starts.settings
-        screen = prober.sweep(
+        screen = prober.measure_units(
             range(network.units),
             settings.screen_values,
             starts.screen,
             steps=settings.screen_steps,
             progress=stage("screen every unit"),
         )
-        chosen = select_units(screen, matching, range(len(robot.attributes)), settings.refine_keep)
-        controls = draw_controls(screen, settings.controls, seed)
-        refined = prober.sweep(
+        chosen = select_units_to_refine(screen, matching, range(len(robot.attributes)), settings.refine_keep)
+        controls = draw_control_units(screen, settings.controls, seed)
+        refined = prober.measure_units(
             sorted({*chosen, *controls}),
             settings.refine_values,
             starts.refine,

@@ -11,13 +11,13 @@ from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.sample_episode import SampleEpisode
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
-from pdtui.probing.effect_probe import EffectCurves
+from pdtui.probing.unit_effects import UnitEffects
 from pdtui.robots.robot_goals import RobotGoals
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.spectra.matching import Discrepancies
+from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.phase_correlation import PhaseCorrelations
-from pdtui.spectra.spectrogram import MatchingPreset
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import StimulationMap
 
@@ -64,8 +64,8 @@ class Dissection:
     matching: Discrepancies
     phase: PhaseCorrelations
     sample_episode: SampleEpisode
-    screen: EffectCurves
-    refined: EffectCurves
+    screen: UnitEffects
+    refined: UnitEffects
     controls: tuple[int, ...]
     spread: Floats
     movable: tuple[int, ...]
@@ -91,7 +91,7 @@ class Dissection:
         Raises:
             RobotError: the robot has no such attribute.
         """
-        ranked = self.matching.ranked(self.column(attribute))[:count]
+        ranked = self.matching.ranked_units(self.column(attribute))[:count]
         return [format_unit(int(unit), self.layers) for unit in ranked]
 
     def side_effects(self) -> dict[float, Floats]:

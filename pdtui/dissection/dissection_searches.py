@@ -10,7 +10,8 @@ import numpy as np
 
 from pdtui.core.units import Stimulation
 from pdtui.dissection.dissection_settings import DissectionSettings
-from pdtui.probing.effect_probe import EffectCurves, EffectProber
+from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.unit_effects import UnitEffects
 from pdtui.robots.robot import Robot
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.behavior_goals import STANDING, reachable_goals
@@ -53,7 +54,7 @@ class DissectionSearches:
         known: sets of units from elsewhere, where searches begin too.
     """
 
-    prober: EffectProber
+    prober: EffectProbe
     world: Robot
     plan: DissectionSettings
     seed: int
@@ -62,7 +63,7 @@ class DissectionSearches:
     known: Sequence[Stimulation] = ()
 
     def run(
-        self, screen: EffectCurves, refined: EffectCurves, starts: SearchStartStates
+        self, screen: UnitEffects, refined: UnitEffects, starts: SearchStartStates
     ) -> tuple[tuple[BehaviorSearchResult, ...], tuple[ControllerSearchResult, ...]]:
         """A behavior for each goal, and a controller for each attribute, that means anything here."""
         goals, targets = reachable_goals(self.world, refined.unperturbed), self._targets(refined)
@@ -76,7 +77,7 @@ class DissectionSearches:
     def _behaviors(
         self,
         goals: Sequence[BehaviorGoal],
-        sweeps: Sequence[EffectCurves],
+        sweeps: Sequence[UnitEffects],
         pool: SharedCandidates,
         starts: SearchStartStates,
     ) -> tuple[BehaviorSearchResult, ...]:
@@ -92,7 +93,7 @@ class DissectionSearches:
 
     def pool(self, starts: SearchStartStates) -> SharedCandidates:
         """Random sets and imprints, probed once for all searches."""
-        crew, sizes, imprint = self.prober.crew, self.plan.behavior_search, self.plan.imprints
+        crew, sizes, imprint = self.prober.pool, self.plan.behavior_search, self.plan.imprints
         seeds = range(self.seed + _IMPRINT_SEEDS, self.seed + _IMPRINT_SEEDS + imprint.episodes)
         episodes = monitor_episodes(self.world, crew.policy, seeds, imprint.steps)
         plans = [
@@ -105,7 +106,7 @@ class DissectionSearches:
         few = starts.search[: sizes.quick_starts]
         return SharedCandidates(self.prober, plans, few, sizes.quick_steps, self.stage("sets of units"))
 
-    def _targets(self, sweep: EffectCurves) -> list[ControllerGoal]:
+    def _targets(self, sweep: UnitEffects) -> list[ControllerGoal]:
         """What the robot's goals hold; a robot that stands has no share of its speed to hold."""
         names = [attribute.name for attribute in self.world.attributes]
         wanted = []
@@ -124,7 +125,7 @@ class DissectionSearches:
     def _holds(
         self,
         targets: Sequence[ControllerGoal],
-        sweep: EffectCurves,
+        sweep: UnitEffects,
         pool: SharedCandidates,
         starts: SearchStartStates,
     ) -> tuple[ControllerSearchResult, ...]:

@@ -9,11 +9,11 @@ from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.probing.confirmation import (
-    BEST,
+    TOP_MATCHES,
     PrimitiveConfirmation,
-    best_probed,
     confirm_unit,
-    matching_hit_rate,
+    measure_matching_hits,
+    rank_probed_units,
 )
 from pdtui.spectra.matching_presets import preset_values
 
@@ -57,8 +57,8 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
 def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, Any]:
     attribute = dissection.attributes[column]
     matching, phase, layers = dissection.matching, dissection.phase, dissection.layers
-    ranked = matching.ranked(column)
-    rate = matching_hit_rate(column, dissection.screen, matching, dissection.refined, dissection.controls)
+    ranked = matching.ranked_units(column)
+    rate = measure_matching_hits(column, dissection.screen, matching, dissection.refined, dissection.controls)
     first = None
     if ranked.size:
         first = confirm_unit(int(ranked[0]), column, dissection.screen, dissection.refined, dissection.seed)
@@ -86,11 +86,11 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
         "first_match": None if first is None else _confirmation(dissection, column, first),
         "probed": [
             _confirmation(dissection, column, one)
-            for one in best_probed(column, dissection.screen, dissection.refined, dissection.seed)
+            for one in rank_probed_units(column, dissection.screen, dissection.refined, dissection.seed)
         ],
         "hits": {
             "first": rate.first,
-            **{f"best_{count}": _number(share) for count, share in zip(BEST, rate.best, strict=True)},
+            **{f"best_{count}": _number(share) for count, share in zip(TOP_MATCHES, rate.best, strict=True)},
             "random": _number(rate.random),
             "rank_correlation": _number(rate.correlation),
             "held_out_matching": _number(rate.held_out_matching),
@@ -109,7 +109,7 @@ def _confirmation(dissection: Dissection, column: int, one: PrimitiveConfirmatio
         "high": _number(one.measured.high),
         "confirmed": one.confirmed,
         "both_ways": one.both_ways,
-        "survived": one.survived,
+        "survived": one.safe_magnitude,
         "rho": _number(rho),
         # ρ > 0 says that a higher output goes with a higher attribute.
         "sign_agrees": bool(rho * one.value * one.measured.effect > 0),

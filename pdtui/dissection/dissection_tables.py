@@ -11,7 +11,7 @@ from rich.text import Text
 from pdtui.core.text_tables import new_table
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.probing.confirmation import BEST
+from pdtui.probing.confirmation import TOP_MATCHES
 
 _LISTED = 6
 _MATCHES = 3
@@ -64,7 +64,7 @@ def _probing_table(summary: dict[str, Any]) -> Table:
         "both ways",
         "first match",
         "its effect [95 %]",
-        "hits: first / " + " / ".join(f"best {count}" for count in BEST) + " / random",
+        "hits: first / " + " / ".join(f"best {count}" for count in TOP_MATCHES) + " / random",
         "held-out rank corr.: matching / probing",
     )
     for attribute in summary["attributes"]:
@@ -80,7 +80,7 @@ def _probing_table(summary: dict[str, Any]) -> Table:
             " / ".join(
                 [
                     "yes" if hits["first"] else "no",
-                    *(_show(hits[f"best_{count}"], ".0%") for count in BEST),
+                    *(_show(hits[f"best_{count}"], ".0%") for count in TOP_MATCHES),
                     _show(hits["random"], ".0%"),
                 ]
             ),

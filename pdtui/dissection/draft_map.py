@@ -11,7 +11,7 @@ import tomlkit
 from pdtui.core.units import NO_STIMULATION, Stimulation, format_unit
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.key_allocator import KeyAllocator
-from pdtui.probing.confirmation import PrimitiveConfirmation, best_probed
+from pdtui.probing.confirmation import PrimitiveConfirmation, rank_probed_units
 from pdtui.robots.robot_goals import HoldGoal
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
@@ -94,7 +94,7 @@ def _primitives(dissection: Dissection) -> list[dict[str, Any]]:
     entries: list[dict[str, Any]] = []
     for attribute, name in _nameable(dissection).items():
         column = dissection.column(attribute)
-        best = best_probed(column, dissection.screen, dissection.refined, dissection.seed)
+        best = rank_probed_units(column, dissection.screen, dissection.refined, dissection.seed)
         # Without a phase there is no ρ, and without ρ no magnitude c: such a unit is no primitive.
         rho = dissection.phase.rho(dissection.preset)[column]
         known = [one for one in best if one.confirmed and np.isfinite(rho[one.unit])]

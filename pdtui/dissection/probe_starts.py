@@ -7,8 +7,8 @@ from typing import NamedTuple
 from pdtui.core.errors import RobotError
 from pdtui.dissection.dissection_settings import DissectionSettings
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.probing.start_states import StartState, collect_start_states, measure_walk_lengths
 from pdtui.search.behavior_search import SearchStartStates
-from pdtui.spectra.monitor import StartState, collect_start_states, walk_lengths
 
 _SHORTEST = 24
 _MORE = 4
@@ -49,7 +49,7 @@ def gather_probe_starts(pool: RolloutPool, settings: DissectionSettings, first_s
     )
     total, wanted, shortened = sum(counts), settings.walk_steps + settings.longest_rollout, ""
     seeds = range(first_seed, first_seed + _MORE * total)
-    lengths = walk_lengths(pool.robot, pool.policy, seeds, wanted, enough=total)
+    lengths = measure_walk_lengths(pool.robot, pool.policy, seeds, wanted, enough=total)
     lasting = sorted(lengths, reverse=True)[total - 1]
     if lasting < wanted:
         settings = settings.shortened_to(lasting)

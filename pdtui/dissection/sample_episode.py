@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.spectra.matching import Discrepancies
+from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.monitor import MonitoredEpisode
 from pdtui.spectra.scaled_series import attribute_series, unit_series, usable_episodes
-from pdtui.spectra.spectrogram import MatchingPreset
 
 _MATCHES = 3
 
@@ -61,7 +61,7 @@ def pick_sample_episode(
         preset: by which.
         matches: how many units of each attribute.
     """
-    nearest = (matching.ranked(column)[:matches] for column in range(len(matching.discrepancy)))
+    nearest = (matching.ranked_units(column)[:matches] for column in range(len(matching.discrepancy)))
     units = sorted({int(unit) for few in nearest for unit in few})
     few = [replace(one, activations=one.activations[:, units]) for one in usable_episodes(episodes, preset)]
     compared = unit_series(few, slice(None), preset)[0] if units else few[0].activations

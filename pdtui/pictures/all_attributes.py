@@ -13,7 +13,7 @@ from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.pictures.chart_data import side_effect_matrix
 from pdtui.pictures.matplotlib_page import figure_page, policy_title
 from pdtui.pictures.plot_colors import GREEN, GREY, VERMILLION, diverging, to_hex
-from pdtui.probing.confirmation import BEST
+from pdtui.probing.confirmation import TOP_MATCHES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,14 +65,18 @@ def draw_matching_hits(folder: Path, dissection: Dissection) -> Path:
         path, 1.1 + 0.19 * len(names), f"{policy_title(dissection)}: how well matching finds units that act"
     ) as figure:
         left, right = figure.subplots(1, 2, sharey=True)
-        width = 0.8 / (1 + len(BEST))
+        width = 0.8 / (1 + len(TOP_MATCHES))
         shades = ("#c85200", "#ff9a4d", "#ffc79b")
-        keys = ("first", *(f"best_{count}" for count in BEST))
-        labels = ("first match", *(f"first {count} matches" for count in BEST))
+        keys = ("first", *(f"best_{count}" for count in TOP_MATCHES))
+        labels = ("first match", *(f"first {count} matches" for count in TOP_MATCHES))
         for number, (key, label) in enumerate(zip(keys, labels, strict=True)):
             shares = 100 * np.array([float(_or_nan(hit[key])) for hit in hits])
             left.barh(
-                places + (number - len(BEST) / 2) * width, shares, width, color=shades[number], label=label
+                places + (number - len(TOP_MATCHES) / 2) * width,
+                shares,
+                width,
+                color=shades[number],
+                label=label,
             )
         random = 100 * np.array([_or_nan(hit["random"]) for hit in hits])
         left.plot(random, places, "|", color="black", markersize=9, label="a unit drawn at random")

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.intervals import bootstrap_interval
 from pdtui.core.units import format_unit
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.sample_episode import SampleEpisode
-from pdtui.probing.confirmation import best_probed
-from pdtui.probing.effect_probe import bootstrap_interval
-from pdtui.spectra.spectrogram import MatchingPreset, short_time_transform
+from pdtui.probing.confirmation import rank_probed_units
+from pdtui.spectra.matching_presets import MatchingPreset
+from pdtui.spectra.spectrogram import short_time_transform
 
 DECIBELS = 60.0
 """Range of a spectrogram's colours below its loudest cell."""
@@ -136,7 +137,7 @@ def spectrogram_of(series: NDArray[np.floating], preset: MatchingPreset, dt: flo
 
 def matched_pair(dissection: Dissection, column: int) -> MatchedPair | None:
     """Spectrograms of an attribute and its best match; None for an attribute that nothing matches."""
-    ranked = dissection.matching.ranked(column)
+    ranked = dissection.matching.ranked_units(column)
     if not ranked.size:
         return None
     unit, shown = int(ranked[0]), dissection.sample_episode
@@ -152,7 +153,7 @@ def matched_pair(dissection: Dissection, column: int) -> MatchedPair | None:
 def unit_ranking(dissection: Dissection, column: int, count: int = RANKED) -> UnitRanking:
     """The nearest units of an attribute; none for one that was left out."""
     matching = dissection.matching
-    ranked = matching.ranked(column)[:count]
+    ranked = matching.ranked_units(column)[:count]
     return UnitRanking(
         tuple(format_unit(int(unit), dissection.layers) for unit in ranked),
         matching.discrepancy[column, ranked],
@@ -162,8 +163,8 @@ def unit_ranking(dissection: Dissection, column: int, count: int = RANKED) -> Un
 
 def effect_curves(dissection: Dissection, column: int) -> list[EffectCurve]:
     """Effect curves of the unit that moves an attribute most and of its first match."""
-    probed = best_probed(column, dissection.screen, dissection.refined, dissection.seed)[:1]
-    ranked = dissection.matching.ranked(column)
+    probed = rank_probed_units(column, dissection.screen, dissection.refined, dissection.seed)[:1]
+    ranked = dissection.matching.ranked_units(column)
     roles: dict[int, list[str]] = {}
     for one in probed:
         roles[one.unit] = ["best probed"]
@@ -193,7 +194,7 @@ def _curve(dissection: Dissection, column: int, unit: int, role: str) -> EffectC
         np.array(lows),
         np.array(highs),
         np.array(falls),
-        unit in dissection.matching.ranked(column)[:1],
+        unit in dissection.matching.ranked_units(column)[:1],
     )
 
 
@@ -202,8 +203,8 @@ def side_effect_matrix(dissection: Dissection) -> SideEffectMatrix:
     refined = dissection.refined
     chosen = set(refined.units) - set(dissection.controls)
     for column in range(len(dissection.attributes)):
-        chosen.update(dissection.matching.ranked(column)[:1].tolist())
-        best = best_probed(column, dissection.screen, refined, dissection.seed)[:1]
+        chosen.update(dissection.matching.ranked_units(column)[:1].tolist())
+        best = rank_probed_units(column, dissection.screen, refined, dissection.seed)[:1]
         chosen.update(one.unit for one in best)
     rows = [row for row, unit in enumerate(refined.units) if unit in chosen]
     by_value = {value: matrix[rows] for value, matrix in dissection.side_effects().items()}

@@ -105,8 +105,8 @@ def match_episode(
             f"expected an attribute for each unit, got {len(units)} units and {len(attributes)} attributes"
         )
     spectrum = find_preset(preset)
-    with RolloutPool(robot, policy, workers=1, import_options=import_options) as crew:
-        world, network = crew.robot, crew.policy
+    with RolloutPool(robot, policy, workers=1, import_options=import_options) as pool:
+        world, network = pool.robot, pool.policy
         flats = [parse_unit(unit, network.layers) for unit in units]
         columns = [world.attribute_index(name) for name in attributes]
         recorded = monitor_episodes(world, network, range(seed, seed + episodes), steps, progress)
@@ -115,7 +115,7 @@ def match_episode(
         shown = next(episode for episode in recorded if episode.seed == matching.used[0])
         if not attributes:
             columns = movable_columns(world.attributes, recorded)[:_FEW]
-        best = [matching.ranked(column) for column in columns]
+        best = [matching.ranked_units(column) for column in columns]
         if not columns or (not units and any(not ranked.size for ranked in best)):
             flaws = "; ".join(f"{name}: {flaw}" for name, flaw in matching.flaws.items())
             raise PictureError(

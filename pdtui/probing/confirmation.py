@@ -1,4 +1,4 @@
-"""Is a unit a motor primitive? Screening ranks all, refining confirms, matching is held against both."""
+"""Decide from probed effects which units are motor primitives, and how well matching alone finds them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from pdtui.core.attributes import Floats
-from pdtui.probing.effect_probe import EffectCurves, bootstrap_interval
+from pdtui.core.intervals import bootstrap_interval
+from pdtui.probing.unit_effects import UnitEffects
 from pdtui.spectra.matching import Discrepancies
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
-RARE = 0.9
-"""A unit exceeds units drawn at random when it moves the attribute more than this share of all units does."""
-BEST = (5, 10)
+RANDOM_QUANTILE = 0.9
+"""A unit exceeds random units if it moves the attribute more than this share of all units does."""
+TOP_MATCHES = (5, 10)
+"""Numbers of first matches whose share of hits is reported."""
 
 
 @dataclass(frozen=True)
@@ -25,44 +26,43 @@ class PrimitiveConfirmation:
 
     Attributes:
         unit: flat index.
-        value: output v at which the effect is strongest, of the values that all units were screened at.
-        measured: effect there with its 95 % interval over the starts.
-        one_sign: whether the effect had that sign from every start, without a fall.
-        exceeds: whether it is larger than that of `RARE` of all units at the same |v|.
+        value: output v with the strongest effect, among the values at which all units were screened.
+        measured: effect at that value with its 95 % interval over the starts.
+        one_sign: whether the effect had the same sign from every start, without a fall.
+        exceeds_random: whether it exceeds the effect of `RANDOM_QUANTILE` of all units at the same |v|.
         both_ways: whether +v and −v move the attribute in opposite directions, each from every start.
-        survived: largest |v| up to which the robot never fell.
+        safe_magnitude: largest |v| up to which the robot never fell.
     """
 
     unit: int
     value: float
     measured: MeasuredEffect
     one_sign: bool
-    exceeds: bool
+    exceeds_random: bool
     both_ways: bool
-    survived: float
+    safe_magnitude: float
 
     @property
     def confirmed(self) -> bool:
-        """One sign, more than units drawn at random, and an interval without zero."""
-        return self.one_sign and self.exceeds and self.measured.low * self.measured.high > 0
+        """Whether the effect has one sign, exceeds random units and has an interval without zero."""
+        return self.one_sign and self.exceeds_random and self.measured.low * self.measured.high > 0
 
 
 @dataclass(frozen=True)
 class MatchingHitRate:
-    """How well matching alone finds what moves an attribute.
+    """How well matching alone finds the units that move an attribute.
 
-    A hit is a unit whose screened strength is among the highest tenth and not zero.
+    A hit is a unit whose screened strength is in the highest tenth and not zero. Correlations are NaN where
+    either side does not vary.
 
     Attributes:
-        first: whether the first match is one.
-        best: share of the first 5 and of the first 10 matches that are (`BEST`).
-        random: share of all units that are.
+        first: whether the first match is a hit.
+        best: share of hits among the first 5 and the first 10 matches (`TOP_MATCHES`).
+        random: share of hits among all units.
         correlation: rank correlation of small discrepancy with strength over all units.
-        held_out_matching: the same against the strength of units drawn at random, from starts that
-            screening did not see.
-        held_out_probing: rank correlation of screened strength with that strength.
-
-    Correlations are NaN where either side does not vary.
+        held_out_matching: the same over the control units, with their strength from starts that screening did
+            not see.
+        held_out_probing: rank correlation of the screened strength of the control units with that strength.
     """
 
     first: bool
@@ -73,128 +73,128 @@ class MatchingHitRate:
     held_out_probing: float
 
 
-def select_units(
-    screen: EffectCurves, match: Discrepancies, columns: Sequence[int], keep: int
+def select_units_to_refine(
+    screening: UnitEffects, matching: Discrepancies, columns: Sequence[int], keep: int
 ) -> tuple[int, ...]:
-    """Units worth refining: of each attribute the first match, and the best probed in each direction."""
+    """Choose the first match of each attribute, and the `keep` strongest probed units in each direction."""
     chosen: set[int] = set()
     for column in columns:
-        chosen.update(match.ranked(column)[:1].tolist())
+        chosen.update(matching.ranked_units(column)[:1].tolist())
         for sign in (1.0, -1.0):
-            reach = screen.robust(column, sign).max(axis=1)
-            order = np.argsort(-reach, kind="stable")[:keep]
-            chosen.update(screen.units[row] for row in order if reach[row] > 0)
+            strengths = screening.robust_effects(column, sign).max(axis=1)
+            order = np.argsort(-strengths, kind="stable")[:keep]
+            chosen.update(screening.units[row] for row in order if strengths[row] > 0)
     return tuple(sorted(chosen))
 
 
-def draw_controls(screen: EffectCurves, count: int, seed: int) -> tuple[int, ...]:
-    """Units drawn at random, whatever they do: what a ranking has to beat."""
+def draw_control_units(screening: UnitEffects, count: int, seed: int) -> tuple[int, ...]:
+    """Draw units at random, whatever they do: a ranking has to beat them."""
     rng = np.random.default_rng(seed)
-    chosen = rng.choice(screen.units, size=min(count, len(screen.units)), replace=False)
+    chosen = rng.choice(screening.units, size=min(count, len(screening.units)), replace=False)
     return tuple(sorted(chosen.tolist()))
 
 
 def confirm_unit(
-    unit: int, column: int, screen: EffectCurves, refined: EffectCurves, seed: int
+    unit: int, column: int, screening: UnitEffects, refinement: UnitEffects, seed: int
 ) -> PrimitiveConfirmation:
-    """Judge one unit by its refined effect curve.
+    """Judge one unit by its refined effects.
 
     Args:
-        unit: flat index, refined.
-        column: of the attribute.
-        screen: every unit, at a few values.
-        refined: some units, at those values and more, from other starts.
-        seed: of the bootstrap.
+        unit: flat index of one of the refined units.
+        column: index of the attribute.
+        screening: effects of every unit at a few values.
+        refinement: effects of some units at those values and more, from other starts.
+        seed: seed of the bootstrap.
     """
-    row = refined.units.index(unit)
-    shared = [dose for dose, value in enumerate(refined.values) if value in screen.values]
-    robust = np.maximum(refined.robust(column, 1.0), refined.robust(column, -1.0))[row]
+    row = refinement.units.index(unit)
+    shared = [dose for dose, value in enumerate(refinement.values) if value in screening.values]
+    up, down = (refinement.robust_effects(column, sign)[row] for sign in (1.0, -1.0))
+    robust = np.maximum(up, down)
     dose = shared[int(np.argmax(robust[shared]))]
-    samples = refined.effects[row, dose, :, column]
+    samples = refinement.effects[row, dose, :, column]
     known = samples[np.isfinite(samples)]
     effect = float(known.mean()) if known.size else float("nan")
-    value = refined.values[dose]
+    value = refinement.values[dose]
     low, high = bootstrap_interval(samples, seed)
     return PrimitiveConfirmation(
         unit=unit,
         value=value,
         measured=MeasuredEffect(effect, low, high),
         one_sign=bool(robust[dose] > 0),
-        exceeds=exceeds_random(effect, value, column, screen),
-        both_ways=_both_ways(refined, row, column),
-        survived=refined.survived(unit),
+        exceeds_random=exceeds_random_units(effect, value, column, screening),
+        both_ways=_moves_both_ways(refinement.values, up > 0, down > 0),
+        safe_magnitude=refinement.safe_magnitude(unit),
     )
 
 
-def best_probed(
-    column: int, screen: EffectCurves, refined: EffectCurves, seed: int, count: int = 3
+def rank_probed_units(
+    column: int, screening: UnitEffects, refinement: UnitEffects, seed: int, count: int = 3
 ) -> list[PrimitiveConfirmation]:
-    """The refined units that move an attribute most, confirmed ones first."""
-    order = np.argsort(-refined.strength(column), kind="stable")[: 4 * count]
-    judged = [confirm_unit(refined.units[row], column, screen, refined, seed) for row in order]
+    """Return the `count` best of the refined units that move an attribute most, confirmed ones first."""
+    order = np.argsort(-refinement.robust_strengths(column), kind="stable")[: 4 * count]
+    judged = [confirm_unit(refinement.units[row], column, screening, refinement, seed) for row in order]
     return sorted(judged, key=lambda one: not one.confirmed)[:count]
 
 
-def matching_hit_rate(
-    column: int, screen: EffectCurves, match: Discrepancies, refined: EffectCurves, controls: Sequence[int]
+def measure_matching_hits(
+    column: int,
+    screening: UnitEffects,
+    matching: Discrepancies,
+    refinement: UnitEffects,
+    controls: Sequence[int],
 ) -> MatchingHitRate:
-    """Hold the ranking by discrepancy against what probing measured.
+    """Compare the ranking by discrepancy with the effects that probing measured.
 
     Args:
-        column: of the attribute.
-        screen: every unit.
-        match: the ranking.
-        refined: some units again, from other starts.
-        controls: those of them that were drawn at random.
+        column: index of the attribute.
+        screening: effects of every unit.
+        matching: the ranking.
+        refinement: effects of some units from other starts.
+        controls: those of the refined units that were drawn at random.
     """
-    strength = screen.strength(column)
-    hits = (strength > 0) & (strength > np.quantile(strength, RARE))
-    doses = [value for value in screen.values if value in refined.values]
-    rows = [refined.units.index(unit) for unit in controls]
-    seen = screen.reach(column, doses)[np.searchsorted(np.array(screen.units), np.array(controls, np.intp))]
-    held_out = refined.reach(column, doses)[rows]
-    probing = rank_correlation(seen, held_out)
-    ranked = match.ranked(column)
+    strengths = screening.robust_strengths(column)
+    hits = (strengths > 0) & (strengths > np.quantile(strengths, RANDOM_QUANTILE))
+    values = [value for value in screening.values if value in refinement.values]
+    units = np.array(screening.units)
+    screened = screening.mean_strengths(column, values)[np.searchsorted(units, np.array(controls, np.intp))]
+    rows = [refinement.units.index(unit) for unit in controls]
+    held_out = refinement.mean_strengths(column, values)[rows]
+    probing = rank_correlation(screened, held_out)
+    ranked = matching.ranked_units(column)
     if not ranked.size:
         none = float("nan")
-        return MatchingHitRate(False, (none,) * len(BEST), float(hits.mean()), none, none, probing)
-    order = np.searchsorted(np.array(screen.units), ranked)
+        return MatchingHitRate(False, (none,) * len(TOP_MATCHES), float(hits.mean()), none, none, probing)
+    order = np.searchsorted(units, ranked)
     return MatchingHitRate(
         first=bool(hits[order[0]]),
-        best=tuple(float(hits[order[:count]].mean()) for count in BEST),
+        best=tuple(float(hits[order[:count]].mean()) for count in TOP_MATCHES),
         random=float(hits.mean()),
-        correlation=rank_correlation(-match.discrepancy[column, ranked], strength[order]),
-        held_out_matching=rank_correlation(-match.discrepancy[column, list(controls)], held_out),
+        correlation=rank_correlation(-matching.discrepancy[column, ranked], strengths[order]),
+        held_out_matching=rank_correlation(-matching.discrepancy[column, list(controls)], held_out),
         held_out_probing=probing,
     )
 
 
 def rank_correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Spearman's rank correlation, ties at their mean rank; NaN where one side does not vary."""
+    """Return Spearman's rank correlation, with ties at their mean rank; NaN if a side does not vary."""
     if len(a) < 2 or np.ptp(a) == 0 or np.ptp(b) == 0:
         return float("nan")
     return float(stats.spearmanr(a, b).statistic)
 
 
-def exceeds_random(effect: float, value: float, column: int, screen: EffectCurves) -> bool:
-    """Whether an effect is larger than that of `RARE` of all units at the same |v|, or the nearest one."""
-    screened = min((abs(v) for v in screen.values), key=lambda size: abs(size - abs(value)))
-    return bool(abs(effect) > np.quantile(_sizes(screen, column, screened), RARE))
+def exceeds_random_units(effect: float, value: float, column: int, screening: UnitEffects) -> bool:
+    """Return whether an effect exceeds that of `RANDOM_QUANTILE` of all units at the nearest screened |v|."""
+    magnitude = min((abs(v) for v in screening.values), key=lambda size: abs(size - abs(value)))
+    doses = [dose for dose, v in enumerate(screening.values) if abs(v) == magnitude]
+    # A fall before the measured steps leaves NaN, which counts as no effect.
+    sizes = np.abs(np.nan_to_num(screening.effects[:, doses, :, column]).mean(axis=-1))
+    return bool(abs(effect) > np.quantile(sizes, RANDOM_QUANTILE))
 
 
-def _sizes(screen: EffectCurves, column: int, size: float) -> Floats:
-    """How far each unit and sign of v moves the attribute, whether steadily or not, at one |v|."""
-    doses = [dose for dose, value in enumerate(screen.values) if abs(value) == size]
-    # Falls before the measured steps leave no number behind: no effect of a living robot.
-    sizes: Floats = np.abs(np.nan_to_num(screen.effects[:, doses, :, column]).mean(axis=-1)).reshape(-1)
-    return sizes
-
-
-def _both_ways(refined: EffectCurves, row: int, column: int) -> bool:
-    up, down = refined.robust(column, 1.0)[row] > 0, refined.robust(column, -1.0)[row] > 0
-    for dose, value in enumerate(refined.values):
-        if value > 0 and -value in refined.values:
-            mirror = refined.values.index(-value)
+def _moves_both_ways(values: Sequence[float], up: NDArray[np.bool_], down: NDArray[np.bool_]) -> bool:
+    for dose, value in enumerate(values):
+        if value > 0 and -value in values:
+            mirror = values.index(-value)
             if (up[dose] and down[mirror]) or (down[dose] and up[mirror]):
                 return True
     return False

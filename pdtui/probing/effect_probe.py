@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
-from pdtui.probing.rollout_journal import RolloutJournal, fingerprint_start
+from pdtui.probing.rollout_journal import RolloutJournal, fingerprint_start_state
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, RolloutPlan
-from pdtui.spectra.monitor import StartState, StepProgress
+from pdtui.probing.unit_effects import UnitEffects
+from pdtui.spectra.monitor import StepProgress
 
 
 @dataclass(frozen=True)
@@ -39,19 +39,19 @@ class PlanEffects:
     errors: Floats
 
 
-class EffectProber:
+class EffectProbe:
     """Measures stimulations; remembers the unperturbed roll-outs, which every comparison needs again.
 
     Args:
-        crew: runs the roll-outs.
+        pool: runs the roll-outs.
         journal: remembers them on disk, and those of a run that was interrupted.
     """
 
-    def __init__(self, crew: RolloutPool, journal: RolloutJournal | None = None) -> None:
-        self.crew, self._journal = crew, journal
+    def __init__(self, pool: RolloutPool, journal: RolloutJournal | None = None) -> None:
+        self.pool, self._journal = pool, journal
         self._unperturbed: dict[tuple[bytes, int, int], RolloutOutcome] = {}
 
-    def probe(
+    def measure_plans(
         self,
         plans: Sequence[RolloutPlan],
         starts: Sequence[StartState],
@@ -73,7 +73,7 @@ class EffectProber:
             WorkerError: a worker process died.
         """
         first = steps // 2 if measure_from is None else measure_from
-        keys = [(fingerprint_start(start), steps, first) for start in starts]
+        keys = [(fingerprint_start_state(start), steps, first) for start in starts]
         missing = [index for index, key in enumerate(keys) if key not in self._unperturbed]
         jobs: list[RolloutJob] = [(NO_STIMULATION, index) for index in missing]
         jobs += [(plan, index) for plan in plans for index in range(len(starts))]
@@ -108,7 +108,7 @@ class EffectProber:
         """Run what the journal does not know yet, and let it know."""
         journal = self._journal
         if journal is None:
-            return self.crew.run(jobs, starts, steps, first, report)
+            return self.pool.run(jobs, starts, steps, first, report)
         keys = journal.keys(jobs, starts, steps, first)
         known = journal.read(keys)
         missing = [number for number, outcome in enumerate(known) if outcome is None]
@@ -117,7 +117,7 @@ class EffectProber:
             journal.write([keys[missing[number]] for number in numbers], outcomes)
 
         fresh = iter(
-            self.crew.run(
+            self.pool.run(
                 [jobs[number] for number in missing],
                 starts,
                 steps,
@@ -126,10 +126,10 @@ class EffectProber:
                 keep,
             )
         )
-        self.crew.count([outcome for outcome in known if outcome is not None])
+        self.pool.count([outcome for outcome in known if outcome is not None])
         return [next(fresh) if outcome is None else outcome for outcome in known]
 
-    def sweep(
+    def measure_units(
         self,
         units: Sequence[int],
         values: Sequence[float],
@@ -137,95 +137,15 @@ class EffectProber:
         *,
         steps: int = 60,
         progress: StepProgress | None = None,
-    ) -> EffectCurves:
+    ) -> UnitEffects:
         """Overwrite each unit alone with each value: the effect curves of single units."""
         plans = [Stimulation((unit,), (value,)) for unit in units for value in values]
-        result = self.probe(plans, starts, steps=steps, progress=progress)
+        result = self.measure_plans(plans, starts, steps=steps, progress=progress)
         shape = (len(units), len(values), len(starts))
-        return EffectCurves(
+        return UnitEffects(
             units=tuple(units),
             values=tuple(values),
             effects=result.effects.reshape(*shape, -1),
             falls=result.falls.reshape(shape),
             unperturbed=result.unperturbed,
         )
-
-
-@dataclass(frozen=True)
-class EffectCurves:
-    """Effect curves of N units at D values from K starts.
-
-    Attributes:
-        units: flat indices.
-        values: the outputs v.
-        effects: shape (N, D, K, J), as in `PlanEffects`.
-        falls: shape (N, D, K).
-        unperturbed: shape (K, J).
-    """
-
-    units: tuple[int, ...]
-    values: tuple[float, ...]
-    effects: Floats
-    falls: NDArray[np.bool_]
-    unperturbed: Floats
-
-    def robust(self, column: int, sign: float) -> Floats:
-        """The weakest effect in one direction over all starts, shape (N, D); 0 where the robot fell.
-
-        Negative where at least one start went the other way.
-        """
-        weakest = np.min(sign * np.nan_to_num(self.effects[..., column]), axis=-1)
-        result: Floats = np.where(self.falls.any(axis=-1), np.minimum(weakest, 0.0), weakest)
-        return result
-
-    def strength(self, column: int) -> Floats:
-        """How far each unit moves an attribute, whichever way: its best value's robust effect, shape (N,)."""
-        both = np.maximum(self.robust(column, 1.0), self.robust(column, -1.0))
-        reach: Floats = np.maximum(both.max(axis=1), 0.0)
-        return reach
-
-    def reach(self, column: int, values: Sequence[float]) -> Floats:
-        """How far each unit moves an attribute on average over the starts, at its best of some values.
-
-        Unlike `strength` it does not ask for one sign from every start, so it ranks weak units too. A fall
-        counts as no effect. Shape (N,).
-        """
-        doses = [self.values.index(value) for value in values]
-        alive = np.where(self.falls, 0.0, np.nan_to_num(self.effects[..., column]))[:, doses]
-        furthest: Floats = np.abs(alive.mean(axis=-1)).max(axis=1)
-        return furthest
-
-    def survived(self, unit: int) -> float:
-        """The largest |v| of a unit up to which the robot never fell, 0 if there is none."""
-        row = self.units.index(unit)
-        alive = 0.0
-        for value in sorted({abs(value) for value in self.values}):
-            columns = [number for number, v in enumerate(self.values) if abs(v) == value]
-            if self.falls[row, columns].any():
-                break
-            alive = value
-        return alive
-
-
-def bootstrap_interval(
-    samples: NDArray[Any], seed: int, *, level: float = 0.95, draws: int = 2000
-) -> tuple[float, float]:
-    """Percentile bootstrap interval of a mean.
-
-    Args:
-        samples: shape (K,); NaN (a fall before the measured steps) is left out.
-        seed: of the draws.
-        level: coverage.
-        draws: resamples.
-
-    Returns:
-        low and high; NaN for fewer than two samples, which say nothing about spread.
-    """
-    known = np.asarray(samples, np.float64)
-    known = known[np.isfinite(known)]
-    if known.size < 2:
-        return float("nan"), float("nan")
-    drawn = stats.bootstrap(
-        (known,), np.mean, n_resamples=draws, confidence_level=level, method="percentile", rng=seed
-    ).confidence_interval
-    return float(drawn.low), float(drawn.high)

@@ -11,9 +11,9 @@ import numpy as np
 
 from pdtui.core.closable import Closable
 from pdtui.core.errors import PdtuiError, RobotError
+from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome
 from pdtui.robots.simulators.python_state import digest_of
-from pdtui.spectra.monitor import StartState
 
 _SCHEMA = "CREATE TABLE IF NOT EXISTS rollouts (key BLOB PRIMARY KEY, outcome BLOB NOT NULL) WITHOUT ROWID"
 
@@ -56,7 +56,7 @@ class RolloutJournal(Closable):
         self, jobs: Sequence[RolloutJob], starts: Sequence[StartState], steps: int, measure_from: int
     ) -> list[bytes]:
         """One key a job."""
-        prints = [fingerprint_start(start) for start in starts]
+        prints = [fingerprint_start_state(start) for start in starts]
         length = f"{steps} {measure_from}".encode()
         return [
             blake2b(
@@ -90,15 +90,15 @@ class RolloutJournal(Closable):
             raise PdtuiError(f"{self.path}: cannot be written: {error}") from error
 
 
-def fingerprint_start(start: StartState) -> bytes:
+def fingerprint_start_state(start: StartState) -> bytes:
     """Return a hash of the whole state that a roll-out begins with: the robot's and the policy's."""
     return digest_of(start.snapshot, start.policy_state).to_bytes(8, "little")
 
 
 def _encode(outcome: RolloutOutcome) -> bytes:
-    return np.array([outcome.error, outcome.lived, outcome.fell, *outcome.means], "<f8").tobytes()
+    return np.array([outcome.error, outcome.steps_survived, outcome.fell, *outcome.means], "<f8").tobytes()
 
 
 def _decode(row: bytes) -> RolloutOutcome:
-    error, lived, fell, *means = np.frombuffer(row, "<f8").tolist()
-    return RolloutOutcome(np.array(means), error, int(lived), bool(fell))
+    error, steps_survived, fell, *means = np.frombuffer(row, "<f8").tolist()
+    return RolloutOutcome(np.array(means), error, int(steps_survived), bool(fell))

@@ -15,10 +15,11 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_fit import check_fit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, WorldSpaces
 from pdtui.policies.weights.policy_loading import load_policy
-from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, roll_out
+from pdtui.probing.start_states import StartState
+from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, run_rollout
 from pdtui.robots import make_robot, open_robot
 from pdtui.robots.robot import Robot
-from pdtui.spectra.monitor import StartState, StepProgress
+from pdtui.spectra.monitor import StepProgress
 
 # Control steps handed over at once: long enough to hide the hand-over, short enough to stop within a second.
 _STEPS_A_CHUNK = 1200
@@ -53,7 +54,7 @@ def _apply(
 
 def _roll_out_chunk(pair: _Pair, chunk: _Chunk) -> list[RolloutOutcome]:
     return [
-        roll_out(*pair, chunk.starts[index], plan, chunk.steps, chunk.measure_from)
+        run_rollout(*pair, chunk.starts[index], plan, chunk.steps, chunk.measure_from)
         for plan, index in chunk.jobs
     ]
 
@@ -160,4 +161,4 @@ class RolloutPool(Closable):
     def count(self, outcomes: Sequence[RolloutOutcome]) -> None:
         """Take roll-outs into `rollouts` and `steps_run`, wherever they were run."""
         self.rollouts += len(outcomes)
-        self.steps_run += sum(outcome.lived for outcome in outcomes)
+        self.steps_run += sum(outcome.steps_survived for outcome in outcomes)

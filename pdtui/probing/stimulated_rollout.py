@@ -12,8 +12,8 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy
+from pdtui.probing.start_states import StartState
 from pdtui.robots.robot import Robot
-from pdtui.spectra.monitor import StartState
 from pdtui.stimulation.pid_magnitude import PidMagnitude
 from pdtui.stimulation.stimulation_map import PidGains
 
@@ -49,17 +49,17 @@ class RolloutOutcome(NamedTuple):
         means: mean of each attribute over the measured steps that the robot lived through, shape (J,); for
             an angle the mean change since the start, unwrapped. NaN where it fell before them.
         error: mean distance from the target over the measured steps, NaN for a fixed stimulation.
-        lived: control steps until the robot fell, or all of them.
+        steps_survived: control steps until the robot fell, or all of them.
         fell: whether it fell, or the simulation diverged.
     """
 
     means: Floats
     error: float
-    lived: int
+    steps_survived: int
     fell: bool
 
 
-def roll_out(
+def run_rollout(
     robot: Robot, policy: Policy, start: StartState, plan: RolloutPlan, steps: int, measure_from: int
 ) -> RolloutOutcome:
     """Stimulate from a snapshot on, and measure the later part.
@@ -77,7 +77,7 @@ def roll_out(
     observation, before = robot.observe(), robot.read_attributes()
     angles = np.array([attribute.wraps for attribute in robot.attributes])
     turned = np.zeros(len(angles))
-    total, counted, errors, lived, fell = np.zeros(len(angles)), 0, 0.0, 0, False
+    total, counted, errors, steps_survived, fell = np.zeros(len(angles)), 0, 0.0, 0, False
     controller = _Controller(plan, robot, before) if isinstance(plan, ControllerPlan) else None
     values = before
     for step in range(steps):
@@ -90,7 +90,7 @@ def roll_out(
             fell = True
             break
         values, previous = robot.read_attributes(), values
-        lived += 1
+        steps_survived += 1
         change = values - previous
         turned[angles] += (change[angles] + np.pi) % (2 * np.pi) - np.pi
         if step >= measure_from:
@@ -101,7 +101,7 @@ def roll_out(
             break
     means = total / counted if counted else np.full(len(angles), np.nan)
     error = errors / counted if counted and controller is not None else float("nan")
-    return RolloutOutcome(means, error, lived, bool(fell))
+    return RolloutOutcome(means, error, steps_survived, bool(fell))
 
 
 class _Controller:

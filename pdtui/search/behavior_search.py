@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.core.intervals import bootstrap_interval
 from pdtui.core.units import Stimulation
-from pdtui.probing.effect_probe import EffectCurves, EffectProber, PlanEffects, bootstrap_interval
+from pdtui.probing.effect_probe import EffectProbe, PlanEffects
+from pdtui.probing.start_states import StartState
+from pdtui.probing.unit_effects import UnitEffects
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.behavior_goals import goal_gains, goal_scores
 from pdtui.search.behavior_search_settings import BehaviorSearchSettings
 from pdtui.search.shared_candidates import SharedCandidates
 from pdtui.search.stimulation_sampler import StimulationSampler
-from pdtui.spectra.monitor import StartState, StepProgress
+from pdtui.spectra.monitor import StepProgress
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
 
@@ -81,7 +84,7 @@ class BehaviorSearch:
 
     def __init__(
         self,
-        prober: EffectProber,
+        prober: EffectProbe,
         goal: BehaviorGoal,
         column: int,
         starts: SearchStartStates,
@@ -92,11 +95,11 @@ class BehaviorSearch:
         self._starts, self._settings, self._seed = starts, settings, seed
         self._seen: set[Stimulation] = set()
         self._elite: list[tuple[float, Stimulation]] = []
-        self._began = prober.crew.rollouts
+        self._began = prober.pool.rollouts
 
     def run(
         self,
-        sweeps: Sequence[EffectCurves],
+        sweeps: Sequence[UnitEffects],
         pool: SharedCandidates,
         deadline: Callable[[], bool],
         progress: StepProgress | None = None,
@@ -132,11 +135,11 @@ class BehaviorSearch:
             progress(total, total)
         return self._finish()
 
-    def _best_single_units(self, sweeps: Sequence[EffectCurves]) -> list[Stimulation]:
+    def _best_single_units(self, sweeps: Sequence[UnitEffects]) -> list[Stimulation]:
         """Single units and values that went the goal's way from every start, the best first."""
         scored: dict[Stimulation, float] = {}
         for sweep in sweeps:
-            robust = sweep.robust(self._column, self._sign)
+            robust = sweep.robust_effects(self._column, self._sign)
             for (row, dose), gain in _entries(robust):
                 # Where a later sweep probed the same again from more starts, it decides.
                 scored[Stimulation((sweep.units[row],), (sweep.values[dose],))] = gain
@@ -149,9 +152,9 @@ class BehaviorSearch:
         ranked = sorted(best.values(), key=lambda pair: (-pair[0], pair[1].units, pair[1].values))
         return [atom for _, atom in ranked[: self._settings.single_units]]
 
-    def _candidates(self, sweeps: Sequence[EffectCurves]) -> StimulationSampler:
+    def _candidates(self, sweeps: Sequence[UnitEffects]) -> StimulationSampler:
         """Draws units twice as often as others where screening saw them go the goal's way, on average."""
-        weights = np.zeros(self._prober.crew.policy.units)
+        weights = np.zeros(self._prober.pool.policy.units)
         for sweep in sweeps:
             mean = self._sign * np.nan_to_num(sweep.effects[..., self._column]).mean(axis=-1)
             np.maximum.at(weights, np.array(sweep.units), np.maximum(mean.max(axis=1), 0.0))
@@ -165,7 +168,7 @@ class BehaviorSearch:
     def _child(self, source: StimulationSampler, most: int) -> Stimulation:
         """A changed or crossed elite that was not tried before."""
         elite = [plan for _, plan in self._elite]
-        most = min(most, self._prober.crew.policy.units)
+        most = min(most, self._prober.pool.policy.units)
         child = elite[0]
         for _ in range(20):
             parent = source.choose_parent(elite)
@@ -192,7 +195,7 @@ class BehaviorSearch:
 
     def _probe(self, plans: Sequence[Stimulation], starts: Sequence[StartState], steps: int) -> PlanEffects:
         # The first third is the transient: evaluation leaves it out too.
-        return self._prober.probe(plans, starts, steps=steps, measure_from=steps // 3)
+        return self._prober.measure_plans(plans, starts, steps=steps, measure_from=steps // 3)
 
     def _score(self, plans: Sequence[Stimulation], starts: Sequence[StartState], steps: int) -> Floats:
         units = [len(plan.units) for plan in plans]
@@ -224,7 +227,7 @@ class BehaviorSearch:
             falls=float(held.falls[0].mean()),
             value=float(np.nanmean(held.means[0, :, column])),
             unperturbed=float(held.unperturbed[:, column].mean()),
-            rollouts=self._prober.crew.rollouts - self._began,
+            rollouts=self._prober.pool.rollouts - self._began,
         )
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
-from pdtui.probing.effect_probe import EffectCurves, EffectProber
+from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import ControllerPlan
+from pdtui.probing.unit_effects import UnitEffects
 from pdtui.search.stimulation_sampler import round_to_three_digits
-from pdtui.spectra.monitor import StartState
 from pdtui.stimulation.stimulation_map import PidGains
 
 _FALL = 2.0
@@ -105,13 +106,13 @@ class ControllerSearch:
     """
 
     def __init__(
-        self, prober: EffectProber, aimed: ControllerGoal, settings: ControllerSearchSettings
+        self, prober: EffectProbe, aimed: ControllerGoal, settings: ControllerSearchSettings
     ) -> None:
         self._prober, self._aimed, self._settings = prober, aimed, settings
 
     def run(
         self,
-        sweep: EffectCurves,
+        sweep: UnitEffects,
         column: int,
         opposites: Sequence[tuple[Stimulation, Stimulation]],
         search: Sequence[StartState],
@@ -203,14 +204,14 @@ class ControllerSearch:
             for one in candidates
             for target in aimed.targets
         ]
-        result = self._prober.probe(plans, starts, steps=steps, measure_from=steps // 3)
+        result = self._prober.measure_plans(plans, starts, steps=steps, measure_from=steps // 3)
         # Whoever fell before the measured steps held nothing: it counts as the largest target.
         errors = np.nan_to_num(result.errors, nan=float(np.max(np.abs(aimed.targets))))
         shape = (len(candidates), -1)
         return errors.reshape(shape).mean(axis=1), result.falls.reshape(shape).mean(axis=1)
 
 
-def _steerers(sweep: EffectCurves, column: int) -> list[tuple[int, float]]:
+def _steerers(sweep: UnitEffects, column: int) -> list[tuple[int, float]]:
     """Units with the sign of their slope, those with the steepest and straightest curves first."""
     values = np.array(sweep.values)
     curves = np.nan_to_num(sweep.effects[..., column].mean(axis=2))

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from pdtui.core.units import Stimulation
-from pdtui.probing.effect_probe import EffectProber
+from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.start_states import StartState
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.behavior_goals import goal_scores
 from pdtui.search.behavior_search_settings import BehaviorSearchSettings
 from pdtui.search.stimulation_sampler import StimulationSampler
-from pdtui.spectra.monitor import StartState, StepProgress
+from pdtui.spectra.monitor import StepProgress
 
 
 class SharedCandidates:
@@ -28,14 +29,14 @@ class SharedCandidates:
 
     def __init__(
         self,
-        prober: EffectProber,
+        prober: EffectProbe,
         plans: Sequence[Stimulation],
         starts: Sequence[StartState],
         steps: int,
         progress: StepProgress | None = None,
     ) -> None:
         self.plans = tuple(plans)
-        self.effects = prober.probe(
+        self.effects = prober.measure_plans(
             self.plans, starts, steps=steps, measure_from=steps // 3, progress=progress
         )
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PolicyError
+from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.monitor import MonitoredEpisode
 from pdtui.spectra.scaled_series import BLOCK, attribute_series, map_unit_blocks, unit_series, usable_episodes
-from pdtui.spectra.spectrogram import MatchingPreset, short_time_transform, spectrogram
+from pdtui.spectra.spectrogram import short_time_transform, spectrogram
 
 # Expanding the square of a difference cancels digits of near matches. Below this part of the summed squares
 # the difference itself is taken: what is left then has a relative error under 1e-9.
@@ -44,7 +45,7 @@ class Discrepancies:
     flaws: dict[str, str]
     unit_flaws: dict[int, str] = field(default_factory=dict)
 
-    def ranked(self, column: int) -> NDArray[np.intp]:
+    def ranked_units(self, column: int) -> NDArray[np.intp]:
         """Units by discrepancy with one attribute, the nearest first; empty for an attribute left out."""
         row = self.discrepancy[column]
         return np.argsort(row, kind="stable")[: int(np.isfinite(row).sum())]

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
+from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.monitor import MonitoredEpisode
 from pdtui.spectra.scaled_series import BLOCK, attribute_series, map_unit_blocks, unit_series, usable_episodes
-from pdtui.spectra.spectrogram import Complexes, MatchingPreset, short_time_transform, spectrogram
+from pdtui.spectra.spectrogram import Complexes, short_time_transform, spectrogram
 
 DISAGREE = 0.1
 """Difference of the plain and the circular ρ from which both are reported."""

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from pdtui.core.attributes import Attribute, Floats
+from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.monitor import MonitoredEpisode
-from pdtui.spectra.spectrogram import MatchingPreset
 
 # Spectra of so many units and one episode of 1000 steps (2 MB) stay in a core's own cache.
 BLOCK = 64

@@ -76,11 +76,11 @@ def test_the_loop_computes_what_matching_does() -> None:
 
 
 def test_columns_beyond_the_recorded_ones_are_other_series(weights: Path) -> None:
-    with RolloutPool("ant", weights, 1) as crew:
+    with RolloutPool("ant", weights, 1) as pool:
         episodes, attributes = record_episodes(
-            crew, BenchmarkSizes(episodes=1, steps=80, units=40, attributes=20)
+            pool, BenchmarkSizes(episodes=1, steps=80, units=40, attributes=20)
         )
-        alone = record_episodes(crew, BenchmarkSizes(episodes=1, steps=80, units=32, attributes=16))[0][0]
+        alone = record_episodes(pool, BenchmarkSizes(episodes=1, steps=80, units=32, attributes=16))[0][0]
     assert len({attribute.name for attribute in attributes}) == 20
     np.testing.assert_array_equal(episodes[0].activations[:, :32], alone.activations)
     assert np.abs(episodes[0].activations[:, 32] - alone.activations[:, 0]).max() > 0

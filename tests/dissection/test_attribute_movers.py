@@ -10,27 +10,28 @@ from pdtui.core.key_table import RESERVED_KEYS
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
 from pdtui.dissection.dissection_settings import QUICK_DISSECTION
 from pdtui.dissection.key_allocator import KeyAllocator
-from pdtui.probing.confirmation import select_units
-from pdtui.probing.effect_probe import EffectProber
+from pdtui.probing.confirmation import select_units_to_refine
+from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.probing.start_states import collect_start_states
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_preset
-from pdtui.spectra.monitor import MonitoredEpisode, collect_start_states, monitor_episodes
+from pdtui.spectra.monitor import MonitoredEpisode, monitor_episodes
 from tests.wired_policy import WIRED_MOTOR, WIRED_UNIT
 
 
 def test_the_unit_that_is_wired_to_a_motor_moves_the_body_both_ways(wired_file: Path) -> None:
     with RolloutPool("ant", wired_file, 1) as crew:
-        prober = EffectProber(crew)
+        prober = EffectProbe(crew)
         episodes = monitor_episodes(crew.robot, crew.policy, range(1000, 1002), 80)
         spread = np.concatenate([episode.attributes for episode in episodes]).std(axis=0)
         starts = collect_start_states(crew.robot, crew.policy, 1100, 8, at=10, survive=20)
-        screen = prober.sweep(range(crew.policy.units), (-4.0, 4.0), starts[:2], steps=16)
+        screen = prober.measure_units(range(crew.policy.units), (-4.0, 4.0), starts[:2], steps=16)
         everything = range(len(crew.robot.attributes))
-        chosen = select_units(
+        chosen = select_units_to_refine(
             screen, match_units(episodes, crew.robot.attributes, find_preset("paper")), everything, 1
         )
-        refined = prober.sweep(chosen, (-4.0, 0.0, 4.0), starts[2:4], steps=16)
+        refined = prober.measure_units(chosen, (-4.0, 0.0, 4.0), starts[2:4], steps=16)
         plan = replace(QUICK_DISSECTION, mover_steps=18, mover_singles=3, mover_pairs=3)
         columns = movable_columns(crew.robot.attributes, episodes)
         found = find_attribute_movers(prober, columns, spread, screen, refined, starts[4:], plan)
@@ -41,7 +42,7 @@ def test_the_unit_that_is_wired_to_a_motor_moves_the_body_both_ways(wired_file: 
             assert crew.policy.layers[0] + WIRED_UNIT in one.stimulation.units
             assert one.sign * one.measured.low > 0
             assert one.sign * one.measured.high > 0
-            again = prober.probe([one.stimulation], starts[6:], steps=18, measure_from=6)
+            again = prober.measure_plans([one.stimulation], starts[6:], steps=18, measure_from=6)
             assert np.isclose(one.measured.effect, again.effects[0, :, one.column].mean())
 
 

@@ -21,14 +21,14 @@ from pdtui.dissection.dissection_tables import render_dissection
 from pdtui.dissection.draft_map import draft_map
 from pdtui.policies.weights.weights_file import hash_file
 from pdtui.probing.confirmation import rank_correlation
-from pdtui.probing.effect_probe import EffectProber, PlanEffects
+from pdtui.probing.effect_probe import EffectProbe, PlanEffects
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.probing.start_states import collect_start_states
 from pdtui.robots.robot_goals import WALKING_GOALS
 from pdtui.search.behavior_goals import goal_gains, goal_scores
 from pdtui.search.behavior_search import BehaviorSearchResult, SearchStartStates
 from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.spectra.matching_presets import PRESETS, find_preset, preset_values
-from pdtui.spectra.monitor import collect_start_states
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains
 from tests.small_dissection import SMALL
@@ -215,7 +215,7 @@ magnitudes = {{ "0:3" = 9.5, "1:7" = -9.5 }}
     with RolloutPool("ant", policy_file, 1) as crew:
         starts = collect_start_states(crew.robot, crew.policy, 1200, 1, at=5, survive=20)
         searches = DissectionSearches(
-            EffectProber(crew), crew.robot, effort, 1000, TimeBudget(0.0, None), lambda _: None, (known,)
+            EffectProbe(crew), crew.robot, effort, 1000, TimeBudget(0.0, None), lambda _: None, (known,)
         )
         assert known in searches.pool(SearchStartStates(tuple(starts), (), ())).plans
     path = tmp_path / "mine.toml"

@@ -9,11 +9,12 @@ import pytest
 
 from pdtui.core.units import NO_STIMULATION, Stimulation, parse_unit
 from pdtui.policies.runtime.policy import Policy
-from pdtui.probing.stimulated_rollout import roll_out
+from pdtui.probing.start_states import StartState, collect_start_states
+from pdtui.probing.stimulated_rollout import run_rollout
 from pdtui.robots.robot import Robot
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_preset
-from pdtui.spectra.monitor import StartState, collect_start_states, monitor_episodes
+from pdtui.spectra.monitor import monitor_episodes
 from tests.small_worlds import Dot, Pole, dot_policy, pole_policy, trained_conv
 
 WORLDS = [(Dot, dot_policy), (Pole, pole_policy)]
@@ -46,7 +47,7 @@ def test_a_roll_out_from_a_start_goes_on_as_the_walk_did(
         robot.step(policy.act(robot.observe()).action)
         values.append(robot.read_attributes())
     for _ in range(2):
-        outcome = roll_out(robot, policy, starts[0], NO_STIMULATION, 20, 10)
+        outcome = run_rollout(robot, policy, starts[0], NO_STIMULATION, 20, 10)
         np.testing.assert_allclose(outcome.means, np.mean(values[40:], axis=0), atol=1e-12)
 
 
@@ -56,7 +57,7 @@ def test_without_its_memory_the_start_is_another() -> None:
     forgotten = StartState(
         start.seed, start.step, start.snapshot, tuple(0 * array for array in start.policy_state)
     )
-    means = [roll_out(robot, policy, one, NO_STIMULATION, 10, 5).means for one in (start, forgotten)]
+    means = [run_rollout(robot, policy, one, NO_STIMULATION, 10, 5).means for one in (start, forgotten)]
     assert not np.array_equal(means[0], means[1])
 
 
@@ -68,5 +69,5 @@ def test_a_unit_that_favours_a_move_makes_it() -> None:
     assert left_minus_right[unit] > 0
     (start,) = collect_start_states(robot, policy, 0, 1, at=10, survive=0)
     flat = parse_unit(f"fc:{unit}", policy.layers)
-    pushed = roll_out(robot, policy, start, Stimulation((flat,), (60.0,)), 20, 10)
+    pushed = run_rollout(robot, policy, start, Stimulation((flat,), (60.0,)), 20, 10)
     assert pushed.means[0] == 0.0

@@ -26,7 +26,7 @@ def test_the_pictured_spectrograms_are_those_that_were_compared(
         column = dissection.column(name)
         pair = matched_pair(dissection, column)
         assert pair is not None
-        assert pair.unit == dissection.matching.ranked(column)[0]
+        assert pair.unit == dissection.matching.ranked_units(column)[0]
         one, other = (10 ** (shown.decibels / 10) for shown in (pair.of_attribute, pair.of_unit))
         distance = np.sqrt(((one - other) ** 2).sum())
         assert distance == pytest.approx(alone.discrepancy[column, pair.unit], rel=1e-6)

@@ -10,11 +10,11 @@ import pytest
 from rerun.chunk import RrdReader
 
 from pdtui.core.errors import PictureError, SessionError
+from pdtui.core.intervals import bootstrap_interval
 from pdtui.core.units import format_unit, parse_unit
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.pictures.dissection_report import write_dissection_report
-from pdtui.probing.effect_probe import bootstrap_interval
 from pdtui.sessions.session_reader import read_session
 from tests.pictures.report_contents import read_entities, read_origins
 from tests.real_viewer import RealViewer, is_blank
@@ -123,7 +123,7 @@ def test_spectrograms_share_their_colours_and_show_the_loudest_cell(entities: En
 
 def test_the_episode_is_the_monitored_one(dissection: Dissection, entities: Entities) -> None:
     column = dissection.column("pitch")
-    unit = int(dissection.matching.ranked(column)[0])
+    unit = int(dissection.matching.ranked_units(column)[0])
     shown = entities["/attributes/pitch/episode/unit"]["Scalars:scalars"]
     np.testing.assert_allclose(
         shown, dissection.sample_episode.activations[:, dissection.sample_episode.column(unit)]

@@ -26,7 +26,7 @@ def test_main_attributes_come_with_the_units_that_match_them(
     for pair in curves.pairs:
         column = dissection.column(pair.attribute.name)
         assert [pair.unit] == dissection.matches(pair.attribute.name, 1)
-        unit = int(dissection.matching.ranked(column)[0])
+        unit = int(dissection.matching.ranked_units(column)[0])
         assert pair.discrepancy == dissection.matching.discrepancy[column, unit]
         np.testing.assert_array_equal(pair.values, dissection.sample_episode.attributes[:, column])
         np.testing.assert_array_equal(

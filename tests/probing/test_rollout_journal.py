@@ -10,11 +10,11 @@ import pytest
 from pdtui.api import dissect
 from pdtui.core.errors import RobotError
 from pdtui.core.units import Stimulation
-from pdtui.probing.effect_probe import EffectProber
+from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.probing.start_states import collect_start_states
 from pdtui.probing.stimulated_rollout import RolloutOutcome
-from pdtui.spectra.monitor import collect_start_states
 from tests.small_dissection import SMALL
 
 
@@ -42,27 +42,27 @@ def test_an_interrupted_dissection_goes_on_without_loss(policy_file: Path, tmp_p
 
 
 def test_what_is_known_is_not_run_again_and_anything_else_is(policy_file: Path, tmp_path: Path) -> None:
-    with RolloutPool("ant", policy_file, 1) as crew, RolloutJournal(tmp_path / "rollouts", "one") as journal:
-        starts = collect_start_states(crew.robot, crew.policy, 1000, 2, at=5, survive=20)
+    with RolloutPool("ant", policy_file, 1) as pool, RolloutJournal(tmp_path / "rollouts", "one") as journal:
+        starts = collect_start_states(pool.robot, pool.policy, 1000, 2, at=5, survive=20)
         plan, other = Stimulation((3,), (2.0,)), Stimulation((3,), (2.5,))
-        first = EffectProber(crew, journal).probe([plan], starts, steps=10)
+        first = EffectProbe(pool, journal).measure_plans([plan], starts, steps=10)
         known = len(journal)
-        again = EffectProber(crew, journal).probe([plan], starts, steps=10)
+        again = EffectProbe(pool, journal).measure_plans([plan], starts, steps=10)
         assert len(journal) == known == 4
         np.testing.assert_array_equal(again.effects, first.effects)
-        EffectProber(crew, journal).probe([other], starts, steps=10)
+        EffectProbe(pool, journal).measure_plans([other], starts, steps=10)
         assert len(journal) == known + 2
-        EffectProber(crew, journal).probe([plan], starts, steps=11)
+        EffectProbe(pool, journal).measure_plans([plan], starts, steps=11)
         assert len(journal) == known + 6
 
 
 def test_starts_that_differ_only_in_their_random_generator_are_two(policy_file: Path, tmp_path: Path) -> None:
-    with RolloutPool("ant", policy_file, 1) as crew, RolloutJournal(tmp_path / "rollouts", "one") as journal:
-        (start,) = collect_start_states(crew.robot, crew.policy, 1000, 1, at=5, survive=20)
+    with RolloutPool("ant", policy_file, 1) as pool, RolloutJournal(tmp_path / "rollouts", "one") as journal:
+        (start,) = collect_start_states(pool.robot, pool.policy, 1000, 1, at=5, survive=20)
         rng = np.random.default_rng(1).bit_generator.state
         other = replace(start, snapshot=replace(start.snapshot, rng=rng))
-        EffectProber(crew, journal).probe([Stimulation((3,), (2.0,))], [start, other], steps=10)
-        assert len(journal) == crew.rollouts == 4
+        EffectProbe(pool, journal).measure_plans([Stimulation((3,), (2.0,))], [start, other], steps=10)
+        assert len(journal) == pool.rollouts == 4
 
 
 def test_outcomes_keep_every_bit(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_outcomes_keep_every_bit(tmp_path: Path) -> None:
     assert known is not None
     assert known.means.tobytes() == outcome.means.tobytes()
     assert np.isnan(known.error)
-    assert (known.lived, known.fell) == (7, True)
+    assert (known.steps_survived, known.fell) == (7, True)
 
 
 def test_a_file_that_is_no_journal_is_named(tmp_path: Path) -> None:

@@ -9,9 +9,9 @@ from scipy.signal import ShortTimeFFT, get_window
 from pdtui.core.attributes import Attribute
 from pdtui.core.errors import PolicyError
 from pdtui.spectra.matching import match_units
-from pdtui.spectra.matching_presets import PRESETS, find_preset
+from pdtui.spectra.matching_presets import PRESETS, MatchingPreset, find_preset
 from pdtui.spectra.monitor import MonitoredEpisode
-from pdtui.spectra.spectrogram import MatchingPreset, short_time_transform, spectrogram
+from pdtui.spectra.spectrogram import short_time_transform, spectrogram
 
 ATTRIBUTES = (Attribute("speed", "m/s"), Attribute("torque", "N m", scale=0.1))
 
@@ -46,7 +46,7 @@ def test_a_copy_of_the_attribute_matches_best_and_exactly() -> None:
     copied = one.activations[:, 4].astype(np.float64) * 10.0
     exact = MonitoredEpisode(3, one.activations, np.column_stack([one.attributes[:, 0], copied]))
     found = match_units([exact], ATTRIBUTES, PRESETS["paper"])
-    assert found.ranked(1)[0] == 4
+    assert found.ranked_units(1)[0] == 4
     assert found.discrepancy[1, 4] == pytest.approx(0.0, abs=1e-9)
     assert found.discrepancy[1, [0, 1, 2, 3, 5]].min() > 0.1
 
@@ -87,8 +87,8 @@ def test_constant_and_broken_attributes_are_marked() -> None:
     assert found.flaws["speed"].startswith("constant")
     assert found.flaws["torque"] == "not finite in the episodes of seeds [7]; left out"
     assert np.isnan(found.discrepancy[1]).all()
-    assert found.ranked(1).size == 0
-    assert found.ranked(0).size == 6
+    assert found.ranked_units(1).size == 0
+    assert found.ranked_units(0).size == 6
 
 
 def by_scipy(one: MonitoredEpisode, attributes: Sequence[Attribute], preset: MatchingPreset) -> np.ndarray:
@@ -115,7 +115,7 @@ def test_the_ranking_is_that_of_a_loop_over_another_library(preset: MatchingPres
     expected = by_scipy(one, ATTRIBUTES, preset)
     np.testing.assert_allclose(found.discrepancy, expected, rtol=1e-9)
     for row in range(2):
-        np.testing.assert_array_equal(found.ranked(row), np.argsort(expected[row]))
+        np.testing.assert_array_equal(found.ranked_units(row), np.argsort(expected[row]))
 
 
 def test_a_near_copy_of_a_loud_attribute_keeps_its_digits() -> None:
@@ -147,7 +147,7 @@ def test_units_that_never_fire_stand_still_or_break_are_marked() -> None:
         4: "not finite; left out",
     }
     assert np.isnan(found.discrepancy[:, 4]).all()
-    assert sorted(found.ranked(0).tolist()) == [0, 1, 2, 3, 5]
+    assert sorted(found.ranked_units(0).tolist()) == [0, 1, 2, 3, 5]
 
 
 @pytest.mark.parametrize("setting", ["level=removed", "scaling=standardised"])
@@ -158,8 +158,8 @@ def test_what_is_constant_is_left_out_where_levels_do_not_count(setting: str) ->
     found = match_units([one], ATTRIBUTES, find_preset("paper", [setting]))
     assert found.flaws == {"speed": "constant in every episode, and levels do not count; left out"}
     assert found.unit_flaws == {2: "constant in every episode, and levels do not count; left out"}
-    assert found.ranked(0).size == 0
-    assert sorted(found.ranked(1).tolist()) == [0, 1, 3, 4, 5]
+    assert found.ranked_units(0).size == 0
+    assert sorted(found.ranked_units(1).tolist()) == [0, 1, 3, 4, 5]
 
 
 def test_a_level_that_is_removed_does_not_count() -> None:

@@ -3,12 +3,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from pdtui.core.errors import RobotError
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
-from pdtui.spectra.monitor import collect_start_states, monitor_episodes
+from pdtui.spectra.matching_presets import PRESETS
+from pdtui.spectra.monitor import monitor_episodes
+from pdtui.spectra.scaled_series import attribute_series
 
 
 def test_a_row_holds_the_activations_and_the_state_that_they_led_to(policy_file: Path) -> None:
@@ -39,24 +39,6 @@ def test_scales_bring_torques_to_the_size_of_commands(policy_file: Path) -> None
     (recorded,) = monitor_episodes(robot, policy, [1], 20)
     torque = robot.attribute_index("front left hip torque")
     commanded = robot.attributes[torque].scale * recorded.attributes[:, torque]
-    np.testing.assert_array_equal(recorded.scaled(robot.attributes)[:, torque], commanded)
+    (compared,) = attribute_series([recorded], robot.attributes, PRESETS["paper"])
+    np.testing.assert_array_equal(compared[:, torque], commanded)
     assert 0 < np.abs(commanded).max() <= 1
-
-
-def test_starts_are_where_the_walk_was(policy_file: Path) -> None:
-    robot, policy = make_robot("ant"), load_policy(policy_file)
-    starts = collect_start_states(robot, policy, 2000, 2, at=15, survive=10)
-    assert [(start.seed, start.step) for start in starts] == [(2000, 15), (2001, 15)]
-    observation, _ = robot.reset(seed=2001)
-    for _ in range(15):
-        observation, *_ = robot.step(policy.act(observation).action)
-    walked = robot.digest()
-    robot.restore(starts[1].snapshot)
-    assert robot.digest() == walked
-
-
-def test_a_policy_that_always_falls_is_refused(policy_file: Path) -> None:
-    robot, policy = make_robot("ant"), load_policy(policy_file)
-    robot._healthy_z_range = (0.9, 1.0)  # type: ignore[attr-defined]
-    with pytest.raises(RobotError, match=r"ant: expected 2 walks of 25 steps without a fall .*found 0"):
-        collect_start_states(robot, policy, 2000, 2, at=15, survive=10)

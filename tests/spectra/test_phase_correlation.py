@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from pdtui.core.attributes import Attribute
-from pdtui.spectra.matching_presets import PRESETS, find_preset
+from pdtui.spectra.matching_presets import PRESETS, MatchingPreset, find_preset
 from pdtui.spectra.monitor import MonitoredEpisode
 from pdtui.spectra.phase_correlation import correlate_phases, phase_correlation
-from pdtui.spectra.spectrogram import MatchingPreset
 
 SPEED = (Attribute("speed", "m/s"),)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import ShortTimeFFT, get_window
 
-from pdtui.spectra.matching_presets import PRESETS
-from pdtui.spectra.spectrogram import MatchingPreset, short_time_transform, spectrogram
+from pdtui.spectra.matching_presets import PRESETS, MatchingPreset
+from pdtui.spectra.spectrogram import short_time_transform, spectrogram
 
 
 @pytest.fixture(params=list(PRESETS))

@@ -14,11 +14,11 @@ from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.weights.import_options import ImportOptions, WorldSpaces
 from pdtui.policies.weights.policy_loading import load_policy
-from pdtui.probing.effect_probe import EffectProber
+from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.probing.start_states import collect_start_states
 from pdtui.robots import make_robot
 from pdtui.robots.ant import Ant
-from pdtui.spectra.monitor import collect_start_states
 
 Reference = Callable[[str], Path]
 Draw = Callable[[int], NDArray[np.float32]]
@@ -157,10 +157,10 @@ def test_probing_sees_the_authors_brake_and_how_common_brakes_are(reference: Ref
     policy = load_policy(reference("ant.npz"), import_options=ImportOptions("tanh"), spaces=ANT)
     others = np.random.default_rng(0).choice(512, 63, replace=False).tolist()
     units = sorted({156, *others})
-    with RolloutPool(_PaddedAnt(), policy, 1) as crew:
-        speed = crew.robot.attribute_index("speed")
-        starts = collect_start_states(crew.robot, policy, 1102, 4, at=100, survive=100)
-        sweep = EffectProber(crew).sweep(units, (-20.0, -8.0), starts, steps=80)
+    with RolloutPool(_PaddedAnt(), policy, 1) as pool:
+        speed = pool.robot.attribute_index("speed")
+        starts = collect_start_states(pool.robot, policy, 1102, 4, at=100, survive=100)
+        sweep = EffectProbe(pool).measure_units(units, (-20.0, -8.0), starts, steps=80)
     change = np.nan_to_num(sweep.effects[..., speed])
     row = units.index(156)
     brakes = np.asarray(np.all(change < -0.5 * sweep.unperturbed[:, speed], axis=2))
@@ -170,4 +170,4 @@ def test_probing_sees_the_authors_brake_and_how_common_brakes_are(reference: Ref
     )
     assert brakes[row, 1]
     assert not sweep.falls[row, 1].any()
-    assert sweep.robust(speed, -1.0)[row, 1] > 2.0
+    assert sweep.robust_effects(speed, -1.0)[row, 1] > 2.0
