@@ -12,56 +12,56 @@ from pdtui.benchmarks.screen_benchmark import ScreenBenchmark
 from pdtui.core.text_tables import new_table
 
 
-def bench_table(result: LoopBenchmark) -> Table:
-    """Steps a second, and each share of the bare simulator."""
-    table = new_table("control loop", "part", "steps/s", "of bare")
+def loop_table(result: LoopBenchmark) -> Table:
+    """Return the steps per second of each part, and its share of the bare simulator."""
+    table = new_table("Control loop", "part", "steps/s", "share of bare")
     for name in ("bare", "policy", "stimulated", "recorded"):
         rate = float(getattr(result, name))
         table.add_row(name, f"{rate:.0f}", f"{rate / result.bare:.0%}")
     table.caption = (
-        f"recorded / bare, median of rounds: {result.recorded_share:.0%}; "
-        f"forward pass with 3 stimulated units: {result.forward_us:.0f} µs"
+        f"Recorded over bare, median of rounds: {result.recorded_share:.0%}. "
+        f"Forward pass with 3 stimulated units: {result.forward_us:.0f} µs."
     )
     return table
 
 
 def dissect_table(result: DissectionBenchmark) -> Group:
-    """Matching against the loop, its growth, its memory, and probing on two workers."""
-    speed = new_table(result.recorded, "preset", "matching", "loop", "times as fast", "ranking", "ties")
+    """Return matching compared with the loop, its growth, and memory and probing."""
+    speed = new_table(result.recorded, "preset", "matching", "loop", "speedup", "ranking", "ties")
     for one in result.compared:
         speed.add_row(
             one.preset,
             f"{one.ours_ms:.1f} ms",
             f"{one.loop_ms:.0f} ms",
             f"{one.ratio:.1f}",
-            "the same" if one.same_ranking else "DIFFERENT",
+            "same" if one.same_ranking else "DIFFERENT",
             str(one.ties),
         )
     speed.caption = (
-        "loop: librosa.stft for each series, numpy.linalg.norm for each pair; largest difference of a "
-        f"discrepancy {max(one.largest_difference for one in result.compared):.0e} of the largest"
+        "Loop: one librosa.stft per series, one numpy.linalg.norm per pair. Largest relative difference of a "
+        f"discrepancy: {max(one.largest_difference for one in result.compared):.0e}."
     )
-    growth = new_table("time of matching", "grows", "size: ms", "ms = fixed + each · size", "off by at most")
+    growth = new_table("Time of matching", "grows", "size: ms", "fitted line (ms)", "largest deviation")
     for curve in result.curves:
         points = "  ".join(f"{size}: {ms:.1f}" for size, ms in zip(curve.sizes, curve.ms, strict=True))
         line = f"{curve.fixed_ms:.1f} + {curve.each_ms:.3g} · size"
         growth.add_row(curve.grows, points, line, f"{curve.deviation:.0%}")
-    rest = new_table("memory and probing", "measure", "value")
+    rest = new_table("Memory and probing", "measure", "value")
     rest.add_row(
-        f"{result.memory_units} units: peak memory, {result.memory_data_gb:.2f} GB of it data",
+        f"peak memory with {result.memory_units} units ({result.memory_data_gb:.2f} GB of data)",
         f"{result.memory_peak_gb:.2f} GB",
     )
-    rest.add_row("their matching and correlating", f"{result.memory_seconds:.1f} s")
+    rest.add_row("time of matching and correlating them", f"{result.memory_seconds:.1f} s")
     rest.add_row("probing, 1 worker", f"{result.probing_one:.0f} steps/s")
     rest.add_row("probing, 2 workers", f"{result.probing_two:.0f} steps/s")
-    rest.add_row("2 workers / 1, median of rounds", f"{result.probing_ratio:.2f}")
+    rest.add_row("2 workers over 1, median of rounds", f"{result.probing_ratio:.2f}")
     return Group(speed, growth, rest)
 
 
 def record_table(result: RecordingBenchmark) -> Table:
-    """What each way to record costs at 50 Hz."""
+    """Return the cost of each way to record at 50 Hz."""
     table = new_table(
-        f"recording, 50 Hz, {result.units} units", "activations", "drive", "of one core", "MB/min"
+        f"Recording at 50 Hz, {result.units} units", "activations", "drive", "share of one core", "MB/min"
     )
     for one in result.costs:
         table.add_row(one.activations, one.driven, f"{one.cpu_share:.1%}", f"{one.mb_a_minute:.2f}")
@@ -69,8 +69,8 @@ def record_table(result: RecordingBenchmark) -> Table:
 
 
 def memory_table(result: MemoryBenchmark) -> Table:
-    """Resident memory over a long drive, in tenths of it."""
-    table = new_table(f"memory, {result.steps} steps", "part", "done", "MB")
+    """Return the resident memory after each tenth of a long drive."""
+    table = new_table(f"Resident memory, {result.steps} steps", "part", "done", "MB")
     for part, sizes in result.resident.items():
         for number, size in enumerate(sizes, start=1):
             table.add_row(part, f"{number * 10} %", f"{size / 1e6:.0f}")
@@ -81,11 +81,11 @@ def memory_table(result: MemoryBenchmark) -> Table:
 
 
 def screen_table(result: ScreenBenchmark) -> Table:
-    """What the screen costs."""
-    table = new_table("screen, 160×48", "measure", "value")
+    """Return how soon the screen appears and what it costs."""
+    table = new_table("Screen of 160×48 cells", "measure", "value")
     table.add_row("first frame", f"{result.first_frame:.2f} s")
     table.add_row("first state of the robot", f"{result.first_state:.2f} s")
     table.add_row(
-        f"CPU of the screen's process, over {result.seconds:g} s", f"{result.cpu_share:.0%} of one core"
+        f"CPU time of the screen's process over {result.seconds:g} s", f"{result.cpu_share:.0%} of one core"
     )
     return table

@@ -1,4 +1,4 @@
-"""What matching is compared with: a loop that transforms series by series and compares pair by pair."""
+"""The loop that matching is compared with: it transforms each series and compares each pair by itself."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from pdtui.spectra.monitor import MonitoredEpisode
 
 
 def load_librosa() -> Any:
-    """The library, which only this comparison needs.
+    """Import librosa, which only this comparison needs.
 
     Raises:
-        PdtuiError: it is not installed.
+        PdtuiError: librosa is not installed.
     """
     try:
         import librosa
@@ -35,20 +35,20 @@ def match_by_loop(
     attributes: Sequence[Attribute],
     preset: MatchingPreset,
 ) -> Floats:
-    """The discrepancies of `match`, by one `librosa.stft` a series and one `numpy.linalg.norm` a pair.
+    """Compute the discrepancies by one `librosa.stft` per series and one `numpy.linalg.norm` per pair.
 
-    The same window, length and hop, with no padding (``center=False``), in double precision. Each series is
-    transformed once an episode, not once a pair. librosa does not divide by the window's sum: the result is,
-    at the end, so that the numbers can be compared too.
+    Window, length and hop are those of the preset, without padding (``center=False``), in double precision.
+    Each series is transformed once per episode, not once per pair. librosa does not divide by the sum of the
+    window; that is done at the end, so that the numbers can be compared.
 
     Args:
         librosa: the library.
-        episodes: each at least one window long.
-        attributes: their scales apply.
+        episodes: recorded episodes, each at least one window long.
+        attributes: attributes of the episodes; their scales apply.
         preset: window, length, hop, and power or magnitude.
 
     Returns:
-        shape (J, U).
+        Discrepancies, shape (J, U).
     """
     exponent = 2 if preset.spectrogram == "power" else 1
     window = {"rectangular": "boxcar"}.get(preset.window, preset.window)

@@ -1,4 +1,4 @@
-"""`pdtui bench loop`: what each part of a control step costs, measured side by side in one run."""
+"""`pdtui bench loop`: the cost of each part of a control step, measured side by side in one run."""
 
 from __future__ import annotations
 
@@ -22,13 +22,15 @@ ROUNDS = 7
 
 @dataclass(frozen=True)
 class LoopBenchmark:
-    """Median over rounds.
+    """Medians over rounds.
 
     Attributes:
-        bare, policy, stimulated, recorded: control steps a second of the simulator alone, with the policy,
-            with attributes and stimulation (the whole control loop), and recorded.
-        recorded_share: median over rounds of recorded / bare.
-        forward_us: a forward pass of the policy with three stimulated units, µs.
+        bare: control steps per second of the simulator alone.
+        policy: the same with the policy.
+        stimulated: the same of the whole control loop, with attributes and stimulation.
+        recorded: the same with a recorder.
+        recorded_share: median over rounds of `recorded` over `bare`.
+        forward_us: time of a forward pass with three stimulated units, µs.
     """
 
     bare: float
@@ -46,12 +48,13 @@ def bench_loop(
     rounds: int = ROUNDS,
     progress: Callable[[int, int], None] | None = None,
 ) -> LoopBenchmark:
-    """Measure the four in turn, several rounds, so that a machine that drifts drifts for all of them.
+    """Measure the four in turn over several rounds, so that a drifting machine affects all alike.
 
-    All four walk: the bare simulator is fed the actions that the policy chose from the same start.
+    The robot walks in all four: the bare simulator gets the actions that the policy chose from the same
+    start.
 
     Raises:
-        PdtuiError: robot, policy or map cannot be had.
+        PdtuiError: the robot, policy or map cannot be loaded.
     """
     loop = build_loop(config)
     walked = _actions(loop, config.seed, steps)

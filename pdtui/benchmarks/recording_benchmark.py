@@ -1,4 +1,4 @@
-"""`pdtui bench record`: what recording costs at 50 Hz, and what an hour of it takes in memory."""
+"""`pdtui bench record` and `memory`: the cost of recording at 50 Hz, and the memory of a long drive."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 RATE = 50.0
-"""Control steps a second, whatever the robot's own rate."""
+"""Control steps per second that are assumed, whatever the robot's own rate."""
 
 _PRESS_EVERY, _HELD = 150, 50
 _SAMPLES = 10
@@ -31,13 +31,13 @@ _SAMPLES = 10
 
 @dataclass(frozen=True)
 class RecordingCost:
-    """Of one way to record, in the small batches of a drive on the screen.
+    """The cost of one way to record, in the small batches of a drive on the screen.
 
     Attributes:
-        activations: how they are recorded.
+        activations: how activations are recorded.
         driven: what the operator does.
-        cpu_share: of one core, by all threads, at `RATE`.
-        mb_a_minute: growth of the file at `RATE`, its end included, 10⁶ bytes.
+        cpu_share: time of all threads at `RATE`, as a share of one core.
+        mb_a_minute: growth of the file at `RATE`, including its end, MB per minute.
     """
 
     activations: ActivationsKept
@@ -48,12 +48,12 @@ class RecordingCost:
 
 @dataclass(frozen=True)
 class RecordingBenchmark:
-    """What was measured.
+    """The result of `bench_record`.
 
     Attributes:
-        units: hidden units of the policy.
+        units: number of hidden units of the policy.
         steps: control steps of each recording.
-        costs: of each way to record.
+        costs: cost of each way to record.
     """
 
     units: int
@@ -67,11 +67,11 @@ class MemoryBenchmark:
 
     Attributes:
         steps: control steps.
-        file_bytes: size of the session.
-        seconds: of recording, examining and replaying.
-        resident: bytes at ten moments of recording, then of replaying, by name.
-        verdict: of the replay.
-        whole: whether the session is.
+        file_bytes: size of the session, bytes.
+        seconds: time of recording, examining and replaying, s.
+        resident: resident memory at ten moments of recording and of replaying, bytes.
+        verdict: verdict of the replay.
+        whole: whether the session is whole.
     """
 
     steps: int
@@ -87,10 +87,10 @@ def bench_record(
 ) -> RecordingBenchmark:
     """Record the same drives in each way; only the recorder's work is measured.
 
-    One drive is left alone, in the other each behavior is latched in turn, for a third of the time.
+    In one drive no key is pressed; in the other each behavior is latched in turn for a third of the time.
 
     Raises:
-        PdtuiError: robot, policy or map cannot be had.
+        PdtuiError: the robot, policy or map cannot be loaded.
     """
     loop = build_loop(config)
     drives = {"nothing is pressed": _driven(loop, config.seed, steps, ())}
@@ -138,14 +138,14 @@ def _cost(info: DriveInfo, records: Sequence[StepRecord]) -> tuple[float, float]
 def bench_memory(
     config: DriveConfig, *, steps: int, progress: Callable[[int, int], None] | None = None
 ) -> MemoryBenchmark:
-    """Record a long drive without a screen, see whether it is whole, and replay it, all in this process.
+    """Record a long drive without a screen, examine it and replay it, all in this process.
 
     Raises:
-        ScreenError: there is no ``/proc`` here to read a process's memory from.
-        PdtuiError: robot, policy or map cannot be had.
+        ScreenError: the system has no ``/proc``.
+        PdtuiError: the robot, policy or map cannot be loaded.
     """
     if not Path("/proc/self/statm").exists():
-        raise ScreenError("the benchmark reads /proc, which this system does not have")
+        raise ScreenError("the memory benchmark reads /proc, which this system does not have")
     every = max(1, steps // _SAMPLES)
     resident: dict[str, list[int]] = {"recording": [], "replaying": []}
     seconds: dict[str, float] = {}

@@ -1,4 +1,4 @@
-"""`pdtui bench screen`: how soon the screen is there, and what it costs, in a real pseudo-terminal."""
+"""`pdtui bench screen`: how soon the screen appears and what it costs, in a real pseudo-terminal."""
 
 from __future__ import annotations
 
@@ -18,19 +18,21 @@ from pathlib import Path
 from pdtui.core.errors import ScreenError
 
 SIZE = (48, 160)
+"""Rows and columns of the terminal."""
 _PATIENCE = 120.0
+"""Longest time to wait for the screen, s; a loaded machine may take a minute."""
 _FRAME_SIGN, _ROBOT_SIGN = b"behaviors", b"m/s"
 
 
 @dataclass(frozen=True)
 class ScreenBenchmark:
-    """What was measured at 160×48.
+    """The result of `bench_screen`, in a terminal of 160×48 cells.
 
     Attributes:
-        first_frame: from the command to its first frame, s.
-        first_state: from the command to the robot's first state on the screen, s.
-        cpu_share: of one core, by the screen's process alone, while the robot is driven.
-        seconds: how long that was measured, s.
+        first_frame: time from the command to the first frame, s.
+        first_state: time from the command to the first state of the robot on the screen, s.
+        cpu_share: CPU time of the screen's process during a drive, as a share of one core.
+        seconds: time over which that was measured, s.
     """
 
     first_frame: float
@@ -43,10 +45,10 @@ def bench_screen(arguments: Sequence[str], seconds: float) -> ScreenBenchmark:
     """Run ``pdtui drive`` with these arguments in a pseudo-terminal.
 
     Raises:
-        ScreenError: there is no ``/proc`` here to read a process's time from, or the screen does not come up.
+        ScreenError: the system has no ``/proc``, or the screen does not appear.
     """
     if not Path("/proc/self/stat").exists():
-        raise ScreenError("the benchmark of the screen reads /proc, which this system does not have")
+        raise ScreenError("the screen benchmark reads /proc, which this system does not have")
     start = time.monotonic()
     pid, terminal = pty.fork()
     if pid == 0:
@@ -87,7 +89,7 @@ def _read_for(terminal: int, seconds: float) -> None:
 
 
 def _read(terminal: int, wait: float) -> bytes:
-    """What the terminal was sent; nothing after `wait` seconds, or when its program has ended."""
+    """Return what the terminal received within `wait` seconds; nothing when its program has ended."""
     if not select.select([terminal], [], [], wait)[0]:
         return b""
     try:

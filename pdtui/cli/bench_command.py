@@ -1,4 +1,4 @@
-"""`pdtui bench`: how fast the loop is, and what recording, matching and the screen cost."""
+"""`pdtui bench`: the speed of the loop, and the cost of recording, matching and the screen."""
 
 from __future__ import annotations
 
@@ -13,62 +13,76 @@ from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept
 
 @click.group()
 def bench() -> None:
-    """Measure speed: ratios of one run, side by side."""
+    """Measure speed and memory.
+
+    What is compared is measured in turn in one run: compare ratios, not figures of different runs.
+    """
 
 
 @bench.command("loop")
 @click.argument("robot")
 @map_option
 @click.option(
-    "--steps", type=click.IntRange(100), default=5000, show_default=True, help="Control steps a round."
+    "--steps", type=click.IntRange(100), default=5000, show_default=True, help="Control steps per round."
 )
 @json_option
 def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bool) -> None:
-    """Control steps a second of ROBOT: bare, with policy, stimulated, recorded."""
-    from pdtui.benchmarks import benchmark_tables
-    from pdtui.benchmarks import loop_benchmark as benchmark
+    """Measure control steps per second: bare, with policy, stimulated, recorded."""
+    from pdtui.benchmarks.benchmark_tables import loop_table
+    from pdtui.benchmarks.loop_benchmark import bench_loop
 
-    order = drive_config(robot, map_name, "")
+    config = drive_config(robot, map_name, "")
     with progress_bar_or_none("measuring", quiet=as_json) as advance:
-        result = benchmark.bench_loop(order, steps=steps, progress=advance)
-    show_result(asdict(result), as_json, lambda: benchmark_tables.bench_table(result))
+        result = bench_loop(config, steps=steps, progress=advance)
+    show_result(asdict(result), as_json, lambda: loop_table(result))
 
 
 @bench.command("dissect")
 @click.argument("robot", default="ant")
-@click.option("--policy", default="", help="Weights to record; default: the robot's shipped policy.")
-@click.option("--episodes", type=click.IntRange(1, 100), default=5, show_default=True)
-@click.option("--steps", type=click.IntRange(64), default=1000, show_default=True)
-@click.option("--units", type=click.IntRange(1), default=512, show_default=True)
-@click.option("--attributes", type=click.IntRange(1), default=20, show_default=True)
-@click.option("--rounds", type=click.IntRange(1), default=7, show_default=True)
-@click.option("--memory-units", type=click.IntRange(1), default=100_000, show_default=True)
-@click.option("--probes", type=click.IntRange(2), default=240, show_default=True, help="A round.")
+@click.option("--policy", default="", metavar="FILE", help="Weights to record; default: the shipped policy.")
+@click.option(
+    "--episodes", type=click.IntRange(1, 100), default=5, show_default=True, help="Episodes to record."
+)
+@click.option("--steps", type=click.IntRange(64), default=1000, show_default=True, help="Steps per episode.")
+@click.option("--units", type=click.IntRange(1), default=512, show_default=True, help="Units to match.")
+@click.option(
+    "--attributes", type=click.IntRange(1), default=20, show_default=True, help="Attributes to match."
+)
+@click.option("--rounds", type=click.IntRange(1), default=7, show_default=True, help="Rounds to measure.")
+@click.option(
+    "--memory-units",
+    type=click.IntRange(1),
+    default=100_000,
+    show_default=True,
+    help="Units of the episode whose memory is measured.",
+)
+@click.option("--probes", type=click.IntRange(2), default=240, show_default=True, help="Roll-outs per round.")
 @json_option
 def bench_dissect_command(robot: str, policy: str, as_json: bool, **sizes: Any) -> None:
-    """Matching against a loop over librosa.stft, its growth and memory, and probing on two workers."""
-    from pdtui.benchmarks import benchmark_tables, dissection_benchmark
+    """Measure matching against a loop over librosa, and probing on two workers."""
+    from pdtui.benchmarks.benchmark_episodes import DissectionBenchmarkSettings
+    from pdtui.benchmarks.benchmark_tables import dissect_table
+    from pdtui.benchmarks.dissection_benchmark import bench_dissection
 
     with progress_bar_or_none("measuring", quiet=as_json) as advance:
-        result = dissection_benchmark.bench_dissection(
-            robot, policy or robot, dissection_benchmark.BenchmarkSizes(**sizes), advance
-        )
-    show_result(asdict(result), as_json, lambda: benchmark_tables.dissect_table(result))
+        result = bench_dissection(robot, policy or robot, DissectionBenchmarkSettings(**sizes), advance)
+    show_result(asdict(result), as_json, lambda: dissect_table(result))
 
 
 @bench.command("record")
 @click.argument("robot")
 @map_option
-@click.option("--steps", type=click.IntRange(100), default=6000, show_default=True)
+@click.option("--steps", type=click.IntRange(100), default=6000, show_default=True, help="Steps per drive.")
 @json_option
 def bench_record_command(robot: str, map_name: str | None, steps: int, as_json: bool) -> None:
-    """What recording ROBOT costs at 50 Hz: share of one core, and MB a minute."""
-    from pdtui.benchmarks import benchmark_tables, recording_benchmark
+    """Measure the CPU time and disk space of recording at 50 Hz."""
+    from pdtui.benchmarks.benchmark_tables import record_table
+    from pdtui.benchmarks.recording_benchmark import bench_record
 
-    order = drive_config(robot, map_name, "")
+    config = drive_config(robot, map_name, "")
     with progress_bar_or_none("measuring", quiet=as_json) as advance:
-        result = recording_benchmark.bench_record(order, steps=steps, progress=advance)
-    show_result(asdict(result), as_json, lambda: benchmark_tables.record_table(result))
+        result = bench_record(config, steps=steps, progress=advance)
+    show_result(asdict(result), as_json, lambda: record_table(result))
 
 
 @bench.command("memory")
@@ -79,32 +93,43 @@ def bench_record_command(robot: str, map_name: str | None, steps: int, as_json: 
     type=click.IntRange(100),
     default=180_000,
     show_default=True,
-    help="An hour has 180,000 at 50 Hz.",
+    help="Control steps to drive; an hour at 50 Hz has 180,000.",
 )
-@click.option("--record-activations", "activations", type=click.Choice(ACTIVATIONS_KEPT), default="all")
+@click.option(
+    "--record-activations",
+    "activations",
+    type=click.Choice(ACTIVATIONS_KEPT),
+    default="all",
+    show_default=True,
+    help="How activations are recorded.",
+)
 @json_option
 def bench_memory_command(
     robot: str, map_name: str | None, steps: int, activations: ActivationsKept, as_json: bool
 ) -> None:
-    """Memory while a long drive of ROBOT is recorded and replayed."""
-    from pdtui.benchmarks import benchmark_tables, recording_benchmark
+    """Measure memory while a long drive is recorded and replayed."""
+    from pdtui.benchmarks.benchmark_tables import memory_table
+    from pdtui.benchmarks.recording_benchmark import bench_memory
 
-    order = drive_config(robot, map_name, "", activations=activations)
+    config = drive_config(robot, map_name, "", activations=activations)
     with progress_bar_or_none("driving", quiet=as_json) as advance:
-        result = recording_benchmark.bench_memory(order, steps=steps, progress=advance)
-    show_result(asdict(result), as_json, lambda: benchmark_tables.memory_table(result))
+        result = bench_memory(config, steps=steps, progress=advance)
+    show_result(asdict(result), as_json, lambda: memory_table(result))
 
 
 @bench.command("screen")
 @click.argument("robot")
 @map_option
-@click.option("--seconds", type=click.FloatRange(1.0), default=15.0, show_default=True)
+@click.option(
+    "--seconds", type=click.FloatRange(1.0), default=15.0, show_default=True, help="Time to measure, s."
+)
 @json_option
 def bench_screen_command(robot: str, map_name: str | None, seconds: float, as_json: bool) -> None:
-    """Time to the first frame of a drive of ROBOT, and the CPU time of the screen, at 160×48."""
-    from pdtui.benchmarks import benchmark_tables, screen_benchmark
+    """Measure the time to the first frame and the screen's CPU time."""
+    from pdtui.benchmarks.benchmark_tables import screen_table
+    from pdtui.benchmarks.screen_benchmark import bench_screen
 
-    drive_config(robot, map_name, "")
+    drive_config(robot, map_name, "")  # an error shows before the screen starts
     arguments = [robot, "--no-record", *(["--map", map_name] if map_name else [])]
-    result = screen_benchmark.bench_screen(arguments, seconds)
-    show_result(asdict(result), as_json, lambda: benchmark_tables.screen_table(result))
+    result = bench_screen(arguments, seconds)
+    show_result(asdict(result), as_json, lambda: screen_table(result))

@@ -1,4 +1,4 @@
-"""Commands that draw."""
+"""`pdtui figure`: figures as PNG files."""
 
 from __future__ import annotations
 
@@ -6,40 +6,60 @@ from pathlib import Path
 
 import click
 
-from pdtui.cli.shared_options import import_option_flags, progress_bar_or_none
+from pdtui.cli.shared_options import import_option_flags, overwrite_option, progress_bar_or_none
 from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
 
 
 @click.group()
 def figure() -> None:
-    """Draw figures as PNGs; needs the extra 'figures'."""
+    """Draw figures as PNG files; needs the extra 'figures'."""
 
 
 @figure.command("episode")
 @click.argument("robot")
-@click.option("--policy", default="", help="Weights; default: the robot's shipped policy.")
+@click.option("--policy", default="", metavar="FILE", help="Weights; default: the robot's shipped policy.")
 @import_option_flags
-@click.option("--attribute", "attributes", multiple=True, metavar="NAME", help="May be given again.")
+@click.option(
+    "--attribute", "attributes", multiple=True, metavar="NAME", help="Attribute to draw; may be repeated."
+)
 @click.option(
     "--unit",
     "units",
     multiple=True,
     metavar="LAYER:INDEX",
-    help="One for each --attribute; default: the unit that matches it best.",
+    help="Unit to draw with it, one per --attribute; default: its best match.",
 )
-@click.option("--preset", type=click.Choice(["paper", "authors"]), default="paper", show_default=True)
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1000, show_default=True)
-@click.option("--from", "start", type=click.FloatRange(0), default=0.0, metavar="SECONDS", help="Start here.")
+@click.option(
+    "--preset",
+    type=click.Choice(["paper", "authors"]),
+    default="paper",
+    show_default=True,
+    help="Settings of the matching.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0, 2**31 - 1), default=1000, show_default=True, help="Seed of the episode."
+)
+@click.option(
+    "--from", "start", type=click.FloatRange(0), default=0.0, metavar="SECONDS", help="Where to start."
+)
 @click.option(
     "--seconds",
     type=click.FloatRange(0, min_open=True),
     default=10.0,
     show_default=True,
-    help="Show so much.",
+    metavar="SECONDS",
+    help="How much to draw.",
 )
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, metavar="FILE.png")
-@click.option("--overwrite", is_flag=True, help="Replace a file that exists already.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    required=True,
+    metavar="FILE.png",
+    help="File to write.",
+)
+@overwrite_option
 def episode(
     robot: str,
     policy: str,
@@ -53,9 +73,9 @@ def episode(
     output: Path,
     overwrite: bool,
 ) -> None:
-    """Draw attributes of ROBOT and the units that match them over one episode (figure 2 of the paper).
+    """Draw attributes and their matching units over one episode.
 
-    ROBOT may be the id of a Gymnasium environment.
+    As in figure 2 of the paper. ROBOT is a robot's name or the ID of a Gymnasium environment.
     """
     from pdtui.pictures.matplotlib_page import check_figure
     from pdtui.robots import check_robot, trust_module

@@ -1,4 +1,4 @@
-"""What the commands share: options, the drive that they ask for, progress and output."""
+"""Options and output that several commands share."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 
 class SeedList(click.ParamType[range]):
+    """A seed, or a range of seeds such as 100-119."""
+
     name = "FIRST-LAST"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
@@ -34,20 +36,20 @@ class SeedList(click.ParamType[range]):
 
 
 map_option = click.option(
-    "--map", "map_name", metavar="MAP", help="A map by name or file; default: the robot's."
+    "--map", "map_name", metavar="MAP", help="Name or file of the map; default: the robot's map."
 )
 force_option = click.option(
-    "--force", is_flag=True, help="Use the map although it was made for another policy."
+    "--force", is_flag=True, help="Use the map even if it was made for another policy."
 )
-json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 overwrite_option = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 workers_option = click.option(
-    "--workers", type=click.IntRange(1, 256), default=None, help="Processes; default: one a core."
+    "--workers", type=click.IntRange(1, 256), default=None, help="Worker processes; default: one per core."
 )
 
 
 def import_option_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """``--activation``, ``--squash`` and ``--normaliser``, given to the command as `import_options`."""
+    """Add ``--activation``, ``--squash`` and ``--normaliser``; the command gets them as `import_options`."""
 
     @wraps(command)
     def choosing(
@@ -59,17 +61,20 @@ def import_option_flags(command: Callable[..., Any]) -> Callable[..., Any]:
 
     for option in (
         click.option(
-            "--normaliser", default="", metavar="FILE", help="Statistics of the observation, or 'none'."
+            "--normaliser",
+            default="",
+            metavar="FILE",
+            help="File with the observation statistics, or 'none'.",
         ),
         click.option(
             "--squash",
             type=click.Choice(SQUASH_NAMES),
-            help="How the policy's output becomes an action, where its file does not say.",
+            help="How outputs become actions, if the policy's file does not say.",
         ),
         click.option(
             "--activation",
             type=click.Choice(ACTIVATION_NAMES),
-            help="Activation function of the hidden layers, where the policy's file does not say.",
+            help="Activation function of the hidden layers, if the policy's file does not say.",
         ),
     ):
         choosing = option(choosing)
@@ -77,14 +82,14 @@ def import_option_flags(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def policy_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """``--policy`` and the choices that its file may leave open, given as `policy` and `import_options`."""
-    return click.option("--policy", default="", help="Weights to use instead of the map's.")(
+    """Add ``--policy`` and the options of `import_option_flags`."""
+    return click.option("--policy", default="", metavar="FILE", help="Weights to use instead of the map's.")(
         import_option_flags(command)
     )
 
 
 def judging_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """``--tolerance`` and ``--strict``, given to the command as `judging`."""
+    """Add ``--tolerance`` and ``--strict``; the command gets them as `judging`."""
 
     @wraps(command)
     def judged(*args: Any, tolerance: float | None, strict: bool, **others: Any) -> Any:
@@ -94,13 +99,13 @@ def judging_options(command: Callable[..., Any]) -> Callable[..., Any]:
         return command(*args, judging=judging, **others)
 
     for option in (
-        click.option("--strict", is_flag=True, help="Accept nothing but the same bits, wherever this runs."),
+        click.option("--strict", is_flag=True, help="Accept only identical bits, on any machine."),
         click.option(
             "--tolerance",
             type=click.FloatRange(0),
             metavar="SPREADS",
-            help="On another machine or other versions, attributes may be off by this many standard "
-            "deviations of the session in its first 2 s.  [default: 1e-06]",
+            help="On another machine or with other versions, accept attributes that differ by at most this "
+            "many of their standard deviations in the first 2 s.  [default: 1e-06]",
         ),
     ):
         judged = option(judged)
@@ -108,7 +113,10 @@ def judging_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 start_option = click.option(
-    "--start", default="", metavar="STATE", help="Where episodes start, for a robot with several states."
+    "--start",
+    default="",
+    metavar="STATE",
+    help="State in which episodes start, for a robot that has several.",
 )
 
 
@@ -122,7 +130,20 @@ def drive_config(
     without_map: bool = False,
     **options: Any,
 ) -> DriveConfig:
-    """The drive that the options ask for; `without_map`: of a policy alone, where its robot has no map."""
+    """Return the drive that the options describe.
+
+    Args:
+        robot: name of a robot or environment, or a map file.
+        map_name: name or file of the map; None for the robot's.
+        policy: weights to use instead of the map's, or an empty string.
+        import_options: what the file of the weights leaves open.
+        seed: seed of the drive.
+        without_map: whether a robot without a map may be driven by its policy alone.
+        options: further fields of `DriveConfig`.
+
+    Raises:
+        PdtuiError: the robot or the map does not exist or cannot be read.
+    """
     from pdtui.drive.drive_config import DriveConfig
     from pdtui.robots import check_robot, file_stem, trust_module
     from pdtui.stimulation.map_library import find_map
@@ -145,7 +166,7 @@ def drive_config(
 
 
 def _map_of(robot: str, name: str, policy: str) -> StimulationMap:
-    """The map of this name; none needs to be there for a policy that is to drive alone."""
+    """Return the map of this name, or an empty one if there is none but a policy is given."""
     from pdtui.stimulation.map_library import bare_map, find_map
     from pdtui.stimulation.map_reader import load_map
 
@@ -177,7 +198,7 @@ def show_result(data: dict[str, Any] | list[dict[str, Any]], as_json: bool, tabl
 def progress_bar_or_none(
     label: str, quiet: bool = False
 ) -> AbstractContextManager[Callable[..., None] | None]:
-    """A progress bar with time left, on standard error; its value is called with done, total, note."""
+    """Return a context manager for a progress bar on standard error, or for None where `quiet`."""
     if quiet:
         return nullcontext(None)
     from pdtui.core.progress_bar import progress_bar

@@ -1,4 +1,4 @@
-"""The command that chooses controllers' gains."""
+"""`pdtui tune`: the gains of PID behaviors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pdtui.policies.weights.import_options import ImportOptions
 @click.command()
 @click.argument("map_name", metavar="MAP")
 @click.argument("behaviors", nargs=-1, metavar="[BEHAVIOR]...")
-@click.option("--all", "every", is_flag=True, help="Tune every behavior of mode pid.")
+@click.option("--all", "every", is_flag=True, help="Tune all behaviors of mode pid.")
 @policy_options
 @force_option
 @click.option(
@@ -29,24 +29,29 @@ from pdtui.policies.weights.import_options import ImportOptions
     type=SeedList(),
     default="200-209",
     show_default=True,
-    help="The search sees the first half, the others judge what it found.",
+    help="Seeds; the first half is for the search, the second for judging its result.",
 )
 @click.option(
-    "--points", type=click.IntRange(1), default=48, show_default=True, help="Controllers to begin with."
+    "--points",
+    type=click.IntRange(1),
+    default=48,
+    show_default=True,
+    help="Gains to try first, spread over the range.",
 )
 @click.option(
     "--refinements",
     type=click.IntRange(0),
     default=24,
     show_default=True,
-    help="Controllers to try near the best.",
+    help="Gains to try near the best.",
 )
 @click.option(
     "--minutes",
     type=click.FloatRange(0, min_open=True),
-    help="The search ends, with the best so far, when these are over; by default it finishes.",
+    metavar="MINUTES",
+    help="Stop the search after this time and keep the best so far.",
 )
-@click.option("--dry-run", is_flag=True, help="Leave the map as it is.")
+@click.option("--dry-run", is_flag=True, help="Do not change the map.")
 @workers_option
 @json_option
 def tune(
@@ -64,9 +69,10 @@ def tune(
     workers: int | None,
     as_json: bool,
 ) -> None:
-    """Choose gains and limits of BEHAVIORs of mode pid by their step responses, and write them into MAP.
+    """Tune the PID gains of BEHAVIORs by their step responses, and write them into MAP.
 
-    The map's comments stay; gains that are no better on seeds that the search did not see are not written.
+    Gains are written only if they are better on seeds that the search did not see. The map's comments are
+    kept.
     """
     if bool(behaviors) == every:
         raise click.UsageError("expected either a BEHAVIOR or --all")
@@ -94,6 +100,4 @@ def tune(
     data = {"map": str(path), "behaviors": [one.as_dict() for one in results], "written": written}
     show_result(data, as_json, lambda: tuned_table(results))
     if not as_json:
-        click.echo(
-            f"{path}: wrote the gains of {', '.join(written)}" if written else f"{path}: left as it is"
-        )
+        click.echo(f"{path}: wrote the gains of {', '.join(written)}" if written else f"{path}: not changed")

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from pdtui.benchmarks.dissection_benchmark import BenchmarkSizes, record_episodes, same_ranking, widen_episode
+from pdtui.benchmarks.benchmark_episodes import DissectionBenchmarkSettings, record_episodes, widen_episode
 from pdtui.benchmarks.librosa_matching import load_librosa, match_by_loop
+from pdtui.benchmarks.matching_benchmark import same_ranking
 from pdtui.cli import main
 from pdtui.core.attributes import Attribute
 from pdtui.core.errors import PdtuiError
@@ -53,8 +54,8 @@ def test_the_command_measures_all_parts(weights: Path) -> None:
     assert data["probing_ratio"] > 0
     assert "shifted in time" in data["recorded"]
     table = CliRunner().invoke(main, ["bench", "dissect", "--policy", str(weights), *SMALL])
-    assert "the same" in table.output
-    assert "2 workers / 1" in table.output
+    assert "same" in table.output
+    assert "2 workers over 1" in table.output
 
 
 def test_the_loop_computes_what_matching_does() -> None:
@@ -78,9 +79,11 @@ def test_the_loop_computes_what_matching_does() -> None:
 def test_columns_beyond_the_recorded_ones_are_other_series(weights: Path) -> None:
     with RolloutPool("ant", weights, 1) as pool:
         episodes, attributes = record_episodes(
-            pool, BenchmarkSizes(episodes=1, steps=80, units=40, attributes=20)
+            pool, DissectionBenchmarkSettings(episodes=1, steps=80, units=40, attributes=20)
         )
-        alone = record_episodes(pool, BenchmarkSizes(episodes=1, steps=80, units=32, attributes=16))[0][0]
+        alone = record_episodes(
+            pool, DissectionBenchmarkSettings(episodes=1, steps=80, units=32, attributes=16)
+        )[0][0]
     assert len({attribute.name for attribute in attributes}) == 20
     np.testing.assert_array_equal(episodes[0].activations[:, :32], alone.activations)
     assert np.abs(episodes[0].activations[:, 32] - alone.activations[:, 0]).max() > 0
