@@ -1,26 +1,20 @@
-"""What is closed where its ``with`` block ends, however it ends."""
+"""The base class of objects that are closed at the end of a ``with`` block."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from types import TracebackType
 from typing import Self
 
 
 class Closable(ABC):
-    """Something with a `close`; leaving its ``with`` block calls it."""
+    """An object with a `close` method, which is called where its ``with`` block ends."""
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of what is held; a second call does nothing."""
+        """Release what is held; a second call does nothing."""

@@ -26,7 +26,7 @@ from pdtui.sessions.environment_versions import (
 from pdtui.sessions.session_comparison import (
     AttributeDeviation,
     attribute_differences,
-    attribute_spread,
+    measure_spread,
     summarise_deviations,
 )
 from pdtui.sessions.session_reader import Session, read_session
@@ -171,7 +171,7 @@ def replay_session(
         first, changes, stopped = _run(session, loop, progress)
     here = collect_versions()
     elsewhere = bool(list_numeric_version_differences(session.versions, here)) and not strict
-    spread = attribute_spread(session.attributes)
+    spread = measure_spread(session.attributes)
     wrong = np.flatnonzero((changes > tolerance * spread).any(axis=1))
     agreed = (first or 0) + (int(wrong[0]) if wrong.size else len(changes))
     found = summarise_deviations(changes, session.info.attributes, first, spread) if first is not None else ()

@@ -1,4 +1,4 @@
-"""What one control step leaves behind, and what is known before the first."""
+"""What is known about a drive before its first control step."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from pdtui.sessions.session_schema import ActivationsKept
 
 @dataclass(frozen=True)
 class DriveInfo:
-    """What is known before the first control step: with the events, it determines the run.
+    """What is known about a drive before its first control step; with the events, it determines the run.
 
     Attributes:
         robot: name of the robot.
-        seed: of the first reset and of every random number.
+        seed: seed of the first reset and of every random number.
         policy: name of the policy.
-        policy_hash: SHA-256 of its weights.
-        map_text: the map, whole.
-        stochastic: whether actions are drawn from the policy's distribution instead of its mean.
-        start: state in which episodes start, empty for the robot's usual one.
-        dt: simulated time of a control step, s.
-        attributes, links, layers: of robot and policy.
-        activations: how they are recorded; no part of the run.
-        obstacles: whether there are any where the first episode starts.
+        policy_hash: SHA-256 of the policy's weights.
+        map_text: text of the stimulation-evoked map.
+        stochastic: whether actions are sampled from the policy's distribution instead of taking its mean.
+        start: state in which episodes start; empty for the robot's default.
+        dt: simulated time per control step, s.
+        attributes, links: kinematic attributes and links of the robot.
+        layers: widths of the policy's hidden layers.
+        activations: how activations are recorded, which does not affect the run.
+        obstacles: whether there are obstacles where the first episode starts.
     """
 
     robot: str

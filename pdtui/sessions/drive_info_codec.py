@@ -1,4 +1,4 @@
-"""`DriveInfo` as the properties of a recording, and back with every field checked."""
+"""Encode a `DriveInfo` as properties of a recording, and decode it again with every field checked."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ _MAX_LINKS, _MAX_UNITS, _MAX_TEXT = 10_000, 4_000_000, 1000
 
 
 def encode_drive_info(info: DriveInfo, created: str) -> dict[str, Any]:
-    """Plain values: what people read in the viewer as it is, structures as JSON.
+    """Return the properties of a drive: plain values, which the viewer shows, and structures as JSON.
 
     Args:
-        info: what determines the run.
-        created: date and time, ISO 8601.
+        info: the drive.
+        created: date and time at which it began, ISO 8601.
     """
     return {
         "schema": SCHEMA,
         "created": created,
         "robot": info.robot,
-        # As text, because a seed may be longer than 64 bits.
+        # As text, because a seed may exceed 64 bits.
         "seed": str(info.seed),
         "policy": info.policy,
         "policy_hash": info.policy_hash,
@@ -47,57 +47,57 @@ def encode_drive_info(info: DriveInfo, created: str) -> dict[str, Any]:
 
 
 def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, str]:
-    """Read back what `encode_drive_info` gave, trusting nothing.
+    """Decode the properties that `encode_drive_info` returned, trusting none of them.
 
     Args:
-        properties: a list of values by name, as the file holds them.
+        properties: a list of values for each name, as the file contains them.
 
     Returns:
-        The drive and when it was created.
+        The drive, and the date and time at which it began.
 
     Raises:
-        SessionError: a property is missing or not what it should be; the message names it.
+        SessionError: a property is missing or invalid; the message names it.
     """
-    schema = _one(properties, "schema", int)
+    schema = _read_value(properties, "schema", int)
     if schema != SCHEMA:
         raise SessionError(f"property 'schema': expected {SCHEMA}, found {schema}")
-    seed = _one(properties, "seed", str)
+    seed = _read_value(properties, "seed", str)
     if not (seed.isascii() and seed.isdigit() and len(seed) < 100):
         raise SessionError(f"property 'seed': expected a whole number, found '{seed[:40]}'")
-    dt = _one(properties, "dt", float)
+    dt = _read_value(properties, "dt", float)
     if not (math.isfinite(dt) and 0 < dt < 1e6):
-        raise SessionError(f"property 'dt': expected a time in s, found {dt}")
+        raise SessionError(f"property 'dt': expected a positive time in s, found {dt}")
     layers = properties.get("layers", [])
     if not layers or not all(type(width) is int and width > 0 for width in layers):
         raise SessionError("property 'layers': expected the widths of the hidden layers")
     if sum(layers) > _MAX_UNITS:
         raise SessionError(f"property 'layers': expected at most {_MAX_UNITS} units, found {sum(layers)}")
-    # Sessions from before there was a choice have them all.
-    kept = _one(properties, "activations", str) if "activations" in properties else "all"
+    # Older sessions, which lack the property, contain all activations.
+    kept = _read_value(properties, "activations", str) if "activations" in properties else "all"
     if kept not in ACTIVATIONS_KEPT:
         raise SessionError(
             f"property 'activations': expected one of {', '.join(ACTIVATIONS_KEPT)}, found '{kept[:40]}'"
         )
     info = DriveInfo(
-        robot=_one(properties, "robot", str),
+        robot=_read_value(properties, "robot", str),
         seed=int(seed),
-        policy=_one(properties, "policy", str),
-        policy_hash=_one(properties, "policy_hash", str),
-        map_text=_one(properties, "map", str),
-        stochastic=_one(properties, "stochastic", bool),
+        policy=_read_value(properties, "policy", str),
+        policy_hash=_read_value(properties, "policy_hash", str),
+        map_text=_read_value(properties, "map", str),
+        stochastic=_read_value(properties, "stochastic", bool),
         dt=dt,
-        attributes=_listed(properties, "attributes", _attribute),
-        links=_listed(properties, "links", _link),
+        attributes=_read_list(properties, "attributes", _attribute),
+        links=_read_list(properties, "links", _link),
         layers=tuple(layers),
         activations=kept,
-        # Sessions from before robots had several starts, or obstacles, do not say.
-        start=_one(properties, "start", str) if "start" in properties else "",
-        obstacles=_one(properties, "obstacles", bool) if "obstacles" in properties else False,
+        # Older sessions lack the following properties.
+        start=_read_value(properties, "start", str) if "start" in properties else "",
+        obstacles=_read_value(properties, "obstacles", bool) if "obstacles" in properties else False,
     )
-    return info, _one(properties, "created", str)
+    return info, _read_value(properties, "created", str)
 
 
-def _one(properties: Mapping[str, list[Any]], name: str, kind: type[T]) -> T:
+def _read_value(properties: Mapping[str, list[Any]], name: str, kind: type[T]) -> T:
     values = properties.get(name)
     if not isinstance(values, list) or len(values) != 1 or type(values[0]) is not kind:
         found = "nothing" if not values else f"{type(values[0]).__name__} × {len(values)}"
@@ -105,23 +105,23 @@ def _one(properties: Mapping[str, list[Any]], name: str, kind: type[T]) -> T:
     return values[0]
 
 
-def _listed(
+def _read_list(
     properties: Mapping[str, list[Any]], name: str, build: Callable[[dict[str, Any]], T]
 ) -> tuple[T, ...]:
-    text = _one(properties, name, str)
+    text = _read_value(properties, name, str)
     try:
         items = json.loads(text)
         if not isinstance(items, list) or len(items) > _MAX_LINKS:
-            raise ValueError("not a list of bearable length")
+            raise ValueError(f"expected a list of at most {_MAX_LINKS} items")
         return tuple(build(item) for item in items)
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
-        raise SessionError(f"property '{name}': not what pdtui writes: {error!r}") from error
+        raise SessionError(f"property '{name}': invalid: {error!r}") from error
 
 
 def _attribute(item: dict[str, Any]) -> Attribute:
     wraps = item["wraps"]
     if type(wraps) is not bool:
-        raise ValueError("'wraps' is not a truth value")
+        raise ValueError("'wraps' is not a boolean")
     (scale,) = _numbers([item["scale"]], 1)
     return Attribute(_text(item["name"]), _text(item["unit"]), scale, wraps)
 
@@ -143,7 +143,7 @@ def _text(value: Any) -> str:
         raise ValueError(f"expected text, found {type(value).__name__}")
     if len(value) > _MAX_TEXT:
         raise ValueError(f"expected at most {_MAX_TEXT} characters, found {len(value)}")
-    value.encode()  # JSON can name halves of characters, which nobody could write
+    value.encode()  # fails for the lone surrogates that JSON can contain
     return value
 
 

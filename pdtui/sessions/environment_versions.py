@@ -1,4 +1,4 @@
-"""What a bit-identical replay may depend on besides the session: machine and libraries."""
+"""Versions of the machine and the libraries, on which a bit-identical replay may depend."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import numpy as np
 
 PACKAGES = ("pdtui", "mujoco", "gymnasium", "torch", "numpy", "simple-pid", "rerun-sdk")
 COMPUTES_NOTHING = ("system", "rerun-sdk")
-"""What may differ without any number of a run being computed in another way."""
+"""Entries that may differ without affecting any number of a run."""
 
 
 def collect_versions() -> dict[str, str]:
-    """Versions of the interpreter and the libraries, and what is known of the machine.
+    """Collect the versions of the interpreter and the libraries, and a description of the machine.
 
-    A package that is not installed is left out.
+    Packages that are not installed are left out.
     """
     found = {
         "python": platform.python_version(),
@@ -38,11 +38,11 @@ def collect_versions() -> dict[str, str]:
 
 
 def list_version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
-    """What differs between two environments, one line each, such as ``numpy: 2.2.0 there, 2.3.1 here``.
+    """List the differences between two environments, such as ``numpy: 2.2.0 there, 2.3.1 here``.
 
     Args:
-        a: there, as a session holds it.
-        b: here.
+        a: the versions there, from a session.
+        b: the versions here.
     """
     return [
         f"{name}: {a.get(name, 'absent')} there, {b.get(name, 'absent')} here"
@@ -52,7 +52,7 @@ def list_version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> list
 
 
 def list_numeric_version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
-    """Those of `list_version_differences` that can change a bit of a run."""
+    """List those of the differences that can affect the numbers of a run."""
     return list_version_differences(
         *({name: value for name, value in one.items() if name not in COMPUTES_NOTHING} for one in (a, b))
     )
@@ -71,11 +71,11 @@ def _blas_name() -> str:
     config = np.show_config(mode="dicts")
     blas = config.get("Build Dependencies", {}).get("blas", {}) if isinstance(config, dict) else {}
     name = f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip()
-    chosen = os.environ.get("OPENBLAS_CORETYPE")  # another processor's instructions sum in another order
+    chosen = os.environ.get("OPENBLAS_CORETYPE")  # other instructions sum in another order
     return f"{name}, {chosen}" if chosen else name
 
 
 def _kernels_name() -> str:
-    """The instructions that torch computes with: they decide in which order a policy sums."""
-    torch = sys.modules.get("torch")  # nothing is computed by it where it is not loaded
+    """Return the instruction set that torch uses, which determines the order in which a policy sums."""
+    torch = sys.modules.get("torch")  # where it is not loaded, it computes nothing
     return torch.backends.cpu.get_cpu_capability() if torch is not None else "none"

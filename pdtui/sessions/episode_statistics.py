@@ -1,4 +1,4 @@
-"""How an episode stands, in the figures that an operator drives by: the same live and from a session."""
+"""Statistics of an episode, computed in the same way during a drive and from a session."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class EpisodeStatistics:
-    """What an episode came to, so far.
+    """Statistics of an episode so far.
 
     Attributes:
-        episode: its number.
-        steps: control steps, rewound ones included.
-        involvement: those in which a key was pressed: the paper's human involvement.
-        distance: where the robot's attribute ``distance`` stands, m; None for a robot without.
-        collisions: sum of the steps' cost, where there are obstacles; None where there are none.
+        episode: number of the episode.
+        steps: number of control steps, including those that were rewound.
+        involvement: number of control steps in which a key was pressed: the paper's human involvement.
+        distance: latest value of the robot's attribute ``distance``, m; None if the robot lacks it.
+        collisions: sum of the cost of all steps where there are obstacles, else None.
     """
 
     episode: int = 0
@@ -30,19 +30,19 @@ class EpisodeStatistics:
 
     @property
     def share(self) -> float:
-        """Part of the control steps in which a key was pressed, 0..1."""
+        """The share of control steps in which a key was pressed, 0..1."""
         return self.involvement / max(1, self.steps)
 
 
 NO_STATISTICS = EpisodeStatistics()
-"""Of a drive that has not begun."""
+"""The statistics of a drive that has not begun."""
 
 
 class EpisodeStatisticsCounter:
-    """One tally an episode; a rewind into an earlier episode goes on with that one's.
+    """Counts the statistics of each episode; after a rewind, those of the earlier episode are continued.
 
     Args:
-        info: of the drive.
+        info: the drive.
     """
 
     def __init__(self, info: DriveInfo) -> None:
@@ -55,19 +55,19 @@ class EpisodeStatisticsCounter:
         self._none = EpisodeStatistics(
             distance=None if self._column is None else 0.0, collisions=0.0 if info.obstacles else None
         )
-        self._tallies: dict[int, EpisodeStatistics] = {}
+        self._statistics: dict[int, EpisodeStatistics] = {}
 
     def add(self, episode: int, *, keyed: bool, cost: float, attributes: Floats) -> None:
-        """Take in one control step.
+        """Count one control step.
 
         Args:
-            episode: its number.
+            episode: number of the episode.
             keyed: whether a key was pressed.
-            cost: of the step.
-            attributes: after the step, shape (J,).
+            cost: cost of the step.
+            attributes: attributes after the step, shape (J,).
         """
         before = self.of(episode)
-        self._tallies[episode] = replace(
+        self._statistics[episode] = replace(
             before,
             steps=before.steps + 1,
             involvement=before.involvement + keyed,
@@ -76,10 +76,10 @@ class EpisodeStatisticsCounter:
         )
 
     def of(self, episode: int) -> EpisodeStatistics:
-        """How an episode stands."""
-        return self._tallies.get(episode) or replace(self._none, episode=episode)
+        """Return the statistics of an episode."""
+        return self._statistics.get(episode) or replace(self._none, episode=episode)
 
     @property
     def all(self) -> tuple[EpisodeStatistics, ...]:
-        """Of every episode that was begun, in the order of their numbers."""
-        return tuple(tally for _, tally in sorted(self._tallies.items()))
+        """The statistics of all episodes that began, ordered by their numbers."""
+        return tuple(statistics for _, statistics in sorted(self._statistics.items()))

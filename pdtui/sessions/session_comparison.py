@@ -1,14 +1,15 @@
-"""How far two runs of the same drive are apart, attribute by attribute."""
+"""Compare two sessions, or two runs of a drive, attribute by attribute."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.core.angles import wrap_angles
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import SessionError
 from pdtui.core.events import Event, describe_event
@@ -17,15 +18,14 @@ from pdtui.sessions.session_reader import Session
 
 @dataclass(frozen=True)
 class AttributeDeviation:
-    """How far an attribute is off.
+    """How much an attribute deviates between two runs.
 
     Attributes:
-        attribute: its name.
-        unit: of the three numbers.
-        first: in the first step that differs.
-        largest: from there to the end.
-        mean: from there to the end.
-        step: at which it is largest.
+        attribute: name of the attribute.
+        unit: unit of the three numbers.
+        first: deviation in the first step that differs.
+        largest, mean: largest and mean deviation from that step to the end.
+        step: the step with the largest deviation.
     """
 
     attribute: str
@@ -44,15 +44,15 @@ class AttributeDeviation:
 
 @dataclass(frozen=True)
 class SessionComparison:
-    """How two sessions compare.
+    """The differences between two sessions.
 
     Attributes:
-        steps: control steps that both have.
-        lengths: control steps of each.
-        first_difference: the first step after which the digests differ; None if none does.
-        deviations: of each attribute that differs from there on, those of the first step first.
-        first_event: the first event that differs, in words; empty if none does.
-        circumstances: what else differs: robot, seed, policy, map, versions.
+        steps: number of control steps that both have.
+        lengths: number of control steps of each.
+        first_difference: the first step after which the digests differ; None if they never do.
+        deviations: the attributes that deviate from that step on, those that deviate first at the top.
+        first_event: the first event that differs, in words; empty if all are equal.
+        circumstances: other differences: robot, seed, policy, map, versions.
     """
 
     steps: int
@@ -64,16 +64,16 @@ class SessionComparison:
 
 
 def attribute_differences(a: Floats, b: Floats, attributes: Sequence[Attribute]) -> Floats:
-    """Absolute differences; an angle that wraps differs by at most π, and NaN equals NaN.
+    """Return absolute differences of attributes; angles that wrap differ by at most π, and NaN equals NaN.
 
     Args:
-        a, b: shape (..., J).
-        attributes: J of them.
+        a, b: values of the attributes, shape (..., J).
+        attributes: the J attributes.
     """
     with np.errstate(invalid="ignore"):
         change: Floats = np.abs(a - b)
     wraps = np.array([attribute.wraps for attribute in attributes], bool)
-    change[..., wraps] = np.abs((change[..., wraps] + math.pi) % (2 * math.pi) - math.pi)
+    change[..., wraps] = np.abs(wrap_angles(change[..., wraps]))
     change[(a == b) | (np.isnan(a) & np.isnan(b))] = 0.0
     return np.where(np.isnan(change), np.inf, change)
 
@@ -81,13 +81,13 @@ def attribute_differences(a: Floats, b: Floats, attributes: Sequence[Attribute])
 def summarise_deviations(
     change: Floats, attributes: Sequence[Attribute], first: int, spread: Floats
 ) -> tuple[AttributeDeviation, ...]:
-    """Sum up what `attribute_differences` gave from step `first` on, worst first.
+    """Summarise the `attribute_differences` from step `first` on, ordered from worst to best.
 
     Args:
-        change: shape (n, J), n > 0; its first row is that of step `first`.
-        attributes: J of them.
-        first: number of the step.
-        spread: by what to divide before attributes are ranked, shape (J,).
+        change: the differences, shape (n, J), n > 0; the first row belongs to step `first`.
+        attributes: the J attributes.
+        first: number of the first step that differs.
+        spread: divisor of each attribute's deviations when they are ranked, shape (J,).
     """
     largest, worst = change.max(axis=0), change.argmax(axis=0)
     mean = change.mean(axis=0)
@@ -106,8 +106,9 @@ def summarise_deviations(
     )
 
 
-def attribute_spread(values: Floats) -> Floats:
-    """Standard deviation of each attribute over a session, 1 for one that hardly moves; shape (J,)."""
+def measure_spread(values: Floats) -> Floats:
+    """Return the standard deviation of each attribute over a session, 1 if it is nearly constant; shape
+    (J,)."""
     if not len(values):
         return np.ones(values.shape[1])
     with np.errstate(invalid="ignore"):
@@ -116,13 +117,15 @@ def attribute_spread(values: Floats) -> Floats:
 
 
 def compare_sessions(a: Session, b: Session) -> SessionComparison:
-    """Find the first step that differs and how far the attributes are apart after it.
+    """Find the first step that differs, and how much the attributes deviate from it on.
 
     Raises:
-        SessionError: the two do not measure the same attributes.
+        SessionError: the sessions have different attributes.
     """
     if a.info.attributes != b.info.attributes:
-        raise SessionError(f"{a.path} and {b.path}: of robots with other attributes; nothing can be compared")
+        raise SessionError(
+            f"{a.path} and {b.path}: cannot be compared: their robots have different attributes"
+        )
     steps = min(a.steps, b.steps)
     differing: NDArray[np.intp] = np.flatnonzero(a.digests[:steps] != b.digests[:steps])
     first = int(differing[0]) if differing.size else None
@@ -131,23 +134,22 @@ def compare_sessions(a: Session, b: Session) -> SessionComparison:
         change = attribute_differences(
             a.attributes[first:steps], b.attributes[first:steps], a.info.attributes
         )
-        found = summarise_deviations(change, a.info.attributes, first, attribute_spread(a.attributes))
+        found = summarise_deviations(change, a.info.attributes, first, measure_spread(a.attributes))
     return SessionComparison(
         steps, (a.steps, b.steps), first, found, _first_event(a.events, b.events, steps), _circumstances(a, b)
     )
 
 
-def _first_event(a: tuple[Event, ...], b: tuple[Event, ...], steps: int) -> str:
+def _first_event(a: Sequence[Event], b: Sequence[Event], steps: int) -> str:
     of_a, of_b = ([event for event in events if event.step < steps] for events in (a, b))
-    for number in range(max(len(of_a), len(of_b))):
-        one, other = (events[number] if number < len(events) else None for events in (of_a, of_b))
-        if one != other:
-            return f"event {number}: {_told(one)} in the first, {_told(other)} in the second"
+    for number, pair in enumerate(zip_longest(of_a, of_b)):
+        if pair[0] != pair[1]:
+            first, second = (
+                "none" if event is None else f"{describe_event(event)} before step {event.step}"
+                for event in pair
+            )
+            return f"event {number}: {first} in the first, {second} in the second"
     return ""
-
-
-def _told(event: Event | None) -> str:
-    return "none" if event is None else f"{describe_event(event)} before step {event.step}"
 
 
 def _circumstances(a: Session, b: Session) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Streams of a session as Parquet or CSV tables, one row a step, a behavior, a unit or an event."""
+"""Export streams of a session as Parquet or CSV tables."""
 
 from __future__ import annotations
 
@@ -25,13 +25,14 @@ _WRITERS: dict[str, Callable[[pa.Table, str], None]] = {
 
 
 def export_stream(path: Path, stream: str, output: Path, *, overwrite: bool = False) -> int:
-    """Write one stream of a session as a table; its columns are ``step``, ``time`` (s) and the stream's own.
+    """Write one stream of a session as a table with the columns ``step``, ``time`` (s) and those of the
+    stream.
 
     Args:
         path: the session.
-        stream: one of `STREAMS`.
-        output: a .parquet or .csv file.
-        overwrite: replace it if it exists.
+        stream: name of one of `STREAMS`.
+        output: the .parquet or .csv file.
+        overwrite: whether an existing file is replaced.
 
     Returns:
         The number of rows.
@@ -59,14 +60,14 @@ def export_stream(path: Path, stream: str, output: Path, *, overwrite: bool = Fa
 
 def _attributes(session: Session) -> Columns:
     names = [f"{attribute.name} ({attribute.unit})" for attribute in session.info.attributes]
-    return _named(session.attributes, names)
+    return _name_columns(session.attributes, names)
 
 
 def _actions(session: Session) -> Columns:
-    return _named(session.actions, [f"action {index}" for index in range(session.actions.shape[1])])
+    return _name_columns(session.actions, [f"action {index}" for index in range(session.actions.shape[1])])
 
 
-def _gains(session: Session) -> Columns:
+def _rewards(session: Session) -> Columns:
     return {
         "reward": session.rewards,
         "cost": session.costs,
@@ -78,7 +79,7 @@ def _gains(session: Session) -> Columns:
 def _activations(session: Session) -> Columns:
     activations = read_activations(session.path)
     units = [format_unit(unit, session.info.layers) for unit in range(activations.shape[1])]
-    return _named(activations, units)
+    return _name_columns(activations, units)
 
 
 def _behaviors(session: Session) -> Columns:
@@ -116,18 +117,24 @@ def _events(session: Session) -> Columns:
     return columns
 
 
-def _named(block: np.ndarray[Any, Any], names: list[str]) -> Columns:
+def _name_columns(block: np.ndarray[Any, Any], names: list[str]) -> Columns:
     return {name: block[:, column] for column, name in enumerate(names)}
 
 
 STREAMS: dict[str, tuple[str, Callable[[Session], Columns]]] = {
     "attributes": ("kinematic attributes after each step", _attributes),
     "actions": ("what the policy commanded", _actions),
-    "gains": ("reward, cost, episode and why it ended", _gains),
-    "digests": ("of the simulator's state after each step", lambda session: {"digest": session.digests}),
-    "activations": ("output of every hidden unit, as the next layer saw it", _activations),
-    "behaviors": ("active behaviors with their controllers; a row each", _behaviors),
-    "stimulation": ("overwritten units, natural against overwritten; a row each", _stimulation),
-    "events": ("everything that changed the run; a row each", _events),
+    "gains": ("reward, cost, episode, and why it ended", _rewards),
+    "digests": (
+        "digest of the simulator's state after each step",
+        lambda session: {"digest": session.digests},
+    ),
+    "activations": ("output of every hidden unit, as the next layer received it", _activations),
+    "behaviors": ("active behaviors with their controllers, one row each", _behaviors),
+    "stimulation": (
+        "stimulated units with their natural and overwritten outputs, one row each",
+        _stimulation,
+    ),
+    "events": ("everything that changed the run, one row per event", _events),
 }
-"""What each stream holds, and how it is read."""
+"""The streams by name: what each contains, and the function that returns its columns."""

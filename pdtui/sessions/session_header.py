@@ -1,4 +1,4 @@
-"""What is known of a session without reading what every step held: enough to list it."""
+"""The header of a session: everything but the data of its control steps."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME,
 
 @dataclass(frozen=True)
 class SessionHeader:
-    """A recorded drive without its numbers.
+    """A recorded drive without the data of its control steps.
 
     Attributes:
         path: the file.
-        info: what determines the run, besides its events.
-        versions: of machine and libraries that ran it.
-        created: date and time, ISO 8601.
-        events: in the order in which they were applied.
+        info: what was known before the first control step.
+        versions: versions of the machine and the libraries that ran the drive.
+        created: date and time at which the drive began, ISO 8601.
+        events: the events, in the order in which they were applied.
         steps: number of control steps.
-        endings: why an episode ended by itself, by the step with which it did.
-        outcome: how the drive ended; empty if the file has no end.
+        endings: why episodes ended by themselves, by the control step that ended each.
+        outcome: how the drive ended; empty if the recording was cut off.
     """
 
     path: Path
@@ -43,12 +43,12 @@ class SessionHeader:
 
     @property
     def seconds(self) -> float:
-        """Simulated time, s."""
+        """The simulated time, s."""
         return self.steps * self.info.dt
 
     @property
     def keys(self) -> int:
-        """Keys pressed."""
+        """The number of key presses."""
         return sum(bool(event.key) for event in self.events)
 
 
@@ -56,8 +56,8 @@ def read_session_header(path: Path | str) -> SessionHeader:
     """Read the header of a session without decoding, or even reading, the data of its control steps.
 
     Raises:
-        SessionError: no such file, not a session, torn, or incomplete; the message names the file. Damage
-            within the data of control steps is not noticed.
+        SessionError: the file does not exist, is no session, or is cut off or damaged; the message names the
+            file. Damage within the data of control steps is not noticed.
     """
     path = Path(path)
     file = RrdContents(path, entities=(EVENTS, ENDINGS))
@@ -71,7 +71,7 @@ def decode_header(file: RrdContents, path: Path, steps: int) -> SessionHeader:
     """Return the header of a session of which properties, events and endings were read.
 
     Raises:
-        SessionError: a part is missing or not what it should be; the message does not name the file.
+        SessionError: a part is missing or invalid; the message does not name the file.
     """
     info, created = decode_drive_info(file.properties(INFO))
     return SessionHeader(
@@ -79,18 +79,18 @@ def decode_header(file: RrdContents, path: Path, steps: int) -> SessionHeader:
         info=info,
         versions={name: str(values[0]) for name, values in file.properties(VERSIONS).items() if values},
         created=created,
-        events=_events(file.rows(EVENTS)),
+        events=_read_events(file.table(EVENTS)),
         steps=steps,
-        endings=_endings(file.rows(ENDINGS)),
-        outcome=_outcome(file),
+        endings=_read_endings(file.table(ENDINGS)),
+        outcome=read_outcome(file),
     )
 
 
 def count_steps(drive: EntityTable) -> int:
-    """How many there are, none missing.
+    """Count control steps, checking that none is missing.
 
     Raises:
-        SessionError: a step is missing.
+        SessionError: a control step is missing.
     """
     steps = drive.steps
     wrong = np.flatnonzero(steps != np.arange(len(steps)))
@@ -99,29 +99,30 @@ def count_steps(drive: EntityTable) -> int:
     return len(steps)
 
 
-def _events(found: EntityTable) -> tuple[Event, ...]:
-    if not len(found.steps):
+def _read_events(table: EntityTable) -> tuple[Event, ...]:
+    if not len(table.steps):
         return ()
-    order = np.argsort(found.numbers("number", np.int64), kind="stable")
-    if not np.array_equal(found.numbers("number", np.int64)[order], np.arange(len(order))):
+    order = np.argsort(table.read_numbers("number", np.int64), kind="stable")
+    if not np.array_equal(table.read_numbers("number", np.int64)[order], np.arange(len(order))):
         raise SessionError("an event is missing")
-    kinds, names, keys = found.texts("kind"), found.texts("name"), found.texts("key")
-    values = found.numbers("value", np.float64)
+    kinds, names, keys = table.read_texts("kind"), table.read_texts("name"), table.read_texts("key")
+    values = table.read_numbers("value", np.float64)
     events = []
     for row in order:
         kind = kinds[row]
         if kind not in EVENT_WORDINGS:
             raise SessionError(f"unknown event '{kind[:40]}'; there are {', '.join(EVENT_WORDINGS)}")
-        events.append(Event(int(found.steps[row]), kind, names[row], float(values[row]), keys[row]))
+        events.append(Event(int(table.steps[row]), kind, names[row], float(values[row]), keys[row]))
     return tuple(events)
 
 
-def _endings(found: EntityTable) -> dict[int, str]:
-    if not len(found.steps):
+def _read_endings(table: EntityTable) -> dict[int, str]:
+    if not len(table.steps):
         return {}
-    return dict(zip(found.steps.tolist(), found.texts("TextLog:text"), strict=True))
+    return dict(zip(table.steps.tolist(), table.read_texts("TextLog:text"), strict=True))
 
 
-def _outcome(file: RrdContents) -> str:
+def read_outcome(file: RrdContents) -> str:
+    """Return how the drive ended; empty if the recording was cut off."""
     values = file.properties(OUTCOME).get("outcome", [])
     return values[0] if len(values) == 1 and isinstance(values[0], str) else ""

@@ -1,4 +1,4 @@
-"""Read a session back: everything in it is checked, because a session may come from anywhere."""
+"""Read a session; everything in it is checked, because a session may come from an untrusted source."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ class Session(SessionHeader):
     """A recorded drive of S control steps, J attributes and A actions.
 
     Attributes:
-        digests: of the simulator's state after each step, shape (S,), int64.
-        attributes: after each step, shape (S, J).
-        actions: shape (S, A), float32.
-        rewards, costs: shape (S,).
-        episodes: number of the episode, shape (S,), int64.
-        active: the behaviors of each step with their controllers, the one latched last at the end.
-        stimulations: units and the outputs that overwrote them, for each step.
-        natural: what those units would have put out, for each step.
+        digests: digest of the simulator's state after each step, shape (S,), int64.
+        attributes: attributes after each step, shape (S, J).
+        actions: action of each step, shape (S, A), float32.
+        rewards, costs: reward and cost of each step, shape (S,).
+        episodes: number of the episode of each step, shape (S,), int64.
+        active: the active behaviors of each step with their controllers, ordered by when they were latched.
+        stimulations: for each step, the stimulated units and the values that overwrote their outputs.
+        natural: for each step, the outputs that those units would have had.
     """
 
     digests: NDArray[np.int64] = field(repr=False)
@@ -55,33 +55,33 @@ class Session(SessionHeader):
 
     @property
     def behaviors(self) -> tuple[tuple[str, ...], ...]:
-        """Names of the behaviors that were active in each step."""
+        """The names of the active behaviors of each step."""
         return tuple(tuple(behavior.name for behavior in step) for step in self.active)
 
 
 def read_session(path: Path | str) -> Session:
-    """Read all of a session but its activations, with or without a footer.
+    """Read a session except its activations, whether or not the file ends with an index.
 
     Raises:
-        SessionError: no such file, not a session, torn, or incomplete; the message names the file and says
-            what is wrong.
+        SessionError: the file does not exist, is no session, or is damaged or incomplete; the message names
+            the file and says what is wrong.
     """
     path = Path(path)
     file = RrdContents(path, skip=("activations",))
     try:
-        drive = file.rows(DRIVE)
-        heading = decode_header(file, path, count_steps(drive))
-        info = heading.info
-        gains = drive.block(REWARD_COST_ACTION, np.float64)
-        if heading.steps and gains.shape[1] < 2:
+        drive = file.table(DRIVE)
+        header = decode_header(file, path, count_steps(drive))
+        info = header.info
+        gains = drive.read_matrix(REWARD_COST_ACTION, np.float64)
+        if header.steps and gains.shape[1] < 2:
             raise SessionError(f"stream '{DRIVE}/{REWARD_COST_ACTION}': expected reward and cost first")
-        gains = gains if heading.steps else np.empty((0, 2))
-        counters = drive.block(DIGEST_EPISODE, np.int64, 2)
+        gains = gains if header.steps else np.empty((0, 2))
+        counters = drive.read_matrix(DIGEST_EPISODE, np.int64, 2)
         stimulations, natural = _stimulations(drive, sum(info.layers))
         return Session(
-            **vars(heading),
+            **vars(header),
             digests=counters[:, 0],
-            attributes=drive.block("attributes", np.float64, len(info.attributes)),
+            attributes=drive.read_matrix("attributes", np.float64, len(info.attributes)),
             actions=gains[:, 2:].astype(np.float32),
             rewards=gains[:, 0],
             costs=gains[:, 1],
@@ -95,25 +95,25 @@ def read_session(path: Path | str) -> Session:
 
 
 def read_activations(path: Path | str) -> NDArray[np.float32]:
-    """Output of every hidden unit in every step, as the next layer saw it, shape (S, U).
+    """Read the output of every hidden unit in every step, as the next layer received it, shape (S, U).
 
-    Where they were recorded as float16, they are rounded to 11 bits.
+    If they were recorded as float16, they are rounded to 11 bits.
 
     Raises:
-        SessionError: as `read_session`, and where they were not recorded.
+        SessionError: as `read_session`; or the activations were not recorded.
     """
     path = Path(path)
     file = RrdContents(path, only=("activations",))
     try:
         info, _ = decode_drive_info(file.properties(INFO))
-        drive = file.rows(DRIVE)
+        drive = file.table(DRIVE)
         count_steps(drive)
         if info.activations == "off":
             raise SessionError(
-                "its activations were not recorded (--record-activations off); a replay has them"
+                "the activations were not recorded (--record-activations off); a replay computes them"
             )
         kind = np.float16 if info.activations == "half" else np.float32
-        return drive.block("activations", kind, sum(info.layers)).astype(np.float32, copy=False)
+        return drive.read_matrix("activations", kind, sum(info.layers)).astype(np.float32, copy=False)
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
 
@@ -121,10 +121,10 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
 def _active(drive: EntityTable) -> tuple[tuple[ActiveBehavior, ...], ...]:
     width = len(ACTIVE_FIELDS)
     steps = []
-    states = drive.lists("active", float, optional=True)
-    for names, flat in zip(drive.lists("behaviors", str, optional=True), states, strict=True):
+    states = drive.read_lists("active", float, optional=True)
+    for names, flat in zip(drive.read_lists("behaviors", str, optional=True), states, strict=True):
         if len(flat) != len(names) * width:
-            raise SessionError(f"stream 'active': expected {width} numbers a behavior")
+            raise SessionError(f"stream 'active': expected {width} numbers per behavior")
         steps.append(
             tuple(_behavior(name, flat[i * width : (i + 1) * width]) for i, name in enumerate(names))
         )
@@ -142,7 +142,7 @@ def _stimulations(
 ) -> tuple[tuple[Stimulation, ...], tuple[tuple[float, ...], ...]]:
     width = len(OVERWRITE_FIELDS)
     stimulations, natural = [], []
-    for flat in drive.lists("stimulation", float, optional=True):
+    for flat in drive.read_lists("stimulation", float, optional=True):
         chosen, values, would = flat[::width], flat[1::width], flat[2::width]
         if len(flat) % width or not all(unit.is_integer() and 0 <= unit < units for unit in chosen):
             raise SessionError(f"stream 'stimulation': expected units 0..{units - 1} with two values each")

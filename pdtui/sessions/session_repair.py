@@ -1,4 +1,4 @@
-"""Rescue what can be read of a session whose end is missing or cut."""
+"""Repair a session whose end is missing or damaged: rescue what can be read."""
 
 from __future__ import annotations
 
@@ -17,23 +17,24 @@ from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.drive_info_codec import decode_drive_info
 from pdtui.sessions.rrd.chunk_stream import ChunkStream
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_header import SessionHeader, count_steps, decode_header
+from pdtui.sessions.session_header import SessionHeader, count_steps, decode_header, read_outcome
 from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, INFO, OUTCOME, STEP
 from pdtui.sessions.writer.rerun_recording import name_file_in_errors, open_recording, send_property
 
-_CHUNKS_A_FLUSH = 64
+_CHUNKS_PER_FLUSH = 64
 
 
 @dataclass(frozen=True)
 class SessionCondition:
-    """What is left of a session.
+    """How much of a session can be read.
 
     Attributes:
-        info: what determines the run.
-        steps: control steps from the first to the last before a gap, or before the first broken chunk.
+        info: what was known before the first control step.
+        steps: number of control steps before the first gap or the first damaged chunk.
         outcome: how the drive ended; empty if the file does not say.
-        recording_id: that the viewer knows it by.
-        whole: nothing is missing: every chunk can be read, no step is missing, outcome and footer are there.
+        recording_id: identifier by which the viewer knows the recording.
+        whole: whether nothing is missing: every chunk, every control step, the outcome and the index at the
+            end.
     """
 
     info: DriveInfo
@@ -44,34 +45,33 @@ class SessionCondition:
 
 
 def examine_session(path: Path) -> SessionCondition:
-    """Read as far as it goes and see what is there.
+    """Read a session as far as possible and report what is there.
 
     Raises:
-        SessionError: no session, or cut before everything that determines the run was written.
+        SessionError: the file is no session, or was cut off before the first control step.
     """
     file = RrdContents(path, only=(DIGEST_EPISODE,), torn=True)
     try:
         info, _ = decode_drive_info(file.properties(INFO))
-        steps = file.rows(DRIVE).steps
+        steps = file.table(DRIVE).steps
     except SessionError as error:
         raise SessionError(f"{path}: nothing can be rescued: {error}") from error
     gaps = np.flatnonzero(steps != np.arange(len(steps)))
     kept = int(gaps[0]) if gaps.size else len(steps)
-    said = file.properties(OUTCOME).get("outcome", [])
-    outcome = said[0] if len(said) == 1 and isinstance(said[0], str) else ""
+    outcome = read_outcome(file)
     whole = file.finished and not gaps.size and bool(outcome)
     return SessionCondition(info, kept, outcome, file.recording_id, whole)
 
 
 def repair_session(path: Path, output: Path) -> SessionHeader:
-    """Write what can be read of a session as a whole one; never more than a few chunks are in memory.
+    """Write what can be read of a session as a complete session, with only a few chunks in memory at a time.
 
-    Everything after the last step without a gap is left out. The outcome becomes ``repaired: cut at step N``,
-    unless the file still says how the drive ended. The output appears when it is whole, and not before.
+    Everything from the first missing step on is left out. The outcome becomes ``repaired: cut at step N``
+    unless the file still says how the drive ended. The output appears only once it is complete.
 
     Args:
         path: the session.
-        output: the repaired one; it may be `path`, which is then replaced.
+        output: the repaired session; may be `path`, which is then replaced.
 
     Raises:
         SessionError: nothing can be rescued, or the output cannot be written.
@@ -82,9 +82,11 @@ def repair_session(path: Path, output: Path) -> SessionHeader:
     with name_file_in_errors(output), replace_file(output, SessionError) as partial:
         _rewrite(path, partial, condition)
         contents = RrdContents(partial, only=(DIGEST_EPISODE,))
-        repaired = decode_header(contents, output, count_steps(contents.rows(DRIVE)))
+        repaired = decode_header(contents, output, count_steps(contents.table(DRIVE)))
         if repaired.steps != condition.steps:
-            raise SessionError(f"{path}: {condition.steps} steps were there, {repaired.steps} were rescued")
+            raise SessionError(
+                f"{path}: expected {condition.steps} steps in the repaired session, found {repaired.steps}"
+            )
         partial.chmod(path.stat().st_mode & 0o777)
     return repaired
 
@@ -92,9 +94,9 @@ def repair_session(path: Path, output: Path) -> SessionHeader:
 def _rewrite(path: Path, output: Path, condition: SessionCondition) -> None:
     recording = open_recording(output, condition.info, condition.recording_id)
     try:
-        for number, chunk in enumerate(_kept(path, condition.steps)):
+        for number, chunk in enumerate(_read_kept_chunks(path, condition.steps)):
             recording.send_chunks(chunk)
-            if number % _CHUNKS_A_FLUSH == 0:
+            if number % _CHUNKS_PER_FLUSH == 0:
                 recording.flush()
         if not condition.outcome:
             send_property(recording, OUTCOME, {"outcome": f"repaired: cut at step {condition.steps}"})
@@ -103,13 +105,13 @@ def _rewrite(path: Path, output: Path, condition: SessionCondition) -> None:
         recording.disconnect()
 
 
-def _kept(path: Path, steps: int) -> Iterator[rerun.chunk.Chunk]:
-    """Chunks without the rows of later steps: a batch's events and views may be there without its drive."""
+def _read_kept_chunks(path: Path, steps: int) -> Iterator[rerun.chunk.Chunk]:
+    """Yield the chunks without rows of later steps, whose events may have been written before their data."""
     stream = iter(ChunkStream(path))
     while True:
         try:
             chunk = next(stream, None)
-        except SessionError:  # the rest is what is left out
+        except SessionError:  # the rest is left out
             return
         if chunk is None:
             return

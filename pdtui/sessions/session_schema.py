@@ -1,4 +1,4 @@
-"""Names inside a session file: what the recorder writes and the reader looks for."""
+"""Names in a session file: the entities, properties and columns that are written and read."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ SCHEMA = 1
 STEP, TIME = "step", "time"
 
 DRIVE = "/drive"
-"""One row a control step: an entity more would cost over a kilobyte a batch, a column a hundred bytes."""
+"""One row per control step, in one entity: another would cost a kilobyte per batch, a column a hundred
+bytes."""
 
 EVENTS = "/events"
 ENDINGS = "/endings"
@@ -29,12 +30,12 @@ INFO, VERSIONS, OUTCOME = "drive", "versions", "outcome"
 REWARD_COST_ACTION, DIGEST_EPISODE = "reward_cost_action", "digest_episode"
 
 ACTIVE_FIELDS = ("remaining", "factor", "target", "value", "error", "magnitude")
-"""Columns of `active`: an `ActiveBehavior` without its name; NaN where it has None."""
+"""Fields in the column ``active``: those of an `ActiveBehavior` except its name, with NaN for None."""
 
 OVERWRITE_FIELDS = ("unit", "overwritten", "natural")
-"""Columns of `stimulation`."""
+"""Fields in the column ``stimulation``."""
 
 ActivationsKept = Literal["all", "half", "off"]
-"""How activations are recorded: as they are, as float16, or not at all."""
+"""How activations are recorded: as float32, as float16, or not at all."""
 
 ACTIVATIONS_KEPT: tuple[ActivationsKept, ...] = get_args(ActivationsKept)

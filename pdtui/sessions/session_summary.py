@@ -1,4 +1,4 @@
-"""What a drive came to, in figures."""
+"""Summary statistics of a session."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pdtui.sessions.session_reader import Session
 
 @dataclass(frozen=True)
 class AttributeSummary:
-    """Mean and standard deviation of an attribute over a session, steps without a number left out."""
+    """Mean and standard deviation of an attribute over the steps in which it is finite."""
 
     attribute: str
     unit: str
@@ -23,18 +23,18 @@ class AttributeSummary:
 
 @dataclass(frozen=True)
 class SessionSummary:
-    """What a drive came to.
+    """Summary statistics of a session.
 
     Attributes:
-        steps: control steps.
+        steps: number of control steps.
         seconds: simulated time, s.
-        episodes: that were begun.
-        falls: episodes that ended by themselves.
-        involvement: control steps in which a key was pressed.
-        total_reward, total_cost: sums over all steps, rewound ones included.
-        stimulated: control steps in which units were overwritten.
-        tallies: of the episodes, in the order of their numbers.
-        attributes: of the robot, in its order; an angle that wraps has no mean that means something.
+        episodes: number of episodes that began.
+        falls: number of episodes that ended by themselves.
+        involvement: number of control steps in which a key was pressed.
+        total_reward, total_cost: sums over all steps, including those that were rewound.
+        stimulated: number of control steps in which units were overwritten.
+        tallies: statistics of the episodes, ordered by their numbers.
+        attributes: the robot's attributes in their order; the mean of an angle that wraps is meaningless.
     """
 
     steps: int
@@ -50,7 +50,7 @@ class SessionSummary:
 
 
 def summarise_session(session: Session) -> SessionSummary:
-    """Sum a session up."""
+    """Compute the summary statistics of a session."""
     keyed = {event.step for event in session.events if event.key}
     return SessionSummary(
         steps=session.steps,
@@ -67,11 +67,11 @@ def summarise_session(session: Session) -> SessionSummary:
 
 
 def _tallies(session: Session, keyed: set[int]) -> tuple[EpisodeStatistics, ...]:
-    tallies = EpisodeStatisticsCounter(session.info)
+    counter = EpisodeStatisticsCounter(session.info)
     steps = zip(session.episodes.tolist(), session.costs.tolist(), session.attributes, strict=True)
     for step, (episode, cost, attributes) in enumerate(steps):
-        tallies.add(episode, keyed=step in keyed, cost=cost, attributes=attributes)
-    return tallies.all
+        counter.add(episode, keyed=step in keyed, cost=cost, attributes=attributes)
+    return counter.all
 
 
 def _attributes(session: Session) -> tuple[AttributeSummary, ...]:

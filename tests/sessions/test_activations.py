@@ -35,9 +35,9 @@ def test_half_is_rounded_and_off_is_refused_by_name(recorded: Recorded, tmp_path
     kept = read_activations(half)
     assert kept.dtype == np.float32
     np.testing.assert_array_equal(kept, exact.astype(np.float16).astype(np.float32))
-    with pytest.raises(SessionError, match=r"off\.rrd: its activations were not recorded"):
+    with pytest.raises(SessionError, match=r"off\.rrd: the activations were not recorded"):
         read_activations(off)
-    with pytest.raises(SessionError, match=r"off\.rrd: its activations were not recorded"):
+    with pytest.raises(SessionError, match=r"off\.rrd: the activations were not recorded"):
         export_stream(off, "activations", tmp_path / "a.parquet")
     assert export_stream(half, "activations", tmp_path / "a.parquet") == len(records)
     assert off.stat().st_size < half.stat().st_size < whole.stat().st_size

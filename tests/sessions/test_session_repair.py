@@ -100,8 +100,8 @@ def test_a_broken_middle_is_cut_there(recorded: Recorded, tmp_path: Path) -> Non
     [
         (b"", "expected a Rerun recording"),
         (random.Random(1).randbytes(5000), "expected a Rerun recording"),
-        (b"RRF2", "cannot be read|holds no recording|torn"),
-        (b"RRF2" + random.Random(1).randbytes(5000), "cannot be read|holds no recording|torn"),
+        (b"RRF2", "cannot be read|contains no recording|torn"),
+        (b"RRF2" + random.Random(1).randbytes(5000), "cannot be read|contains no recording|torn"),
     ],
 )
 def test_what_is_no_session_cannot_be_repaired(content: bytes, message: str, tmp_path: Path) -> None:

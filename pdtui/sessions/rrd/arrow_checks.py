@@ -1,8 +1,8 @@
-"""Arrow data from anywhere: checked to the last offset, and never larger than it looks.
+"""Read Arrow data from untrusted files: every offset is checked, and memory bombs are refused.
 
-Arrow's own format can announce more than it holds: compressed buffers, columns of nothing that have any
+Arrow's format can expand far beyond the size of the file: compressed buffers, columns of nulls with any
 number of rows, dictionaries and runs that repeat one value. Rerun writes none of these, so they are refused;
-what is left takes as much memory as it has bytes.
+anything else takes as much memory as it has bytes.
 """
 
 from __future__ import annotations
@@ -33,21 +33,18 @@ _RECORD_BATCH = 3  # type of a header
 
 
 def read_record_batch(data: pa.Buffer) -> pa.RecordBatch:
-    """The only record batch of an IPC stream.
-
-    Args:
-        data: the stream.
+    """Read an IPC stream that consists of a schema and one record batch.
 
     Raises:
-        pyarrow.ArrowException: it is damaged.
-        ValueError: it is not what Rerun writes, or too large.
+        pyarrow.ArrowException: the stream is damaged.
+        ValueError: the stream is too large, or is not of the kind that Rerun writes.
     """
     reader = pa.ipc.MessageReader.open_stream(data)
     try:
         first, message = reader.read_next_message(), reader.read_next_message()
     except StopIteration:
         raise ValueError("expected a schema and a record batch, found less") from None
-    if first.type != _SCHEMA:  # Arrow would take any message for one, and crash
+    if first.type != _SCHEMA:  # Arrow would interpret any message as a schema, and crash
         raise ValueError(f"expected a {_SCHEMA}, found a {first.type}")
     schema = pa.ipc.read_schema(first)
     if len(schema) > _MAX_COLUMNS:
@@ -59,7 +56,7 @@ def read_record_batch(data: pa.Buffer) -> pa.RecordBatch:
     if message.type != _BATCH:
         raise ValueError(f"expected a {_BATCH}, found a {message.type}")
     if _is_compressed(message.metadata):
-        raise ValueError("expected buffers as they are, found compressed ones")
+        raise ValueError("expected uncompressed buffers, found compressed ones")
     batch = pa.ipc.read_record_batch(message, schema)
     if batch.num_rows > MAX_ROWS:
         raise ValueError(f"expected at most {MAX_ROWS} rows, found {batch.num_rows}")
@@ -68,7 +65,7 @@ def read_record_batch(data: pa.Buffer) -> pa.RecordBatch:
 
 
 def _check_field(field: pa.Field) -> None:
-    """See that names are text, which Arrow does not ask for and Rerun does; reading a name decodes it."""
+    """Check that names are UTF-8, which Rerun requires and Arrow does not; reading a name decodes it."""
     kind, _ = field.type, field.name
     _check_texts(field.metadata)
     for index in range(kind.num_fields):
@@ -89,7 +86,7 @@ def _check_type(kind: pa.DataType, depth: int) -> None:
         inner, sized = [kind.value_type], not types.is_fixed_size_list(kind) or kind.list_size > 0
     elif types.is_struct(kind) or types.is_union(kind):
         inner, sized = [kind.field(index).type for index in range(kind.num_fields)], kind.num_fields > 0
-        if types.is_union(kind):  # says for each row which of its types it has, also where that is none
+        if types.is_union(kind):  # a union stores the type of each row, even where the type is null
             inner = [one for one in inner if not types.is_null(one)]
     else:
         inner = []
@@ -97,7 +94,7 @@ def _check_type(kind: pa.DataType, depth: int) -> None:
             types.is_fixed_size_binary(kind) and kind.byte_width > 0
         )
     if not sized:
-        raise ValueError(f"a column of type {str(kind)[:80]} has no place in a recording")
+        raise ValueError(f"a column of type {str(kind)[:80]} is not expected in a recording")
     if inner and not depth:
         raise ValueError(f"expected columns nested at most {_MAX_DEPTH} deep")
     for one in inner:
@@ -117,36 +114,36 @@ def count_rows(metadata: memoryview) -> int:
             raise ValueError("expected the metadata of a record batch")
         rows = 0 if length is None else struct.unpack_from("<q", metadata, length)[0]
     except (struct.error, IndexError) as error:
-        raise ValueError(f"a message whose header is damaged: {error}") from error
+        raise ValueError(f"the header of a message is damaged: {error}") from error
     if not 0 <= rows <= MAX_ROWS:
         raise ValueError(f"expected at most {MAX_ROWS} rows, found {rows}")
     return int(rows)
 
 
 def _is_compressed(metadata: pa.Buffer) -> bool:
-    """Whether a record batch names a codec; only its flatbuffer says so before the buffers are unpacked."""
+    """Return whether a record batch is compressed, which only its flatbuffer tells beforehand."""
     view = memoryview(metadata)
     try:
         return _field(view, _header(view), _COMPRESSION) is not None
     except struct.error as error:
-        raise ValueError(f"a message whose header is damaged: {error}") from error
+        raise ValueError(f"the header of a message is damaged: {error}") from error
 
 
 def _header(view: memoryview) -> int:
-    """Where the header of a message begins."""
+    """Return the position of the header of a message."""
     (root,) = struct.unpack_from("<I", view, 0)
     header = _field(view, root, _HEADER)
     if header is None:
-        raise ValueError("a message without a header")
+        raise ValueError("the message has no header")
     return int(header + struct.unpack_from("<I", view, header)[0])
 
 
 def _field(view: memoryview, table: int, number: int) -> int | None:
-    """Where a table of a flatbuffer has a field; None where it has not."""
+    """Return the position of a field in a table of a flatbuffer; None if the table lacks the field."""
     (back,) = struct.unpack_from("<i", view, table)
     places = table - back
     if places < 0:
-        raise ValueError("a message whose header is damaged")
+        raise ValueError("the header of a message is damaged")
     (size,) = struct.unpack_from("<H", view, places)
     if 4 + 2 * number >= size:
         return None

@@ -38,7 +38,7 @@ _DAMAGED = (ValueError, OverflowError, EOFError, OSError, MemoryError, pa.ArrowE
 
 
 class ChunkStream:
-    """The chunks of a recording in the order of the file; never more than one is in memory.
+    """Iterates over the chunks of a recording in file order, with one chunk in memory at a time.
 
     Args:
         path: the file.
@@ -46,10 +46,10 @@ class ChunkStream:
             default every message is decoded and checked.
 
     Attributes:
-        skipped_rows: number of rows in the chunks that were not decoded, by entity.
-        store: of the recording, once its announcement was read.
+        store: the store of the recording, once the message that announces it was read.
         complete: whether every message was read.
-        finished: whether the index at the file's end was, too.
+        finished: whether the index at the end of the file was read, too.
+        skipped_rows: number of rows by entity in the chunks that were not decoded.
     """
 
     def __init__(self, path: Path, needed: Callable[[str], bool] | None = None) -> None:
@@ -60,11 +60,11 @@ class ChunkStream:
         self.skipped_rows: Counter[str] = Counter()
 
     def __iter__(self) -> Iterator[EntityChunk]:
-        """Read from the beginning.
+        """Read the file from its beginning.
 
         Raises:
-            SessionError: no such file, not a recording, another program's, or torn: raised after the chunks
-                before the damage were given. The message names file and byte.
+            SessionError: the file does not exist, is no recording of pdtui, or is damaged; the chunks before
+                the damage are yielded first. The message names the file and the byte.
         """
         try:
             with open_regular_file(self._path) as file:
@@ -75,17 +75,17 @@ class ChunkStream:
             raise SessionError(f"{self._path}: cannot be read: {error.strerror}") from error
         except SessionError as error:
             raise SessionError(f"{self._path}: {error}") from error
-        self.found()
+        self.require_store()
         self.complete = True
 
-    def found(self) -> StoreInfo:
-        """The store of the recording.
+    def require_store(self) -> StoreInfo:
+        """Return the store of the recording.
 
         Raises:
-            SessionError: the file announces none.
+            SessionError: the file does not announce a recording.
         """
         if self.store is None:
-            raise SessionError(f"{self._path}: holds no recording")
+            raise SessionError(f"{self._path}: contains no recording")
         return self.store
 
     def _chunks(self, file: BinaryIO) -> Iterator[EntityChunk]:
@@ -95,14 +95,14 @@ class ChunkStream:
                 check_end(file, frame)
                 self.finished = True
             elif frame.kind == STORE:
-                self._announced(_decoded(file, frame, decode_store_info))
+                self._add_store(_decode_message(file, frame, decode_store_info))
             elif frame.kind == CHUNK and (chunk := self._read_chunk(file, frame)) is not None:
                 yield chunk
 
     def _read_chunk(self, file: BinaryIO, frame: MessageFrame) -> EntityChunk | None:
         head = None if self._needed is None else read_chunk_head(file, frame, self.store)
         if head is None or self._needed is None or (head.store == self.store and self._needed(head.entity)):
-            store, chunk = _decoded(file, frame, decode_chunk)
+            store, chunk = _decode_message(file, frame, decode_chunk)
         else:
             store, chunk = head.store, None
             self.skipped_rows[head.entity] += head.rows
@@ -110,30 +110,30 @@ class ChunkStream:
             raise SessionError(f"byte {frame.start}: rows of a recording that the file does not announce")
         return chunk if store == self.store else None
 
-    def _announced(self, store: StoreInfo) -> None:
+    def _add_store(self, store: StoreInfo) -> None:
         if store in self._stores:
             return
         if len(self._stores) == _MAX_STORES:
-            raise SessionError(f"expected at most {_MAX_STORES} recordings and layouts, there are more")
+            raise SessionError(f"expected at most {_MAX_STORES} recordings and blueprints, found more")
         if store.application_id != APP:
             raise SessionError(f"expected a recording of {APP}, found one of '{store.application_id[:60]}'")
         self._stores.append(store)
-        if self.store is None and store.drive:
+        if self.store is None and store.is_recording:
             self.store = store
 
 
-def _decoded(file: BinaryIO, frame: MessageFrame, read: Callable[[memoryview], T]) -> T:
-    """What a message says.
+def _decode_message(file: BinaryIO, frame: MessageFrame, read: Callable[[memoryview], T]) -> T:
+    """Read and decode a message.
 
     Raises:
-        SessionError: it is damaged or too large.
+        SessionError: the message is damaged or too large.
     """
     if frame.length > MAX_MESSAGE:
         raise SessionError(f"byte {frame.start}: expected a message of at most {MAX_MESSAGE >> 20} MiB")
     file.seek(frame.start)
     payload = file.read(frame.length)
     if len(payload) < frame.length:
-        raise SessionError("the file became shorter while it was read")
+        raise SessionError("the file was shortened while it was read")
     try:
         return read(memoryview(payload))
     except _DAMAGED as error:

@@ -1,4 +1,4 @@
-"""Chunks of one entity, gathered into columns whose types and lengths are known to be right."""
+"""The rows of one entity as columns whose types and lengths have been checked."""
 
 from __future__ import annotations
 
@@ -17,7 +17,18 @@ Number = TypeVar("Number", bound=np.generic)
 
 
 class EntityTable:
-    """All rows of one entity, in the order of their steps."""
+    """All rows of one entity, in the order of their control steps.
+
+    Args:
+        entity: path of the entity.
+        batches: its rows, as the file has them.
+
+    Attributes:
+        steps: the control step of each row, shape (rows,).
+
+    Raises:
+        SessionError: a row does not state its control step.
+    """
 
     def __init__(self, entity: str, batches: Sequence[pa.RecordBatch]) -> None:
         self._entity, self._batches = entity, batches
@@ -27,16 +38,16 @@ class EntityTable:
         self._order = np.argsort(unsorted, kind="stable")
         self.steps: NDArray[np.int64] = unsorted[self._order]
 
-    def lists(self, name: str, kind: type[Any], *, optional: bool = False) -> list[list[Any]]:
-        """A list of its own length for each row.
+    def read_lists(self, name: str, kind: type[Any], *, optional: bool = False) -> list[list[Any]]:
+        """Return one list per row; their lengths may differ.
 
         Args:
-            name: of the stream.
+            name: name of the column.
             kind: Python type of the values.
-            optional: a batch without the stream counts as empty lists.
+            optional: whether a batch without the column stands for empty lists.
 
         Raises:
-            SessionError: the stream is missing or of another type.
+            SessionError: the column is missing or has another type.
         """
         rows: list[list[Any]] = []
         for batch in self._batches:
@@ -49,53 +60,54 @@ class EntityTable:
             raise SessionError(f"stream '{self._entity}/{name}': expected lists of {kind.__name__}")
         return [rows[row] for row in self._order]
 
-    def texts(self, name: str) -> list[str]:
-        """One text a row.
+    def read_texts(self, name: str) -> list[str]:
+        """Return one text per row.
 
         Raises:
-            SessionError: as `lists`.
+            SessionError: as `read_lists`; or a row has no text, or several.
         """
-        rows = self.lists(name, str)
+        rows = self.read_lists(name, str)
         if any(len(row) != 1 for row in rows):
-            raise SessionError(f"stream '{self._entity}/{name}': expected one text a row")
+            raise SessionError(f"stream '{self._entity}/{name}': expected one text per row")
         return [row[0] for row in rows]
 
-    def block(self, name: str, kind: type[Number], width: int | None = None) -> NDArray[Number]:
-        """As many numbers in each row, shape (rows, width).
+    def read_matrix(self, name: str, kind: type[Number], width: int | None = None) -> NDArray[Number]:
+        """Return equally many numbers per row, shape (rows, width).
 
         Args:
-            name: of the stream.
+            name: name of the column.
             kind: NumPy type of the numbers.
-            width: how many there must be; None takes the first row's.
+            width: expected numbers per row; None takes the width of the first row.
 
         Raises:
-            SessionError: the stream is missing, or has another type or width.
+            SessionError: the column is missing, or has another type or width.
         """
         wanted = pa.from_numpy_dtype(np.dtype(kind))
         blocks = []
         for batch in self._batches:
             column = self._column(batch, name)
-            lists = _unwrapped(column)
+            lists = _flatten_nested_lists(column)
             lengths = pc.list_value_length(lists).to_numpy(zero_copy_only=False)
             if width is None and len(lengths):
                 width = int(lengths[0])
             values = lists.flatten()
             even = len(lists) == len(column) and bool((lengths == width).all())
             if values.type != wanted or values.null_count or not even:
+                expected = f"{width} × {wanted} per row"
                 raise SessionError(
-                    f"stream '{self._entity}/{name}': expected {width} × {wanted} a row, found {column.type}"
+                    f"stream '{self._entity}/{name}': expected {expected}, found {column.type}"
                 )
             blocks.append(values.to_numpy(zero_copy_only=False).reshape(len(column), width or 0))
         gathered = np.concatenate(blocks) if blocks else np.empty((0, width or 0), kind)
         return gathered[self._order].astype(kind, copy=False)
 
-    def numbers(self, name: str, kind: type[Number]) -> NDArray[Number]:
-        """One number a row, shape (rows,).
+    def read_numbers(self, name: str, kind: type[Number]) -> NDArray[Number]:
+        """Return one number per row, shape (rows,).
 
         Raises:
-            SessionError: as `block`.
+            SessionError: as `read_matrix`.
         """
-        return self.block(name, kind, 1)[:, 0]
+        return self.read_matrix(name, kind, 1)[:, 0]
 
     def _column(self, batch: pa.RecordBatch, name: str, *, optional: bool = False) -> pa.Array:
         if name not in batch.schema.names:
@@ -109,13 +121,13 @@ class EntityTable:
         if STEP not in batch.schema.names or batch.schema.field(STEP).type != pa.int64():
             raise SessionError(f"entity '{self._entity}': expected a timeline '{STEP}'")
         if batch.column(STEP).null_count:
-            raise SessionError(f"entity '{self._entity}': expected rows that say their step")
+            raise SessionError(f"entity '{self._entity}': expected every row to state its step")
         steps: NDArray[np.int64] = batch.column(STEP).to_numpy(zero_copy_only=False)
         return steps
 
 
-def _unwrapped(column: pa.Array) -> pa.Array:
-    """Lists of numbers, where the recorder wrote lists of one list each."""
+def _flatten_nested_lists(column: pa.Array) -> pa.Array:
+    """Remove the outer level of nested lists, which the recorder writes where the viewer selects a number."""
     while pa.types.is_list(column.type.value_type):
         column = column.flatten()
     return column

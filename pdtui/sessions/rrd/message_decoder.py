@@ -1,4 +1,4 @@
-"""The messages of an .rrd, decoded here and not by Rerun's library, which damaged ones make abort."""
+"""Decode the messages of an .rrd file, without Rerun's own library: damaged messages make it abort."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from pdtui.sessions.rrd.arrow_checks import read_record_batch
 from pdtui.sessions.rrd.protobuf_fields import Value, bytes_field, number_field, read_fields, text_field
 
 MAX_MESSAGE = 256 << 20
-"""Bytes of one message, packed or not. A batch of 1000 steps of 4096 units has 16 MB."""
+"""Largest size of a message, bytes, compressed or not. A batch of 1000 steps of 4096 units takes 16 MB."""
 
-_LZ4_RATIO = 255  # no LZ4 block grows more than by this
+_LZ4_RATIO = 255  # the largest factor by which an LZ4 block can grow
 _PLAIN, _LZ4 = (0, 1), 2
 _ARROW_IPC = 1
 ENTITY_PATH = b"rerun:entity_path"
@@ -23,25 +23,26 @@ _KIND, _INDEX = b"rerun:kind", b"index"
 
 @dataclass(frozen=True)
 class StoreInfo:
-    """What a message belongs to.
+    """The store, in Rerun's terms, to which a message belongs: a recording or a blueprint.
 
     Attributes:
-        drive: whether it is a recording; a layout is kept apart from what it lays out.
-        recording_id, application_id: of it.
+        is_recording: whether it is a recording rather than a blueprint.
+        recording_id: its identifier.
+        application_id: the name of the program that wrote it.
     """
 
-    drive: bool
+    is_recording: bool
     recording_id: str
     application_id: str
 
 
 @dataclass(frozen=True)
 class EntityChunk:
-    """Some rows of one entity.
+    """A batch of rows of one entity.
 
     Attributes:
-        entity: its path.
-        timelines: names of the batch's columns that say when; none for what holds all the time.
+        entity: path of the entity.
+        timelines: names of the columns that say when a row applies; empty if the rows apply at all times.
         batch: the rows.
     """
 
@@ -51,7 +52,7 @@ class EntityChunk:
 
 
 def decode_store_info(payload: memoryview) -> StoreInfo:
-    """The store that a message announces.
+    """Return the store that a message announces.
 
     Raises:
         ValueError: the message is damaged.
@@ -60,10 +61,10 @@ def decode_store_info(payload: memoryview) -> StoreInfo:
 
 
 def decode_chunk(payload: memoryview) -> tuple[StoreInfo, EntityChunk]:
-    """Decode a message that holds rows.
+    """Decode a message that contains rows.
 
     Raises:
-        ValueError, pyarrow.ArrowException: the message is damaged, or would unpack to more than is bearable.
+        ValueError, pyarrow.ArrowException: the message is damaged, or would take too much memory.
     """
     message = read_fields(payload)
     store = decode_store(message)
@@ -72,7 +73,7 @@ def decode_chunk(payload: memoryview) -> tuple[StoreInfo, EntityChunk]:
     batch = read_record_batch(unpack_payload(message, decompress_whole))
     metadata = batch.schema.metadata or {}
     if ENTITY_PATH not in metadata:
-        raise ValueError("rows of no entity")
+        raise ValueError("the rows name no entity")
     timelines = tuple(field.name for field in batch.schema if (field.metadata or {}).get(_KIND) == _INDEX)
     return store, EntityChunk(metadata[ENTITY_PATH].decode(), timelines, batch)
 

@@ -1,7 +1,7 @@
-"""Where the messages of an .rrd begin and end. Only headers are believed, and only as far as the file goes.
+"""Find the messages of an .rrd file.
 
-A file is 12 bytes, then messages, each behind 16 bytes: its kind and its length. The last has kind 0 and is
-followed by 32 bytes that point back to it and hold its checksum.
+A file begins with 12 bytes. Messages follow, each after a header of 16 bytes: its kind and its length. The
+last message is of kind 0 and is followed by 32 bytes that contain its position, length and checksum.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from xxhash import xxh32
 from pdtui.core.errors import SessionError
 
 LAST, STORE, CHUNK = 0, 1, 2
-RESCUE = "`pdtui sessions repair` rescues what is before it"
+RESCUE = "`pdtui sessions repair` rescues what precedes it"
 _KINDS = 4
 _START = struct.Struct("<4s4sBBxx")
 _HEADER = struct.Struct("<QQ")
 _TRAILER = struct.Struct("<QQI4s4sI")
 _MAGIC, _END_MAGIC = b"RRF2", b"FOOT"
 _PROTOBUF = 2
-_SEED = 7850921  # the letters of RERUN as digits to base 26, as the format has it
+_SEED = 7850921  # prescribed by the format: the letters of RERUN as digits of base 26
 _BLOCK = 1 << 20
 
 
 class MessageFrame(NamedTuple):
-    """One whole message.
+    """The place of a complete message.
 
     Attributes:
-        kind: `LAST`, `STORE`, `CHUNK`, or another that holds nothing of a drive.
-        start: byte at which its payload begins.
-        length: of its payload in bytes; the file has them.
+        kind: `LAST`, `STORE`, `CHUNK`, or another kind, which a session does not need.
+        start: byte at which the payload begins.
+        length: size of the payload, bytes.
     """
 
     kind: int
@@ -42,42 +42,42 @@ class MessageFrame(NamedTuple):
 
     @property
     def end(self) -> int:
-        """The byte after it, and after the file's trailer if this is the last message."""
+        """The byte after the message, and after the trailer of the file if this is the last message."""
         return self.start + self.length + (_TRAILER.size if self.kind == LAST else 0)
 
 
 def check_start(file: BinaryIO) -> None:
-    """See that a file begins as a recording does.
+    """Check that a file begins like a recording.
 
     Raises:
-        SessionError: it does not; the message does not name the file.
+        SessionError: it does not. The message does not name the file.
     """
     start = file.read(_START.size)
     if start[:4] != _MAGIC:
         raise SessionError("expected a Rerun recording (.rrd), found another kind of file")
     if len(start) < _START.size:
-        raise SessionError("the file is torn: it ends within its first bytes")
+        raise SessionError("the file is torn: it ends within its first 12 bytes")
     if _START.unpack(start)[3] != _PROTOBUF:
         raise SessionError("byte 9: cannot be read as a recording: expected messages in protobuf")
 
 
 def read_message_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
-    """Messages in their order, up to the end of the file.
+    """Yield the messages of a file in their order.
 
     Args:
-        file: an open recording; it may be moved between messages.
-        size: of the file in bytes.
+        file: an open recording; its position may be changed between messages.
+        size: size of the file, bytes.
 
     Raises:
-        SessionError: the messages do not cover the file: the last is cut, or a length is wrong; raised after
-            all that are whole were given. The message names the byte, not the file.
+        SessionError: the last message is cut off, or a length is wrong; the complete messages before it are
+            yielded first. The message names the byte, not the file.
     """
     place = _START.size
     while place < size:
         file.seek(place)
         header = file.read(_HEADER.size)
         if len(header) < _HEADER.size:
-            raise _torn(place, f"{len(header)} bytes are left of a message's header")
+            raise _torn(place, f"{len(header)} bytes of a message's header are left")
         kind, length = _HEADER.unpack(header)
         frame = MessageFrame(kind, place + _HEADER.size, length)
         if kind >= _KINDS:
@@ -85,23 +85,23 @@ def read_message_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
         if frame.end > size:
             raise _torn(place, f"a message of {length} bytes begins there, {size - frame.start} are left")
         if kind == LAST and frame.end < size:
-            raise _torn(place, f"the file's end is said to be here, {size - frame.end} bytes come after it")
+            raise _torn(place, f"the file's end is said to be here, but {size - frame.end} bytes follow it")
         yield frame
         place = frame.end
 
 
 def check_end(file: BinaryIO, last: MessageFrame) -> None:
-    """See that the last message, an index of the others, is the one that was written.
+    """Check that the last message, an index of the others, has the checksum in the trailer.
 
     Raises:
-        SessionError: it is not, or what points to it is damaged; the message does not name the file.
+        SessionError: the index or the trailer is damaged. The message does not name the file.
     """
     file.seek(last.start)
     digest, left = xxh32(seed=_SEED), last.length
     while left > 0:
         block = file.read(min(left, _BLOCK))
         if not block:
-            raise SessionError("the file became shorter while it was read")
+            raise SessionError("the file was shortened while it was read")
         digest.update(block)
         left -= len(block)
     trailer = file.read(_TRAILER.size)
@@ -111,7 +111,7 @@ def check_end(file: BinaryIO, last: MessageFrame) -> None:
 
 
 def undamaged_length(path: Path) -> int:
-    """Bytes up to which every message is whole; the file's size if all are.
+    """Return the number of bytes up to which every message is complete; the file's size if all are.
 
     Raises:
         SessionError: the file cannot be read.

@@ -1,4 +1,4 @@
-"""Protobuf's wire format, as far as the envelope of a recording's messages needs it."""
+"""Read Protobuf's wire format, as far as the messages of an .rrd file need it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def read_fields(message: memoryview, *, cut: bool = False) -> dict[int, Value]:
         cut: whether only the start of the message is there, so that the last field may be incomplete.
 
     Raises:
-        ValueError: the bytes are no such message.
+        ValueError: the bytes are not such a message.
     """
     found: dict[int, Value] = {}
     place = 0
@@ -39,22 +39,22 @@ def read_fields(message: memoryview, *, cut: bool = False) -> dict[int, Value]:
 
 
 def number_field(found: dict[int, Value], field: int) -> int:
-    """A field that is a number; 0 where it is missing, as the format wants it.
+    """Return a numeric field; 0 if it is missing, which is the default of the format.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the field has another type.
     """
     value = found.get(field, 0)
     if not isinstance(value, int):
-        raise ValueError(f"field {field} is no number")
+        raise ValueError(f"field {field} is not a number")
     return value
 
 
 def bytes_field(found: dict[int, Value], field: int) -> memoryview:
-    """A field that is bytes, a text or a message; empty where it is missing.
+    """Return the bytes of a field that is a text, a message or bytes; empty if it is missing.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the field has another type.
     """
     value = found.get(field, memoryview(b""))
     if isinstance(value, int):
@@ -63,10 +63,10 @@ def bytes_field(found: dict[int, Value], field: int) -> memoryview:
 
 
 def text_field(found: dict[int, Value], field: int) -> str:
-    """A field that is a text.
+    """Return a text field.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the field has another type.
     """
     return str(bytes_field(found, field), "utf-8")
 

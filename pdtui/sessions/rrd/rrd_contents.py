@@ -1,4 +1,4 @@
-"""What an .rrd file of pdtui contains: its properties, and the rows of its entities."""
+"""The contents of an .rrd file of pdtui: its properties and the rows of its entities."""
 
 from __future__ import annotations
 
@@ -16,31 +16,32 @@ from pdtui.sessions.rrd.message_decoder import EntityChunk
 from pdtui.sessions.session_schema import DRIVE, STEP, VIEWS
 
 MAX_KEPT = 4 << 30
-"""Bytes of rows that are kept in memory: an hour at 50 Hz with 512 units has 0.6 GB."""
+"""Largest size of the rows kept in memory, bytes. An hour at 50 Hz with 512 units takes 0.6 GB."""
 
 _PROPERTIES = "/__properties/"
 _PROPERTY_TYPES = (pa.utf8(), pa.int64(), pa.float64(), pa.bool_())
 
 
 class RrdContents:
-    """An .rrd of pdtui, read once from its beginning to its end.
+    """The properties and rows of an .rrd file of pdtui, which is read once from beginning to end.
 
     Args:
         path: the file.
-        entities: whose rows are kept, besides all properties; the rows of others are counted, not decoded. By
-            default every message is decoded and checked, and all rows but the viewer's are kept.
-        only: components of the drive to keep; all if empty.
-        skip: components of the drive to leave out.
-        torn: read up to the first message that cannot be read, instead of raising.
+        entities: the entities whose rows are kept, besides all properties; the rows of the others are
+            counted but not decoded. By default every message is decoded and checked, and all rows are kept
+            except those that only the viewer draws.
+        only: columns of the drive to keep; all if empty.
+        skip: columns of the drive to leave out.
+        torn: whether to stop at the first message that cannot be read instead of raising an error.
 
     Attributes:
-        skipped_rows: number of rows by entity that were counted only.
-        recording_id: of the recording.
+        recording_id: the identifier of the recording.
         complete: whether every message could be read.
-        finished: whether it is complete and ends as a finished one does, with an index of its chunks.
+        finished: whether the file also ends with the index of its chunks, as a finished recording does.
+        skipped_rows: number of rows by entity that were counted but not decoded.
 
     Raises:
-        SessionError: no such file, not a recording, another program's, or torn.
+        SessionError: the file does not exist, is no recording of pdtui, or is damaged.
     """
 
     def __init__(
@@ -66,16 +67,16 @@ class RrdContents:
         except SessionError:
             if not torn or stream.store is None:
                 raise
-        self.recording_id = stream.found().recording_id
+        self.recording_id = stream.require_store().recording_id
         self.complete, self.finished = stream.complete, stream.finished
         self.skipped_rows = stream.skipped_rows
 
     def properties(self, name: str) -> dict[str, list[Any]]:
-        """Values of one group of properties, by name; empty if the file has none."""
+        """Return the values of a group of properties by name; empty if the file does not have the group."""
         return self._properties.get(name, {})
 
-    def rows(self, entity: str) -> EntityTable:
-        """All rows of an entity; none if the file has none."""
+    def table(self, entity: str) -> EntityTable:
+        """Return the rows of an entity; no rows if the file does not have the entity."""
         return EntityTable(entity, self._batches.get(entity, []))
 
     def _take(self, path: Path, chunk: EntityChunk, only: Sequence[str], skip: Sequence[str]) -> None:
@@ -90,9 +91,9 @@ class RrdContents:
             if entity == DRIVE:
                 names = [name for name in batch.schema.names if name not in skip]
                 batch = batch.select([name for name in names if not only or name in (STEP, *only)])
-                # A copy, or what is kept would keep the whole message, activations and all, in memory.
+                # A copy: a view would keep the whole message in memory, and with it the other columns.
                 batch = batch.take(pa.array(np.arange(batch.num_rows)))
             self._kept += batch.nbytes
             if self._kept > MAX_KEPT:
-                raise SessionError(f"{path}: expected at most {MAX_KEPT >> 20} MiB of rows, there are more")
+                raise SessionError(f"{path}: expected at most {MAX_KEPT >> 20} MiB of rows, found more")
             self._batches.setdefault(entity, []).append(batch)
