@@ -239,7 +239,7 @@ def replay(
         session: File of the session.
         robot: The robot, if the session's cannot be built from its name.
         policy: The policy, if the session's is not where its map says.
-        judging: ``strict``, ``tolerance``, ``horizon`` and ``force``, as for
+        judging: ``strict``, ``tolerance``, ``required_steps`` and ``force``, as for
             `pdtui.drive.replay.replay_session`.
 
     Raises:

@@ -55,7 +55,7 @@ def pdtui_session(request: pytest.FixtureRequest) -> SessionCheck:
     - ``policy``: a weights file (found like the session), a shipped name, or a live network; by default the
       session's own. Other weights than the session's are run and compared all the same;
     - ``robot``: where the session's is not known by its name;
-    - ``strict``, ``tolerance``, ``horizon``: as for `pdtui.drive.replay.replay_session`;
+    - ``strict``, ``tolerance``, ``required_steps``: as for `pdtui.drive.replay.replay_session`;
 
     and returns the `ReplayResult` of a drive that repeats.
     """

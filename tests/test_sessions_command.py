@@ -198,7 +198,7 @@ def test_the_viewer_is_bound_to_this_machine(folder: Path, tmp_path: Path) -> No
 
 
 def test_another_processor_repeats_within_the_tolerance() -> None:
-    """The shipped sample, summed in the order of an older processor: other bits, the same first seconds."""
+    """The shipped sample, summed in the order of an older processor: other bits, the same first steps."""
     sample = shipped_folder("sessions") / "samples" / "ant.rrd"
     environment = {**os.environ, "OPENBLAS_CORETYPE": "Nehalem"}
 
@@ -213,10 +213,10 @@ def test_another_processor_repeats_within_the_tolerance() -> None:
         pytest.skip("this machine computes the sample in that order anyway")
     assert code == 0, row
     assert any(line.startswith("blas: ") and line.endswith("Nehalem here") for line in row["environment"])
-    assert row["tolerance"] == 1e-6
-    assert row["judged"] == 40
-    assert 40 <= row["agreed"] < row["total"]
-    assert row["deviations"][0]["first"] < 1e-9 < row["deviations"][0]["largest"]
+    assert row["tolerance"] == 5e-6
+    assert row["judged"] == 5
+    assert 5 <= row["agreed"] < row["total"]
+    assert row["deviations"][0]["largest"] > 1.0
     code, row = verify("--strict")
     assert (code, row["repeats"], row["tolerance"]) == (3, False, None)
     code, row = verify("--tolerance", "0")

@@ -43,8 +43,8 @@ def test_a_sample_driven_on_the_screen_replays_bit_for_bit(path: Path) -> None:
     assert any(event.key for event in session.events)
     result = replay_session(path)
     if result.environment and result.first_difference is not None:
-        # Another CPU sums in another order: bits may differ, but the first that do must be the last ones.
-        assert result.change < 1e-6, result.detail
+        # Another processor sums in another order: the session has to repeat within the tolerance.
+        assert result.passed, result.verdict
         pytest.skip(f"bits differ from step {result.first_difference} on: {'; '.join(result.environment)}")
     assert result.first_difference is None, result.detail
     assert result.steps == session.steps

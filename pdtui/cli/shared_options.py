@@ -105,7 +105,7 @@ def judging_options(command: Callable[..., Any]) -> Callable[..., Any]:
             type=click.FloatRange(0),
             metavar="SPREADS",
             help="On another machine or with other versions, accept attributes that differ by at most this "
-            "many of their standard deviations in the first 2 s.  [default: 1e-06]",
+            "many of their standard deviations in the first 5 control steps.  [default: 5e-06]",
         ),
     ):
         judged = option(judged)
