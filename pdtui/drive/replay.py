@@ -38,8 +38,8 @@ TOLERANCE = 5e-6
 
 Another processor sums in another order. The shipped samples, recorded on an AMD EPYC and computed again on
 an Intel Xeon, differ by an ulp of the policy's float32 output from the first control step on: by at most
-2.5e-6 in the first 5 steps, 5e-5 in the first 20, and by everything after some seconds, since contacts amplify
-the last bits. A change that is meant is larger at once: with weights changed by 1e-5 of themselves,
+2.5e-6 in the first 5 steps, 5e-5 in the first 20, and by everything after some seconds, since contacts
+amplify the last bits. A change that is meant is larger at once: with weights changed by 1e-5 of themselves,
 attributes are off by 2e-5 or more within 5 steps (four robots, six draws each).
 """
 
