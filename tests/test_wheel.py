@@ -60,3 +60,8 @@ def test_the_wheel_brings_the_samples(installed: Path, tmp_path: Path) -> None:
     shipped = Path(_run(installed, tmp_path, "-c", code).strip())
     assert shipped.is_relative_to(installed)
     assert list(shipped.glob("samples/*.rrd"))
+
+
+def test_the_wheel_brings_the_guide(installed: Path, tmp_path: Path) -> None:
+    assert _run(installed, tmp_path, "-m", "pdtui", "guide", "driving").startswith("# Driving\n")
+    assert (installed / "pdtui" / "guide" / "images" / "headings.png").stat().st_size > 100_000

@@ -27,9 +27,15 @@ class _Annotation(str):
         return str(self)
 
 
-def python_reference(module: Any) -> str:
-    """Return the Markdown of a module's public functions, then its classes, then its constants."""
+def python_reference(module: Any, *more: type) -> str:
+    """Return the Markdown of a module's public functions, then its classes, then its constants.
+
+    Args:
+        module: Module whose ``__all__`` is described.
+        more: Classes that the functions take or return, described among the others.
+    """
     objects = [(name, getattr(module, name)) for name in module.__all__]
+    objects += [(value.__name__, value) for value in more]
     functions = [_callable(name, value) for name, value in objects if inspect.isfunction(value)]
     classes = [part for name, value in objects if inspect.isclass(value) for part in _class(name, value)]
     constants = [_constant(name, value) for name, value in objects if not callable(value)]
@@ -48,7 +54,8 @@ def _signature(name: str, function: Any) -> str:
         for one in signature.parameters.values()
         if one.name != "self"
     ]
-    returns = signature.return_annotation
+    # What a decorator says of the parameters does not know what the function returns.
+    returns = function.__annotations__.get("return", signature.return_annotation)
     arrow = "" if returns is signature.empty else f" -> {returns}"
     line = f"{name}{signature.replace(parameters=kept, return_annotation=signature.empty)}{arrow}"
     if len(line) <= _WIDTH:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pdtui import api
 from pdtui.cli import main
+from pdtui.dissection.dissection_config import DissectionConfig
+from pdtui.drive.replay import ReplayResult
 from pdtui.guide.guide_pages import GUIDE_FOLDER
 from pdtui.guide.reference.command_reference import command_reference
 from pdtui.guide.reference.python_reference import python_reference
@@ -13,7 +15,7 @@ def generate_pages() -> dict[str, str]:
     """Return the text of the generated pages, by topic."""
     return {
         "commands": command_reference(main, "pdtui"),
-        "python": python_reference(api),
+        "python": python_reference(api, DissectionConfig, ReplayResult),
     }
 
 
