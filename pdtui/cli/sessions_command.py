@@ -1,4 +1,4 @@
-"""`pdtui sessions`: look at recorded drives, prove them, rescue them, and take them elsewhere."""
+"""`pdtui sessions`: list, inspect, verify, repair, export, compare and open recorded drives."""
 
 from __future__ import annotations
 
@@ -10,61 +10,67 @@ from typing import Any
 
 import click
 
-from pdtui.cli.shared_options import json_option, judging_options, progress_bar_or_none, show_result
+from pdtui.cli.shared_options import (
+    json_option,
+    judging_options,
+    overwrite_option,
+    progress_bar_or_none,
+    show_result,
+)
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.json_text import to_json
 from pdtui.core.printable_text import make_printable
 
 BROKEN, DIFFERS = 1, 3
-_file = click.argument("file", type=click.Path(path_type=Path))
-_overwrite = click.option("--overwrite", is_flag=True, help="Replace what exists already.")
+"""Exit codes."""
+_file_argument = click.argument("file", type=click.Path(path_type=Path))
 
 
 @click.group()
 def sessions() -> None:
-    """List, show, verify, repair, export, compare and open recorded drives."""
+    """List, inspect, verify, repair, export, compare and open sessions."""
 
 
 @sessions.command("list")
 @click.argument("folder", type=click.Path(path_type=Path), default="sessions")
 @json_option
 def list_command(folder: Path, as_json: bool) -> None:
-    """All sessions under FOLDER; broken ones say why."""
+    """List the sessions under FOLDER, and say what is wrong with broken ones."""
     from pdtui.cli import session_tables
 
     if not folder.is_dir():
         raise SessionError(f"{folder}: no such folder")
-    rows = [_row(path) for path in sorted(folder.rglob("*.rrd")) if path.is_file()]
+    rows = [_list_row(path) for path in sorted(folder.rglob("*.rrd")) if path.is_file()]
     if not rows and not as_json:
         click.echo(f"no sessions under {make_printable(str(folder))}")
         return
     show_result({"sessions": rows}, as_json, lambda: session_tables.list_table(rows, folder))
 
 
-def _row(path: Path) -> dict[str, Any]:
+def _list_row(path: Path) -> dict[str, Any]:
     from pdtui.sessions.session_header import read_session_header
 
     row: dict[str, Any] = {"path": str(path), "bytes": path.stat().st_size, "broken": ""}
     try:
-        heading = read_session_header(path)
+        header = read_session_header(path)
     except SessionError as error:
         return {**row, "broken": str(error).removeprefix(f"{path}: ")}
     return {
         **row,
-        "robot": heading.info.robot,
-        "steps": heading.steps,
-        "seconds": heading.seconds,
-        "keys": heading.keys,
-        "outcome": heading.outcome,
+        "robot": header.info.robot,
+        "steps": header.steps,
+        "seconds": header.seconds,
+        "keys": header.keys,
+        "outcome": header.outcome,
     }
 
 
 @sessions.command()
-@_file
+@_file_argument
 @json_option
 def show(file: Path, as_json: bool) -> None:
-    """Who drove what in FILE, key by key, and what it came to."""
+    """Show robot, policy, keys, attributes and outcome of FILE."""
     from pdtui.cli import session_tables
     from pdtui.sessions.session_reader import read_session
     from pdtui.sessions.session_summary import summarise_session
@@ -94,15 +100,16 @@ def show(file: Path, as_json: bool) -> None:
 
 @sessions.command()
 @click.argument("files", type=click.Path(path_type=Path), nargs=-1, required=True)
-@click.option("--policy", default="", help="The sessions' weights, where they are elsewhere now.")
+@click.option("--policy", default="", metavar="FILE", help="Weights of the sessions, if they have moved.")
 @judging_options
 @json_option
 def verify(files: tuple[Path, ...], policy: str, judging: dict[str, Any], as_json: bool) -> None:
-    """See whether FILES are whole and repeat, digest by digest.
+    """Check that FILES are whole and that their drives repeat.
 
-    Exit codes: 0 all do; 1 a file is broken, not whole or cannot be replayed; 3 a drive does not repeat.
+    Exit codes: 0 if all do; 1 if a file is broken, not whole or cannot be replayed; 3 if a drive does not
+    repeat.
     """
-    found = [_verified(file, policy, judging, as_json) for file in files]
+    found = [_verify_file(file, policy, judging, as_json) for file in files]
     if as_json:
         click.echo(to_json({"sessions": found}))
     if any(row["repeats"] is False for row in found):
@@ -111,7 +118,7 @@ def verify(files: tuple[Path, ...], policy: str, judging: dict[str, Any], as_jso
         sys.exit(BROKEN)
 
 
-def _verified(file: Path, policy: str, judging: dict[str, Any], as_json: bool) -> dict[str, Any]:
+def _verify_file(file: Path, policy: str, judging: dict[str, Any], as_json: bool) -> dict[str, Any]:
     from pdtui.drive.replay import replay_session
     from pdtui.sessions.session_repair import examine_session
 
@@ -135,20 +142,20 @@ def _verified(file: Path, policy: str, judging: dict[str, Any], as_json: bool) -
 
 
 @sessions.command()
-@_file
+@_file_argument
 @click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path),
-    help="A new file; default: *.repaired.rrd beside FILE.",
+    help="New file; default: FILE with the suffix .repaired.rrd.",
 )
-@click.option("--in-place", is_flag=True, help="Replace FILE itself.")
+@click.option("--in-place", is_flag=True, help="Replace FILE.")
 def repair(file: Path, output: Path | None, in_place: bool) -> None:
-    """Cut the torn tail of FILE and give it an end: a new file that opens and replays as far as it goes."""
+    """Cut off the damaged end of FILE, so that it opens and replays up to there."""
     from pdtui.sessions.session_repair import examine_session, repair_session
 
     if in_place and output is not None:
-        raise SessionError("--in-place replaces the file; -o writes another: choose one")
+        raise SessionError("--in-place and -o exclude each other")
     if examine_session(file).whole:
         click.echo(f"{make_printable(str(file))}: whole; nothing to repair")
         return
@@ -163,17 +170,28 @@ def repair(file: Path, output: Path | None, in_place: bool) -> None:
 
 
 @sessions.command()
-@_file
-@click.option("--stream", help="What to export; without it and --keys, the streams are listed.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="A .parquet or .csv file.")
-@click.option("--keys", type=click.Path(path_type=Path), help="Write the keystrokes to this text file.")
-@_overwrite
+@_file_argument
+@click.option("--stream", help="Stream to export; without --stream and --keys, list the streams.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE.parquet|.csv",
+    help="File for the stream.",
+)
+@click.option(
+    "--keys", type=click.Path(path_type=Path), metavar="FILE", help="Write the keystrokes to this text file."
+)
+@overwrite_option
 def export(file: Path, stream: str | None, output: Path | None, keys: Path | None, overwrite: bool) -> None:
-    """Write a stream of FILE as a table, or its keystrokes as text for `pdtui drive --headless --keys`."""
+    """Export a stream of FILE as a table, or its keystrokes as text.
+
+    `pdtui drive --headless --keys` reads the keystrokes.
+    """
     from pdtui.sessions.session_export import STREAMS, export_stream
 
     if (stream is None) != (output is None):
-        raise SessionError("--stream says what, -o where: give both")
+        raise SessionError("--stream and -o go together")
     if stream is not None and output is not None:
         rows = export_stream(file, stream, output, overwrite=overwrite)
         click.echo(make_printable(f"wrote {output}: {rows} rows"))
@@ -190,11 +208,11 @@ def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
 
     if output.exists() and not overwrite:
         raise SessionError(f"{output}: exists already; --overwrite replaces it")
-    heading = read_session_header(file)
-    write_file(output, format_keystrokes(heading.events), SessionError)
-    without = len(heading.events) - heading.keys
-    note = f"; {without} events had no key and are not in it" if without else ""
-    click.echo(make_printable(f"wrote {output}: {heading.keys} keys of {heading.steps} steps{note}"))
+    header = read_session_header(file)
+    write_file(output, format_keystrokes(header.events), SessionError)
+    without = len(header.events) - header.keys
+    note = f"; left out {without} events without a key" if without else ""
+    click.echo(make_printable(f"wrote {output}: {header.keys} keys of {header.steps} steps{note}"))
 
 
 @sessions.command()
@@ -202,7 +220,10 @@ def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
 @click.argument("b", type=click.Path(path_type=Path))
 @json_option
 def compare(a: Path, b: Path, as_json: bool) -> None:
-    """The first step in which sessions A and B differ, and by how much after it; exit with 3 if they do."""
+    """Compare sessions A and B step by step.
+
+    Exit codes: 0 if they are identical; 3 if they differ.
+    """
     from pdtui.cli import session_tables
     from pdtui.sessions.session_comparison import compare_sessions
     from pdtui.sessions.session_reader import read_session
@@ -214,14 +235,14 @@ def compare(a: Path, b: Path, as_json: bool) -> None:
 
 
 @sessions.command("open")
-@_file
-@click.option("--web", is_flag=True, help="Serve it to a browser on this machine.")
+@_file_argument
+@click.option("--web", is_flag=True, help="Show it in the browser.")
 def open_command(file: Path, web: bool) -> None:
-    """Open FILE in the Rerun viewer, laid out; it listens on 127.0.0.1 only."""
+    """Open FILE in the Rerun viewer, which listens on 127.0.0.1 only."""
     from pdtui.sessions.session_header import read_session_header
     from pdtui.sessions.viewer.viewer_address import viewer_command
 
-    read_session_header(file)  # the viewer shows an empty window for what is no session
+    read_session_header(file)  # for a file that is no session, the viewer would show an empty window
     try:
         code = subprocess.run(viewer_command(file, web=web), check=False).returncode
     except OSError as error:

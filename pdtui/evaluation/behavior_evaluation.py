@@ -1,8 +1,8 @@
-"""`pdtui evaluate`: what every behavior of a map does, against the default, on seeds it was not chosen on.
+"""`pdtui evaluate`: what each behavior of a map does, on seeds that no search used.
 
-Each seed is driven twice from the same reset: once untouched, once with the behavior latched from
-`STIMULATED_FROM` on. Figures are means over the last `WINDOW` control steps; an effect is the paired
-difference.
+Each seed is driven twice from the same reset: with the policy alone, and with the behavior latched from step
+`STIMULATED_FROM` on. Attributes are averaged over the last `WINDOW` control steps; an effect is the
+difference between both drives of a seed.
 """
 
 from __future__ import annotations
@@ -25,26 +25,29 @@ from pdtui.evaluation.task_evaluation import TaskEvaluation, TaskRun, run_task, 
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
 
 STEPS = 400
+"""Control steps per episode."""
 STIMULATED_FROM = 100
+"""Control step before which the behavior is latched: the robot walks steadily by then."""
 WINDOW = 200
+"""Control steps at the end of an episode over which attributes are averaged."""
 
 
 @dataclass(frozen=True)
 class BehaviorEvaluation:
-    """One behavior over all seeds.
+    """The effect of one behavior over all seeds.
 
     Attributes:
-        behavior: its name.
-        measure: attribute, its unit and what is wanted of it.
-        effect: mean over seeds of the paired difference to the default, in the attribute's unit.
+        behavior: name of the behavior.
+        measure: attribute, its unit and what the behavior aims at.
+        effect: mean over seeds of the difference to the policy alone, in the attribute's unit.
         low, high: 95 % interval of `effect` (Student's t over seeds).
         value: mean of the attribute with the behavior.
-        default: mean of the attribute without it.
-        right_sign: seeds on which the robot stayed up and moved as wanted: the difference has the wanted
-            sign and, unless the aim is ``raise`` or ``lower``, so has the attribute itself; for ``stop``, it
-            is under a fifth of the default's.
-        falls: seeds on which the robot fell with the behavior.
-        default_falls: seeds on which it fell without.
+        default: mean of the attribute with the policy alone.
+        right_sign: number of seeds on which the robot stayed up and the behavior reached its aim: the
+            difference has the right sign and, unless the aim is ``raise`` or ``lower``, so has the attribute
+            itself; for ``stop``, the attribute is less than a fifth of the default.
+        falls: number of seeds on which the robot fell with the behavior.
+        default_falls: number of seeds on which it fell with the policy alone.
     """
 
     behavior: str
@@ -61,7 +64,7 @@ class BehaviorEvaluation:
 
 @dataclass(frozen=True)
 class MapEvaluation:
-    """All behaviors of a map."""
+    """The effects of all behaviors of a map, and the success of those with a task."""
 
     robot: str
     policy: str
@@ -70,7 +73,7 @@ class MapEvaluation:
     tasks: tuple[TaskEvaluation, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """The form that ``--json`` prints."""
+        """Return what ``--json`` prints."""
         return {
             "robot": self.robot,
             "policy": self.policy,
@@ -80,7 +83,7 @@ class MapEvaluation:
         }
 
     def measured(self) -> dict[str, MeasuredEffect]:
-        """Effects by behavior, as maps hold them."""
+        """Return the effects by behavior, as maps hold them."""
         return {
             one.behavior: MeasuredEffect(one.effect, one.low, one.high, one.falls, len(self.seeds))
             for one in self.behaviors
@@ -107,16 +110,16 @@ def evaluate_map(
     workers: int = 2,
     progress: Callable[[int, int], None] | None = None,
 ) -> MapEvaluation:
-    """Measure every behavior of the order's map that has an aim or a task.
+    """Measure every behavior of the map that has an aim or a task.
 
     Args:
         config: robot, map and policy; its seed is not used.
-        seeds: of the resets.
-        workers: processes.
-        progress: called with runs done and runs in all.
+        seeds: seeds of the resets.
+        workers: number of worker processes.
+        progress: called with the number of runs done and the total.
 
     Raises:
-        PdtuiError: robot, policy or map cannot be had.
+        PdtuiError: the robot, policy or map cannot be loaded.
     """
     known = config.stimulation_map.behaviors.values()
     tasked = [b for b in known if b.task]
@@ -145,7 +148,7 @@ def evaluate_map(
 
 
 _Job = tuple[str, int, str]
-"""A behavior's name, a seed, and what to run: ``aim``, ``task`` or ``untouched``."""
+"""A behavior's name, a seed, and what to run: ``aim``, ``task``, or ``untouched`` for a task without it."""
 
 
 def _run_job(loop: ControlLoop, job: _Job) -> BehaviorRun | TaskRun:

@@ -1,4 +1,4 @@
-"""The tables that the commands print."""
+"""The tables of `pdtui evaluate`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pdtui.evaluation.policy_evaluation import PolicyEvaluation
 
 
 def behavior_tables(result: MapEvaluation) -> Group:
-    """One row a behavior: those that move an attribute, then those that accomplish something."""
+    """Return a table of the behaviors that move an attribute, and one of those with a task."""
     tables = [_aim_table(result)] if result.behaviors else []
     return Group(*tables, *([_task_table(result)] if result.tasks else []))
 
@@ -19,7 +19,7 @@ def behavior_tables(result: MapEvaluation) -> Group:
 def _task_table(result: MapEvaluation) -> Table:
     table = new_table(
         f"{result.robot}, policy {result.policy}, {seed_range(result.seeds)}",
-        *("behavior", "wanted", "done", "by itself", "falls", "measured (by itself)"),
+        *("behavior", "success means", "success", "without it", "falls", "measured (without it)"),
     )
     count = len(result.seeds)
     for row in result.tasks:
@@ -41,7 +41,7 @@ def _task_table(result: MapEvaluation) -> Table:
 def _aim_table(result: MapEvaluation) -> Table:
     table = new_table(
         f"{result.robot}, policy {result.policy}, {seed_range(result.seeds)}",
-        *("behavior", "measure", "with it", "default", "effect [95 %]", "right", "falls"),
+        *("behavior", "attribute", "with it", "default", "effect [95 %]", "aim reached", "falls"),
     )
     count = len(result.seeds)
     for row in result.behaviors:
@@ -58,9 +58,9 @@ def _aim_table(result: MapEvaluation) -> Table:
 
 
 def policy_table(result: PolicyEvaluation) -> Table:
-    """The policy alone."""
+    """Return the performance of the policy alone."""
     table = new_table(
-        f"the policy alone, {seed_range(result.seeds)}, {result.steps} steps each", "measure", "value"
+        f"Policy alone, {seed_range(result.seeds)}, {result.steps} steps each", "measure", "value"
     )
     for name, speed in (("mean speed (m/s)", result.mean_speed), ("net speed (m/s)", result.net_speed)):
         if speed is not None:

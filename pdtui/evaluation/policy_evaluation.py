@@ -1,4 +1,4 @@
-"""`pdtui evaluate --policy-only`: how the policy does by itself, over whole episodes."""
+"""`pdtui evaluate --policy-only`: speed, return and falls of the policy alone, over whole episodes."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from pdtui.drive.loop_builder import build_loop
 
 @dataclass(frozen=True)
 class PolicyEvaluation:
-    """The policy alone.
+    """The performance of a policy without stimulation.
 
     Attributes:
-        seeds: of the episodes.
-        steps: control steps an episode.
+        seeds: seeds of the episodes.
+        steps: control steps per episode.
         mean_speed: mean of |v| over all steps, m/s; None for a robot without the attribute ``speed``.
-        net_speed: mean over episodes of the distance between start and end, over the time, m/s; None for a
-            robot without a place.
-        mean_return, std_return: of the episodes' sums of reward.
-        finished: episodes without a fall.
+        net_speed: distance between start and end over time, mean over episodes, m/s; None for a robot
+            without poses.
+        mean_return, std_return: mean and standard deviation of the episodes' returns.
+        finished: number of episodes without a fall.
     """
 
     seeds: tuple[int, ...]
@@ -43,10 +43,16 @@ def evaluate_policy(
     steps: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> PolicyEvaluation:
-    """Drive the policy untouched, one episode a seed, as long as the robot's episodes are by default.
+    """Run the policy without stimulation for one episode per seed.
+
+    Args:
+        config: robot, map, policy and start; its seed is not used.
+        seeds: seeds of the episodes.
+        steps: control steps per episode; None for the robot's default.
+        progress: called with the number of episodes done and the total.
 
     Raises:
-        PdtuiError: robot, policy or map cannot be had.
+        PdtuiError: the robot, policy or map cannot be loaded.
     """
     built = build_loop(config)
     steps = steps or built.robot.episode_steps

@@ -1,4 +1,4 @@
-"""`pdtui evaluate --target yaw`: how precisely a PID holds an attribute, any that a map can hold."""
+"""`pdtui evaluate --target ATTRIBUTE`: how precisely a PID behavior holds an attribute."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ def evaluate_tracking(
     workers: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> TrackingSummary:
-    """Set the targets one after the other, 100 control steps each, on every seed; and once without control.
+    """Drive every seed through the targets, 100 control steps each, with the PID behavior and without.
 
     Args:
         config: robot, map and policy; its seed is not used.
-        attribute: what is to be held.
-        seeds: of the resets.
-        targets: in the attribute's unit; empty takes `choose_tracking_targets`.
-        workers: processes.
-        progress: called with drives done and drives in all.
+        attribute: name of the attribute to hold.
+        seeds: seeds of the resets.
+        targets: targets in the attribute's unit; empty for those of `choose_tracking_targets`.
+        workers: number of worker processes.
+        progress: called with the number of drives done and the total.
 
     Raises:
         MapError: the map has no behavior of mode ``pid`` for the attribute.
-        PdtuiError: robot or policy cannot be had.
+        PdtuiError: the robot or policy cannot be loaded.
     """
-    behavior = holding_behavior(config, attribute)
+    behavior = find_pid_behaviors(config, attribute)[0]
     with TrackingDriveRunner(config, workers) as runner:
         targets = tuple(targets) or choose_tracking_targets(runner, behavior, seeds[:3])
         drives = [
@@ -48,23 +48,23 @@ def evaluate_tracking(
             for name in (behavior.name, "")
             for seed in seeds
         ]
-        followed = runner.run(drives, progress)
+        results = runner.run(drives, progress)
         unit = runner.attribute(attribute).unit
-    untouched = finite_mean(seed_errors(followed[len(seeds) :]))
-    return summarise_tracking(followed[: len(seeds)], unit, untouched)
+    untouched = finite_mean(seed_errors(results[len(seeds) :]))
+    return summarise_tracking(results[: len(seeds)], unit, untouched)
 
 
-def holding_behavior(config: DriveConfig, attribute: str) -> Behavior:
-    """The behavior that holds an attribute; of several, the first.
+def find_pid_behaviors(config: DriveConfig, attribute: str) -> list[Behavior]:
+    """Return the map's behaviors of mode ``pid`` that hold an attribute, at least one.
 
     Raises:
         MapError: there is none.
     """
-    holding = [one for one in config.stimulation_map.behaviors.values() if one.pid is not None]
-    for behavior in holding:
-        if behavior.pid is not None and behavior.pid.attribute == attribute:
-            return behavior
-    known = ", ".join(one.pid.attribute for one in holding if one.pid is not None) or "none"
-    raise MapError(
-        f"{config.stimulation_map.source}: no behavior of mode pid holds '{attribute}'; held are: {known}"
-    )
+    behaviors = config.stimulation_map.behaviors.values()
+    held = {one.name: one.pid.attribute for one in behaviors if one.pid is not None}
+    if attribute not in held.values():
+        known = ", ".join(held.values()) or "none"
+        raise MapError(
+            f"{config.stimulation_map.source}: no behavior of mode pid holds '{attribute}'; held are: {known}"
+        )
+    return [one for one in behaviors if held.get(one.name) == attribute]

@@ -1,4 +1,4 @@
-"""What behaviors accomplish: each seed is driven with the behavior and without, and both are judged."""
+"""The success of behaviors in their tasks: each seed is driven with the behavior and without it."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from pdtui.stimulation.stimulation_map import Behavior
 
 @dataclass(frozen=True)
 class TaskEvaluation:
-    """One behavior over all seeds.
+    """The success of one behavior over all seeds.
 
     Attributes:
-        behavior: its name.
-        task: what it is for.
-        wanted: what counts as done.
-        done: seeds on which it was done with the behavior,
-        by_itself: and without.
-        falls: seeds on which the robot fell with the behavior.
-        figures: means over seeds of what was measured, with the behavior.
-        figures_by_itself: the same, without.
+        behavior: name of the behavior.
+        task: name of its task.
+        wanted: what counts as success.
+        done: number of seeds with success with the behavior.
+        by_itself: number of seeds with success without it.
+        falls: number of seeds on which the robot fell with the behavior.
+        figures: the task's measures with the behavior, means over seeds.
+        figures_by_itself: the same without it.
     """
 
     behavior: str
@@ -43,14 +43,14 @@ class TaskEvaluation:
 
 @dataclass(frozen=True)
 class TaskRun:
-    """One run, judged."""
+    """The verdict on one run, and whether the robot fell."""
 
     verdict: TaskVerdict
     fell: bool
 
 
 def run_task(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bool) -> TaskRun:
-    """One run of a behavior's task through the control loop, as a drive would do it.
+    """Run a behavior's task once through the control loop, as in a drive.
 
     Raises:
         MapError: the robot has no such task.
@@ -81,7 +81,7 @@ def _judge(task: Task, loop: ControlLoop, rows: Floats, walk: int, fell: bool) -
 def summarise_task(
     behavior: Behavior, task: Task, runs: Sequence[TaskRun], untouched: Sequence[TaskRun]
 ) -> TaskEvaluation:
-    """The figures of one behavior."""
+    """Summarise the runs of one behavior."""
     return TaskEvaluation(
         behavior.name,
         task.name,

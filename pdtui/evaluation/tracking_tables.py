@@ -1,4 +1,4 @@
-"""The tables of what holds targets: one behavior, several side by side, and what tuning changed."""
+"""The tables of PID behaviors: how precisely they hold targets, and what tuning changed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pdtui.search.tracking_summary import TrackingSummary
 
 
 def tracking_table(result: TrackingSummary) -> Table:
-    """One row a target, and the mean."""
+    """Return one row per target, and the mean."""
     unit = result.unit
     table = new_table(
         f"{result.behavior}: {result.attribute} ({unit}), {seed_range(result.seeds)}, falls {result.falls}",
@@ -26,23 +26,23 @@ def tracking_table(result: TrackingSummary) -> Table:
     table.add_row("mean", _with_interval(result), f"{result.settled:.3f}")
     if result.default_error is not None:
         table.add_row("without control", f"{result.default_error:.3f}", "")
-    answers = result.responses
+    responses = result.responses
     table.caption = (
-        f"rise time {_rise(answers)} s, {answers.unrisen} of {answers.steps} steps not risen; "
-        f"overshoot {_overshoot(answers)}"
+        f"Rise time {_rise(responses)} s; {responses.unrisen} of {responses.steps} steps not risen; "
+        f"overshoot {_overshoot(responses)}."
     )
     return table
 
 
 def tuned_table(results: list[TunedGains]) -> Group:
-    """Gains and figures before and after, behavior by behavior."""
-    return Group(*(part for result in results for part in (_tuned(result), result.verdict)))
+    """Return the gains and figures of each behavior, before and after tuning."""
+    return Group(*(part for result in results for part in (_gains_table(result), result.verdict)))
 
 
-def _tuned(result: TunedGains) -> Table:
+def _gains_table(result: TunedGains) -> Table:
     before = result.before
     title = f"{result.behavior}: {before.attribute}, {seed_range(before.seeds)}"
-    table = new_table(title, "", "the map's", "the best found")
+    table = new_table(title, "", "in the map", "best found")
     for name in ("kp", "ki", "kd", "limit"):
         table.add_row(name, *(f"{getattr(pid, name):.3g}" for pid in (result.old, result.new)))
     table.add_section()
@@ -51,12 +51,12 @@ def _tuned(result: TunedGains) -> Table:
 
 
 def add_tracking_figures(table: Table, columns: Sequence[TrackingSummary]) -> None:
-    unit, answers = columns[0].unit, [one.responses for one in columns]
+    unit, responses = columns[0].unit, [one.responses for one in columns]
     table.add_row(f"mean |error| ({unit})", *(_with_interval(one) for one in columns))
     table.add_row("over the last 25 steps", *(f"{one.settled:.3f}" for one in columns))
-    table.add_row("rise time (s)", *map(_rise, answers))
-    table.add_row("steps not risen", *(f"{one.unrisen} of {one.steps}" for one in answers))
-    table.add_row("overshoot", *map(_overshoot, answers))
+    table.add_row("rise time (s)", *map(_rise, responses))
+    table.add_row("steps not risen", *(f"{one.unrisen} of {one.steps}" for one in responses))
+    table.add_row("overshoot", *map(_overshoot, responses))
     table.add_row("falls", *(f"{one.falls} of {len(one.seeds)}" for one in columns))
 
 
@@ -64,9 +64,9 @@ def _with_interval(figures: TrackingSummary) -> str:
     return mean_with_interval(figures.error, figures.low, figures.high, ".3f")
 
 
-def _rise(answers: StepResponseSummary) -> str:
-    return "–" if answers.rise is None else f"{answers.rise:.2f}"
+def _rise(responses: StepResponseSummary) -> str:
+    return "–" if responses.rise is None else f"{responses.rise:.2f}"
 
 
-def _overshoot(answers: StepResponseSummary) -> str:
-    return "–" if answers.overshoot is None else f"{answers.overshoot:.0%}"
+def _overshoot(responses: StepResponseSummary) -> str:
+    return "–" if responses.overshoot is None else f"{responses.overshoot:.0%}"

@@ -1,7 +1,7 @@
-"""`pdtui evaluate --experiment tracking`: does a stimulated unit steer as precisely as a trained command?
+"""Whether a stimulated unit holds headings as precisely as a trained command.
 
-The paper's control-precision experiment (section 4): the same headings are held by a PID on a command that
-the policy was trained to follow, and by a PID on the output of a hidden unit with that command at rest.
+The paper's experiment on control precision (section 4): the same headings are held by a PID that sets a
+command which the policy was trained to follow, and by a PID that sets the output of a hidden unit.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from scipy import stats
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
 from pdtui.drive.drive_config import DriveConfig
+from pdtui.evaluation.target_tracking import find_pid_behaviors
 from pdtui.search.tracking_drives import STEPS_EACH, TrackingDrive, TrackingDriveResult, TrackingDriveRunner
 from pdtui.search.tracking_summary import HEADINGS, TrackingSummary, seed_errors, summarise_tracking
 from pdtui.stimulation.stimulation_map import Behavior
@@ -26,11 +27,11 @@ ControlInput = Literal["command", "units", "both"]
 
 @dataclass(frozen=True)
 class ErrorRatio:
-    """Mean |error| with units over that with the command.
+    """Mean |error| with units over mean |error| with the command.
 
     Attributes:
         value: ratio of the means over seeds.
-        low, high: 95 % interval, bootstrapped over seeds in pairs.
+        low, high: 95 % interval, bootstrapped over pairs of the same seed.
     """
 
     value: float
@@ -40,16 +41,16 @@ class ErrorRatio:
 
 @dataclass(frozen=True)
 class HeadingControllerResult:
-    """One behavior that holds the heading.
+    """The result of one behavior that holds the heading.
 
     Attributes:
-        map: where it is from.
-        robot, policy: names.
+        map: file of its map.
+        robot, policy: names of robot and policy.
         input_kind: whether the PID sets commands, units or both.
         inputs: names of the commands and units that it sets.
         other_commands: the commands that it leaves alone, and their values.
-        tracking: its figures.
-        ratio: to the map's behavior by command; None for that one, and where there is none.
+        tracking: how precisely it holds the targets.
+        ratio: its error over that of the map's behavior by command; None for that one, and without one.
         headings: heading per seed and control step, rad, shape (seeds, targets × 100); NaN after a fall.
     """
 
@@ -66,13 +67,13 @@ class HeadingControllerResult:
 
 @dataclass(frozen=True)
 class HeadingPrecisionComparison:
-    """The experiment.
+    """The result of the experiment.
 
     Attributes:
-        seeds: of the drives, the same for all.
-        targets: rad, in the order in which they were set.
-        dt: s per control step.
-        rows: by map, then in the order of its behaviors.
+        seeds: seeds of the drives, the same for all behaviors.
+        targets: target headings in the order in which they are set, rad.
+        dt: duration of a control step, s.
+        rows: results by map, then in the order of its behaviors.
     """
 
     seeds: tuple[int, ...]
@@ -81,7 +82,7 @@ class HeadingPrecisionComparison:
     rows: tuple[HeadingControllerResult, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """The form that ``--json`` prints."""
+        """Return what ``--json`` prints."""
         rows = [
             {
                 "map": row.map,
@@ -105,7 +106,7 @@ class HeadingPrecisionComparison:
 
 
 def control_input(behavior: Behavior) -> ControlInput:
-    """What a behavior's controller moves."""
+    """Return what the PID of a behavior sets."""
     if behavior.commands and behavior.magnitudes:
         return "both"
     return "command" if behavior.commands else "units"
@@ -119,20 +120,20 @@ def compare_heading_precision(
     workers: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> HeadingPrecisionComparison:
-    """Hold headings with every behavior of mode ``pid`` on the yaw angle that the maps have.
+    """Hold headings with every behavior of the maps that has a PID on the yaw angle.
 
     Args:
         configs: robots, maps and policies; their seeds are not used.
-        seeds: of the resets.
-        targets: headings, rad, 100 control steps each.
-        workers: processes.
-        progress: called with drives done and drives in all.
+        seeds: seeds of the resets.
+        targets: target headings, 100 control steps each, rad.
+        workers: number of worker processes.
+        progress: called with the number of drives done and the total.
 
     Raises:
-        MapError: a map has no such behavior, or maps are of robots with other control steps.
-        PdtuiError: robot, policy or map cannot be had.
+        MapError: a map has no such behavior, or the robots' control steps differ in duration.
+        PdtuiError: a robot, policy or map cannot be loaded.
     """
-    found = [(config, _holding(config)) for config in configs]
+    found = [(config, find_pid_behaviors(config, ATTRIBUTE)) for config in configs]
     total, before = len(seeds) * sum(len(behaviors) for _, behaviors in found), 0
     rows: list[HeadingControllerResult] = []
     steps: dict[str, float] = {}
@@ -155,18 +156,6 @@ def compare_heading_precision(
         told = ", ".join(f"{source} has {dt:g} s" for source, dt in steps.items())
         raise MapError(f"expected maps of robots with one control step, found: {told}")
     return HeadingPrecisionComparison(tuple(seeds), tuple(targets), next(iter(steps.values())), tuple(rows))
-
-
-def _holding(config: DriveConfig) -> list[Behavior]:
-    wanted = config.stimulation_map
-    found = [b for b in wanted.behaviors.values() if b.pid is not None and b.pid.attribute == ATTRIBUTE]
-    if not found:
-        held = ", ".join(b.pid.attribute for b in wanted.behaviors.values() if b.pid is not None) or "none"
-        raise MapError(
-            f"{wanted.source}: no behavior of mode pid holds '{ATTRIBUTE}', which the experiment is about; "
-            f"held are: {held}"
-        )
-    return found
 
 
 def _rows(
@@ -197,7 +186,7 @@ def _rows(
 
 
 def paired_ratio(units: Sequence[TrackingDriveResult], command: Sequence[TrackingDriveResult]) -> ErrorRatio:
-    """Ratio of mean |errors| over the same seeds, of which both drives came to the first target."""
+    """Return the ratio of mean |error| over the seeds on which both drives reached the first target."""
     above, below = seed_errors(units), seed_errors(command)
     both = np.isfinite(above) & np.isfinite(below)
     above, below = above[both], below[both]

@@ -20,7 +20,7 @@ from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.evaluation.behavior_evaluation import STEPS, evaluate_map, run_behavior
 from pdtui.evaluation.policy_evaluation import evaluate_policy
-from pdtui.evaluation.target_tracking import evaluate_tracking, holding_behavior
+from pdtui.evaluation.target_tracking import evaluate_tracking, find_pid_behaviors
 from pdtui.evaluation.tracking_tables import tracking_table
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
@@ -123,9 +123,9 @@ def test_tracking_measures_the_wrapped_error(config: DriveConfig) -> None:
     assert loop.attributes[loop.attribute_index("yaw")].wraps
     assert 0.0 <= result.error <= np.pi
     assert result.targets[0].error == pytest.approx(result.error)
-    assert holding_behavior(config, "yaw").name == "hold heading"
+    assert [one.name for one in find_pid_behaviors(config, "yaw")] == ["hold heading"]
     with pytest.raises(MapError, match="no behavior of mode pid holds 'speed'; held are: yaw"):
-        holding_behavior(config, "speed")
+        find_pid_behaviors(config, "speed")
 
 
 def test_walking_sums_up_whole_episodes(config: DriveConfig, policy: Policy) -> None:
