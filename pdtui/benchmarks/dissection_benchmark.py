@@ -120,8 +120,8 @@ def measure_probing_rate(one: RolloutPool, two: RolloutPool, settings: Dissectio
     two.run(jobs, starts, 1, 0)  # start the worker processes before the clock
 
     def rate(pool: RolloutPool) -> float:
-        before = pool.steps_run
+        before = pool.control_steps
         seconds = measure_seconds(lambda: pool.run(jobs, starts, settings.probe_steps, 0))
-        return (pool.steps_run - before) / seconds
+        return (pool.control_steps - before) / seconds
 
     return np.array([[rate(one), rate(two)] for _ in range(settings.rounds)])

@@ -12,7 +12,7 @@ from pdtui.core.attributes import Floats
 
 
 def confidence_interval(values: Floats) -> tuple[float, float]:
-    """95 % interval of the mean, Student's t; as wide as can be for a single value."""
+    """Return the 95 % confidence interval of the mean (Student's t), infinite for fewer than 2 values."""
     if len(values) < 2:
         return float("-inf"), float("inf")
     half = float(stats.t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values)))
@@ -22,16 +22,16 @@ def confidence_interval(values: Floats) -> tuple[float, float]:
 def bootstrap_interval(
     samples: NDArray[Any], seed: int, *, level: float = 0.95, draws: int = 2000
 ) -> tuple[float, float]:
-    """Percentile bootstrap interval of a mean.
+    """Return the percentile bootstrap interval of a mean.
 
     Args:
-        samples: shape (K,); NaN (a fall before the measured steps) is left out.
-        seed: of the draws.
-        level: coverage.
-        draws: resamples.
+        samples: shape (K,); values that are not finite are left out.
+        seed: seed of the resampling.
+        level: coverage of the interval.
+        draws: number of resamples.
 
     Returns:
-        low and high; NaN for fewer than two samples, which say nothing about spread.
+        The ends of the interval; NaN for fewer than two samples.
     """
     known = np.asarray(samples, np.float64)
     known = known[np.isfinite(known)]

@@ -126,7 +126,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             behaviors=behaviors,
             controllers=controllers,
             rollouts=pool.rollouts,
-            control_steps=pool.steps_run,
+            control_steps=pool.control_steps,
             minutes=(time.monotonic() - began) / 60,
             import_options=config.import_options,
             shortened=starts.shortened,

@@ -1,8 +1,8 @@
-"""Step 5, probe: stimulate from common snapshots, and measure against the unperturbed roll-out."""
+"""Step 5, probe: stimulate from common starts and compare with the unperturbed roll-outs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,16 +20,16 @@ from pdtui.spectra.monitor import StepProgress
 
 @dataclass(frozen=True)
 class PlanEffects:
-    """What each of S plans does from each of K starts.
+    """Effects of S plans from each of K starts on J attributes.
 
     Attributes:
         effects: change of each attribute against the unperturbed roll-out from the same start, in its unit,
-            shape (S, K, J). Each is a difference of means over the measured steps; of an angle, of its mean
-            change since the start. NaN where the robot fell before the measured steps.
-        means: the stimulated means themselves, shape (S, K, J).
+            shape (S, K, J): a difference of means over the measured steps; for an angle, of its mean change
+            since the start. NaN where the robot fell before the measured steps.
+        means: the means with stimulation, shape (S, K, J).
         unperturbed: the means without stimulation, shape (K, J).
-        falls: whether it fell, shape (S, K).
-        errors: mean distance from the target, for plans that hold one, else NaN; shape (S, K).
+        falls: whether the robot fell, shape (S, K).
+        errors: mean distance from the target for plans with a controller, else NaN, shape (S, K).
     """
 
     effects: Floats
@@ -40,11 +40,11 @@ class PlanEffects:
 
 
 class EffectProbe:
-    """Measures stimulations; remembers the unperturbed roll-outs, which every comparison needs again.
+    """Measures the effects of stimulations, and remembers the unperturbed roll-outs that all of them need.
 
     Args:
         pool: runs the roll-outs.
-        journal: remembers them on disk, and those of a run that was interrupted.
+        journal: file of finished roll-outs, which are not run again; None for none.
     """
 
     def __init__(self, pool: RolloutPool, journal: RolloutJournal | None = None) -> None:
@@ -63,11 +63,11 @@ class EffectProbe:
         """Measure plans from common starts.
 
         Args:
-            plans: stimulations of any number of units, or targets to hold.
-            starts: common snapshots, restored bit-exactly before every roll-out.
+            plans: stimulations of any number of units, or controllers.
+            starts: states to which robot and policy are restored, bit for bit, before each roll-out.
             steps: control steps of stimulation.
-            measure_from: first step that counts; by default the second half does.
-            progress: called with (roll-outs done, roll-outs).
+            measure_from: first step that is measured; by default the second half is.
+            progress: called with the number of roll-outs finished and of all roll-outs.
 
         Raises:
             WorkerError: a worker process died.
@@ -77,12 +77,7 @@ class EffectProbe:
         missing = [index for index, key in enumerate(keys) if key not in self._unperturbed]
         jobs: list[RolloutJob] = [(NO_STIMULATION, index) for index in missing]
         jobs += [(plan, index) for plan in plans for index in range(len(starts))]
-
-        def report(done: int) -> None:
-            if progress is not None:
-                progress(done, len(jobs))
-
-        outcomes = self._run(jobs, starts, steps, first, report)
+        outcomes = self._run(jobs, starts, steps, first, progress)
         for index, outcome in zip(missing, outcomes, strict=False):
             self._unperturbed[keys[index]] = outcome
         unperturbed = np.array([self._unperturbed[key].means for key in keys])
@@ -97,38 +92,6 @@ class EffectProbe:
             errors=np.array([outcome.error for outcome in probed], np.float64).reshape(shape),
         )
 
-    def _run(
-        self,
-        jobs: Sequence[RolloutJob],
-        starts: Sequence[StartState],
-        steps: int,
-        first: int,
-        report: Callable[[int], None],
-    ) -> list[RolloutOutcome]:
-        """Run what the journal does not know yet, and let it know."""
-        journal = self._journal
-        if journal is None:
-            return self.pool.run(jobs, starts, steps, first, report)
-        keys = journal.keys(jobs, starts, steps, first)
-        known = journal.read(keys)
-        missing = [number for number, outcome in enumerate(known) if outcome is None]
-
-        def keep(numbers: Sequence[int], outcomes: Sequence[RolloutOutcome]) -> None:
-            journal.write([keys[missing[number]] for number in numbers], outcomes)
-
-        fresh = iter(
-            self.pool.run(
-                [jobs[number] for number in missing],
-                starts,
-                steps,
-                first,
-                lambda done: report(len(jobs) - len(missing) + done),
-                keep,
-            )
-        )
-        self.pool.count([outcome for outcome in known if outcome is not None])
-        return [next(fresh) if outcome is None else outcome for outcome in known]
-
     def measure_units(
         self,
         units: Sequence[int],
@@ -138,7 +101,7 @@ class EffectProbe:
         steps: int = 60,
         progress: StepProgress | None = None,
     ) -> UnitEffects:
-        """Overwrite each unit alone with each value: the effect curves of single units."""
+        """Overwrite each unit alone with each value, and measure it as `measure_plans` does."""
         plans = [Stimulation((unit,), (value,)) for unit in units for value in values]
         result = self.measure_plans(plans, starts, steps=steps, progress=progress)
         shape = (len(units), len(values), len(starts))
@@ -149,3 +112,30 @@ class EffectProbe:
             falls=result.falls.reshape(shape),
             unperturbed=result.unperturbed,
         )
+
+    def _run(
+        self,
+        jobs: Sequence[RolloutJob],
+        starts: Sequence[StartState],
+        steps: int,
+        measure_from: int,
+        progress: StepProgress | None,
+    ) -> list[RolloutOutcome]:
+        """Run the roll-outs that the journal does not hold, and add them to it."""
+        journal = self._journal
+        keys = [] if journal is None else journal.keys(jobs, starts, steps, measure_from)
+        stored = [] if journal is None else journal.read(keys)
+        known = {number: outcome for number, outcome in enumerate(stored) if outcome is not None}
+        missing = [number for number in range(len(jobs)) if number not in known]
+        self.pool.count_rollouts(known.values())
+
+        def keep(indices: Sequence[int], batch: Sequence[RolloutOutcome]) -> None:
+            numbers = [missing[index] for index in indices]
+            known.update(zip(numbers, batch, strict=True))
+            if journal is not None:
+                journal.write([keys[number] for number in numbers], batch)
+            if progress is not None:
+                progress(len(known), len(jobs))
+
+        self.pool.run([jobs[number] for number in missing], starts, steps, measure_from, keep)
+        return [known[number] for number in range(len(jobs))]

@@ -1,4 +1,4 @@
-"""A file of finished roll-outs, from which an interrupted dissection goes on without loss."""
+"""A file of finished roll-outs, with which an interrupted dissection resumes without loss."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ _SCHEMA = "CREATE TABLE IF NOT EXISTS rollouts (key BLOB PRIMARY KEY, outcome BL
 
 
 class RolloutJournal(Closable):
-    """Outcomes by what determines them: policy, robot, start, plan and length.
+    """Outcomes of roll-outs by policy, robot, start, plan and length, which determine them.
 
-    A roll-out is a function of those, so one that is known need not be run again: a dissection that is run
-    again with the same arguments takes the same decisions and soon stands where it was killed.
+    A dissection that is run again with the same arguments makes the same decisions. It reads the outcomes of
+    finished roll-outs instead of running them, and soon arrives where it was interrupted.
 
     Args:
-        path: SQLite database; made if it does not exist.
-        identity: what all roll-outs share, such as robot and hash of the policy.
+        path: SQLite database; created if it does not exist.
+        identity: what all roll-outs have in common, such as the robot and the hash of the policy.
 
     Raises:
-        RobotError: the file is no journal, or cannot be written.
+        RobotError: the file is not a journal or cannot be written.
     """
 
     def __init__(self, path: Path, identity: str) -> None:
@@ -49,13 +49,13 @@ class RolloutJournal(Closable):
         return int(self._database.execute("SELECT count(*) FROM rollouts").fetchone()[0])
 
     def close(self) -> None:
-        """Leave the file as it is."""
+        """Close the file."""
         self._database.close()
 
     def keys(
         self, jobs: Sequence[RolloutJob], starts: Sequence[StartState], steps: int, measure_from: int
     ) -> list[bytes]:
-        """One key a job."""
+        """Return the key of each job."""
         prints = [fingerprint_start_state(start) for start in starts]
         length = f"{steps} {measure_from}".encode()
         return [
@@ -66,7 +66,7 @@ class RolloutJournal(Closable):
         ]
 
     def read(self, keys: Sequence[bytes]) -> list[RolloutOutcome | None]:
-        """What is known, in the order of the keys."""
+        """Return the outcome for each key, or None where there is none."""
         found: list[RolloutOutcome | None] = []
         for key in keys:
             row = self._database.execute("SELECT outcome FROM rollouts WHERE key = ?", (key,)).fetchone()
@@ -74,10 +74,10 @@ class RolloutJournal(Closable):
         return found
 
     def write(self, keys: Sequence[bytes], outcomes: Sequence[RolloutOutcome]) -> None:
-        """Remember outcomes.
+        """Store outcomes.
 
-        When this returns they survive the death of this process, but not of the machine: SQLite hands them to
-        the operating system and does not wait for the disk.
+        They then survive the end of this process, but not a crash of the machine, because SQLite hands them
+        to the operating system and does not wait for the disk.
 
         Raises:
             PdtuiError: the disk is full or the file is gone.

@@ -1,8 +1,8 @@
-"""Roll-outs on several cores: each worker process has its own robot and policy."""
+"""Roll-outs on several cores, where each worker process has its own robot and policy."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -21,8 +21,9 @@ from pdtui.robots import make_robot, open_robot
 from pdtui.robots.robot import Robot
 from pdtui.spectra.monitor import StepProgress
 
-# Control steps handed over at once: long enough to hide the hand-over, short enough to stop within a second.
-_STEPS_A_CHUNK = 1200
+# Control steps that a worker is sent at once: enough to make the cost of sending them negligible, few enough
+# for progress to be reported about once per second.
+_STEPS_PER_CHUNK = 1200
 
 WorkItem = TypeVar("WorkItem")
 WorkResult = TypeVar("WorkResult")
@@ -52,7 +53,7 @@ def _apply(
     return function(*pair, item)
 
 
-def _roll_out_chunk(pair: _Pair, chunk: _Chunk) -> list[RolloutOutcome]:
+def _run_chunk(pair: _Pair, chunk: _Chunk) -> list[RolloutOutcome]:
     return [
         run_rollout(*pair, chunk.starts[index], plan, chunk.steps, chunk.measure_from)
         for plan, index in chunk.jobs
@@ -60,21 +61,24 @@ def _roll_out_chunk(pair: _Pair, chunk: _Chunk) -> list[RolloutOutcome]:
 
 
 class RolloutPool(Closable):
-    """Runs roll-outs of one policy on one robot; with one worker in this process, else in others.
+    """Runs roll-outs of one policy on one robot, in a `WorkerPool`.
 
-    The results do not depend on the number of workers: each roll-out is a function of its snapshot and plan.
-    Processes are started by the first call of `run`, not before.
+    The results do not depend on the number of workers, as each roll-out depends on its start and plan only.
 
     Args:
         robot: name of the robot, or a robot.
         policy: weights file, name of a shipped policy, or a policy.
-        workers: processes, which load robot and policy by their names; what is given as an object stays in
-            this one.
+        workers: number of processes, each of which loads robot and policy by name. If one of the two is given
+            as an object, all roll-outs run in this process.
         import_options: what the weights file leaves open.
+
+    Attributes:
+        rollouts: number of roll-outs so far.
+        control_steps: number of control steps in them.
 
     Raises:
         RobotError: no such robot.
-        PolicyError: no such policy, one for another robot, or one whose shapes do not fit it.
+        PolicyError: no such policy, or one that does not fit the robot.
     """
 
     def __init__(
@@ -84,7 +88,7 @@ class RolloutPool(Closable):
         workers: int = 2,
         import_options: ImportOptions = NO_OPTIONS,
     ) -> None:
-        # Built here too: the caller needs both, and what is wrong with them is raised in this process.
+        # Also built in this process: callers need both, and errors in them are raised at once.
         with ExitStack() as stack:
             self.robot = stack.enter_context(open_robot(robot))
             self.policy = policy if isinstance(policy, Policy) else _load(policy, self.robot, import_options)
@@ -98,8 +102,7 @@ class RolloutPool(Closable):
             _build_pair,
             *(robot, str(policy), import_options),
         )
-        self.steps_run = 0
-        self.rollouts = 0
+        self.rollouts = self.control_steps = 0
 
     def close(self) -> None:
         """End the worker processes, and close the robot if it was built here."""
@@ -112,37 +115,31 @@ class RolloutPool(Closable):
         starts: Sequence[StartState],
         steps: int,
         measure_from: int,
-        done: Callable[[int], None] | None = None,
         keep: Callable[[Sequence[int], Sequence[RolloutOutcome]], None] | None = None,
     ) -> list[RolloutOutcome]:
-        """Roll out every job; results in the order of the jobs.
+        """Run all jobs and return their outcomes in the order of the jobs.
 
         Args:
-            jobs: what to overwrite, and the number of the start from which.
-            starts: snapshots.
-            steps: control steps of each roll-out.
-            measure_from: first step that counts.
-            done: called with the number of jobs finished so far.
-            keep: called with each batch of finished jobs, by number, and their outcomes.
+            jobs: plans, each with the index of its start.
+            starts: states to start from.
+            steps: control steps per roll-out.
+            measure_from: first step that is measured.
+            keep: called with the indices of finished jobs and with their outcomes, as they are finished.
 
         Raises:
             WorkerError: a worker process died.
         """
-        size = max(1, _STEPS_A_CHUNK // steps)
+        size = max(1, _STEPS_PER_CHUNK // steps)
         parts = [jobs[low : low + size] for low in range(0, len(jobs), size)]
         chunks = [
             _Chunk(part, {index: starts[index] for _, index in part}, steps, measure_from) for part in parts
         ]
         results: list[list[RolloutOutcome]] = [[] for _ in chunks]
-        finished = 0
-        for number, outcomes in self._pool.as_completed(_roll_out_chunk, chunks):
+        for number, outcomes in self._pool.as_completed(_run_chunk, chunks):
             results[number] = outcomes
-            finished += len(outcomes)
-            self.count(outcomes)
+            self.count_rollouts(outcomes)
             if keep is not None:
                 keep(range(number * size, number * size + len(outcomes)), outcomes)
-            if done is not None:
-                done(finished)
         return [outcome for outcomes in results for outcome in outcomes]
 
     def map(
@@ -151,14 +148,17 @@ class RolloutPool(Closable):
         items: Sequence[WorkItem],
         progress: StepProgress | None = None,
     ) -> list[WorkResult]:
-        """Apply a function of a module to robot, policy and each item; results in the order of the items.
+        """Call a function with robot, policy and each item, and return the results in order.
+
+        The function has to be a module's, so that worker processes can import it.
 
         Raises:
             WorkerError: a worker process died.
         """
         return self._pool.map(partial(_apply, function), items, progress)
 
-    def count(self, outcomes: Sequence[RolloutOutcome]) -> None:
-        """Take roll-outs into `rollouts` and `steps_run`, wherever they were run."""
-        self.rollouts += len(outcomes)
-        self.steps_run += sum(outcome.steps_survived for outcome in outcomes)
+    def count_rollouts(self, outcomes: Iterable[RolloutOutcome]) -> None:
+        """Add roll-outs to `rollouts` and `control_steps`, whether they were run here or read from a file."""
+        for outcome in outcomes:
+            self.rollouts += 1
+            self.control_steps += outcome.steps_survived

@@ -1,4 +1,4 @@
-"""States of unstimulated walks from which stimulated roll-outs start."""
+"""States of unstimulated walks in which stimulated roll-outs start."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from pdtui.robots.robot import Robot
 
 @dataclass(frozen=True)
 class StartState:
-    """A state of an unstimulated walk from which stimulated roll-outs start.
+    """A state of an unstimulated walk in which stimulated roll-outs start.
 
     Attributes:
-        seed: of the reset.
+        seed: seed of the reset.
         step: control steps since the reset.
-        snapshot: the whole state of the robot.
-        policy_state: the hidden state of a recurrent policy.
+        snapshot: the robot's whole state.
+        policy_state: hidden state of a recurrent policy.
     """
 
     seed: int
@@ -32,21 +32,21 @@ class StartState:
 def collect_start_states(
     robot: Robot, policy: Policy, first_seed: int, count: int, *, at: int = 100, survive: int = 0
 ) -> list[StartState]:
-    """Snapshots of unstimulated walks, one a seed: other headings, other phases of the gait.
+    """Take one state from each of several unstimulated walks, which differ in heading and phase of the gait.
 
-    Seeds whose unstimulated walk falls before step ``at + survive`` are passed over, so that a fall in a
-    stimulated roll-out of that length is the stimulation's.
+    Seeds whose walk falls before step ``at + survive`` are skipped, so that a fall within `survive` steps of
+    a stimulated roll-out is due to the stimulation.
 
     Args:
-        robot: the world; it is reset.
-        policy: acts.
-        first_seed: seeds count up from here.
-        count: how many snapshots to take.
-        at: control steps since the reset.
-        survive: control steps that the walk has to go on.
+        robot: the robot; it is reset.
+        policy: the policy, which acts with its mean action.
+        first_seed: seed of the first walk; the others follow.
+        count: number of states.
+        at: control steps from the reset to the state.
+        survive: control steps for which the walk has to go on without a fall.
 
     Raises:
-        RobotError: among four times as many seeds too few walks last that long.
+        RobotError: too few of ``4 * count`` walks last that long.
     """
     starts: list[StartState] = []
     for seed in range(first_seed, first_seed + 4 * count):
@@ -64,14 +64,14 @@ def collect_start_states(
 def measure_walk_lengths(
     robot: Robot, policy: Policy, seeds: Sequence[int], most: int, *, enough: int = 0
 ) -> list[int]:
-    """Control steps that unstimulated walks last, one a seed: at most `most`.
+    """Return for how many control steps unstimulated walks last, in the order of their seeds.
 
     Args:
-        robot: the world; it is reset.
-        policy: acts.
-        seeds: of the walks.
-        most: where a walk is broken off.
-        enough: so many walks of that length end it; 0 walks them all.
+        robot: the robot; it is reset.
+        policy: the policy, which acts with its mean action.
+        seeds: one seed per walk.
+        most: step at which a walk is broken off.
+        enough: stop after this many walks of `most` steps; 0 for never.
     """
     lengths: list[int] = []
     for seed in seeds:

@@ -1,4 +1,4 @@
-"""One stimulated roll-out from a snapshot: what a worker process does."""
+"""One stimulated roll-out from a start state."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pdtui.core.angles import wrap_angle
+from pdtui.core.angles import wrap_angle, wrap_angles
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.units import NO_STIMULATION, Stimulation
@@ -23,11 +23,11 @@ class ControllerPlan:
     """A stimulation whose strength a controller sets at each control step.
 
     Attributes:
-        units: what to overwrite, and with how much for each unit of the controller's output.
+        units: units to overwrite, each with its value per unit of the controller's output.
         pid: the controller and the attribute that it holds.
-        target: where, in the attribute's unit.
-        relative: whether the target counts from the attribute's value at the start.
-        base: outputs at which the controller's output is 0, in the order of `units`; empty for zeros.
+        target: target of the attribute, in its unit.
+        relative: whether the target is relative to the attribute's value at the start.
+        base: values added to those, in the order of `units`; empty for zeros.
     """
 
     units: Stimulation
@@ -39,18 +39,18 @@ class ControllerPlan:
 
 RolloutPlan = Stimulation | ControllerPlan
 RolloutJob = tuple[RolloutPlan, int]
-"""A plan, and the number of the start that it begins from."""
+"""A plan and the index of its start."""
 
 
 class RolloutOutcome(NamedTuple):
-    """What one roll-out shows.
+    """What one roll-out measures.
 
     Attributes:
-        means: mean of each attribute over the measured steps that the robot lived through, shape (J,); for
-            an angle the mean change since the start, unwrapped. NaN where it fell before them.
-        error: mean distance from the target over the measured steps, NaN for a fixed stimulation.
+        means: mean of each attribute over the measured steps up to a fall, shape (J,); for an angle, the mean
+            change since the start, unwrapped. NaN if the robot fell before the measured steps.
+        error: mean distance from the target over the measured steps; NaN for a fixed stimulation.
         steps_survived: control steps until the robot fell, or all of them.
-        fell: whether it fell, or the simulation diverged.
+        fell: whether the robot fell or the simulation diverged.
     """
 
     means: Floats
@@ -62,15 +62,15 @@ class RolloutOutcome(NamedTuple):
 def run_rollout(
     robot: Robot, policy: Policy, start: StartState, plan: RolloutPlan, steps: int, measure_from: int
 ) -> RolloutOutcome:
-    """Stimulate from a snapshot on, and measure the later part.
+    """Run a policy with stimulation from a start state, and measure the later part.
 
     Args:
-        robot: the world; its state and the policy's are replaced by the start's, bit-exactly.
-        policy: acts with its mean action.
-        start: where to begin.
+        robot: restored to the start state, bit for bit.
+        policy: likewise; acts with its mean action.
+        start: state to start from.
         plan: what to overwrite.
-        steps: control steps.
-        measure_from: first step that counts.
+        steps: number of control steps.
+        measure_from: first step that is measured.
     """
     robot.restore(start.snapshot)
     policy.restore(start.policy_state)
@@ -92,7 +92,7 @@ def run_rollout(
         values, previous = robot.read_attributes(), values
         steps_survived += 1
         change = values - previous
-        turned[angles] += (change[angles] + np.pi) % (2 * np.pi) - np.pi
+        turned[angles] += wrap_angles(change[angles])
         if step >= measure_from:
             total += np.where(angles, turned, values)
             counted += 1

@@ -1,4 +1,4 @@
-"""What single units do to attributes, measured by roll-outs."""
+"""Effects of single units on attributes, measured by roll-outs."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from pdtui.core.attributes import Floats
 
 @dataclass(frozen=True)
 class UnitEffects:
-    """Effect curves of N units at D values from K starts.
+    """Effects of N units, overwritten with D values from K starts, on J attributes.
 
     Attributes:
-        units: flat indices.
-        values: the outputs v.
-        effects: shape (N, D, K, J), as in `PlanEffects`.
-        falls: shape (N, D, K).
-        unperturbed: shape (K, J).
+        units: flat indices of the units.
+        values: the values v with which each unit is overwritten.
+        effects: change of each attribute against the unperturbed roll-out, shape (N, D, K, J), as in
+            `PlanEffects`.
+        falls: whether the robot fell, shape (N, D, K).
+        unperturbed: means of the attributes without stimulation, shape (K, J).
     """
 
     units: tuple[int, ...]
@@ -30,38 +31,38 @@ class UnitEffects:
     unperturbed: Floats
 
     def robust_effects(self, column: int, sign: float) -> Floats:
-        """The weakest effect in one direction over all starts, shape (N, D); 0 where the robot fell.
+        """Return the weakest effect over all starts in the direction of `sign`, shape (N, D).
 
-        Negative where at least one start went the other way.
+        It is negative where the effect from a start has the other sign, and at most 0 where the robot fell.
         """
         weakest = np.min(sign * np.nan_to_num(self.effects[..., column]), axis=-1)
         result: Floats = np.where(self.falls.any(axis=-1), np.minimum(weakest, 0.0), weakest)
         return result
 
     def robust_strengths(self, column: int) -> Floats:
-        """How far each unit moves an attribute, whichever way: its best value's robust effect, shape (N,)."""
+        """Return the largest robust effect of each unit over its values and both directions, shape (N,)."""
         both = np.maximum(self.robust_effects(column, 1.0), self.robust_effects(column, -1.0))
-        reach: Floats = np.maximum(both.max(axis=1), 0.0)
-        return reach
+        strengths: Floats = np.maximum(both.max(axis=1), 0.0)
+        return strengths
 
     def mean_strengths(self, column: int, values: Sequence[float]) -> Floats:
-        """How far each unit moves an attribute on average over the starts, at its best of some values.
+        """Return the largest mean effect of each unit over the starts, in size, at some values, shape (N,).
 
-        Unlike `strength` it does not ask for one sign from every start, so it ranks weak units too. A fall
-        counts as no effect. Shape (N,).
+        Unlike `robust_strengths` it does not require one sign from every start, so it ranks weak units too.
+        A fall counts as no effect.
         """
         doses = [self.values.index(value) for value in values]
-        alive = np.where(self.falls, 0.0, np.nan_to_num(self.effects[..., column]))[:, doses]
-        furthest: Floats = np.abs(alive.mean(axis=-1)).max(axis=1)
-        return furthest
+        effects = np.where(self.falls, 0.0, np.nan_to_num(self.effects[..., column]))[:, doses]
+        strengths: Floats = np.abs(effects.mean(axis=-1)).max(axis=1)
+        return strengths
 
     def safe_magnitude(self, unit: int) -> float:
-        """The largest |v| of a unit up to which the robot never fell, 0 if there is none."""
+        """Return the largest |v| of a unit up to which the robot never fell; 0 if there is none."""
         row = self.units.index(unit)
-        alive = 0.0
+        safe = 0.0
         for value in sorted({abs(value) for value in self.values}):
             columns = [number for number, v in enumerate(self.values) if abs(v) == value]
             if self.falls[row, columns].any():
                 break
-            alive = value
-        return alive
+            safe = value
+        return safe

@@ -1,4 +1,4 @@
-"""Step 3, match: which unit's spectrogram is nearest to an attribute's."""
+"""Step 3, match: the distance between the spectrograms of units and attributes."""
 
 from __future__ import annotations
 
@@ -16,26 +16,25 @@ from pdtui.spectra.monitor import MonitoredEpisode
 from pdtui.spectra.scaled_series import BLOCK, attribute_series, map_unit_blocks, unit_series, usable_episodes
 from pdtui.spectra.spectrogram import short_time_transform, spectrogram
 
-# Expanding the square of a difference cancels digits of near matches. Below this part of the summed squares
-# the difference itself is taken: what is left then has a relative error under 1e-9.
+# ``|a|² + |b|² − 2ab`` loses digits where a and b are close. Below this share of ``|a|² + |b|²`` the
+# difference itself is squared, so that relative errors stay under 1e-9.
 _NEAR = 1e-6
 
 
 @dataclass(frozen=True)
 class Discrepancies:
-    """Discrepancies of every pair of attribute and unit.
+    """Discrepancies of J attributes and U units.
 
     Attributes:
-        discrepancy: mean over the episodes used, shape (J, U); NaN where a flaw leaves the attribute or the
-            unit out.
-        level_share: part of the squared distance that lies in the bins that a constant fills, in [0, 1], mean
-            over episodes, shape (J, U). Near 1, the match is one of mean levels (and of anything slower
-            than those bins), not of movement.
-        used: seeds of the episodes that count.
+        discrepancy: mean over the episodes used, shape (J, U); NaN if the attribute or the unit is left out.
+        level_share: share of the squared distance in the bins that a constant fills, in [0, 1], mean over the
+            episodes, shape (J, U). Near 1, mean levels (and anything slower than those bins) are compared
+            rather than movement.
+        used: seeds of the episodes used.
         skipped: (seed, steps) of the episodes that are shorter than one window.
-        flaws: what is wrong with an attribute, by its name: not finite (left out), or constant (kept, but
-            its spectrum says only at what level it stands; left out where the preset leaves nothing of it).
-        unit_flaws: the same of units, by flat index: one that never fires is constant.
+        flaws: what is wrong with attributes, by name: not finite (left out), or constant (kept, although only
+            its level can match, unless the preset removes levels).
+        unit_flaws: the same for units, by flat index; a unit that never fires is constant.
     """
 
     discrepancy: Floats
@@ -46,7 +45,7 @@ class Discrepancies:
     unit_flaws: dict[int, str] = field(default_factory=dict)
 
     def ranked_units(self, column: int) -> NDArray[np.intp]:
-        """Units by discrepancy with one attribute, the nearest first; empty for an attribute left out."""
+        """Return the units by discrepancy with one attribute, nearest first; none if it is left out."""
         row = self.discrepancy[column]
         return np.argsort(row, kind="stable")[: int(np.isfinite(row).sum())]
 
@@ -58,15 +57,16 @@ def match_units(
     *,
     block: int = BLOCK,
 ) -> Discrepancies:
-    """``Dis(z, s) = ‖SG_z − SG_s‖₂`` over all frequencies and windows, averaged over episodes (section 3.2).
+    """Compute ``Dis(z, s) = ‖SG_z − SG_s‖₂`` of all units z and attributes s (section 3.2).
 
-    Time grows linearly in units, attributes and episodes, memory by one block of units for each core.
+    The norm is over all frequencies and windows, and its mean is taken over the episodes. Time grows linearly
+    with units, attributes and episodes; memory grows by one block of units per core.
 
     Args:
-        episodes: unstimulated roll-outs.
-        attributes: of the robot; their scales apply.
-        preset: of the spectrum.
-        block: units at a time; no result depends on it beyond rounding.
+        episodes: unstimulated episodes.
+        attributes: the robot's attributes, with their scales.
+        preset: choices of the method.
+        block: units per block, which results depend on only by rounding.
 
     Raises:
         PolicyError: no episode is as long as one window.
@@ -108,12 +108,12 @@ def match_units(
 
 
 class _Spectra:
-    """Spectrograms of many series of one episode, flat, and their squared norms."""
+    """Flattened spectrograms of the series of one episode, and their squared norms."""
 
     @np.errstate(invalid="ignore", over="ignore")
     def __init__(self, series: NDArray[Any], preset: MatchingPreset) -> None:
         whole = spectrogram(short_time_transform(series, preset), preset)
-        # A copy of the few level bins is cheaper than a second pass over all.
+        # Copying the few level bins is cheaper than a second pass over all bins.
         self.level = whole[:, :, : preset.level_bins].reshape(len(whole), -1)
         counted = whole[:, :, preset.first_bin :]
         self.all = counted.reshape(len(whole), -1)
@@ -122,9 +122,9 @@ class _Spectra:
         self.level_squares = np.einsum("nk,nk->n", self.level, self.level)
 
 
-@np.errstate(invalid="ignore", over="ignore")  # what is not finite is named in the flaws
+@np.errstate(invalid="ignore", over="ignore")  # flaws report what is not finite
 def _compare(targets: _Spectra, units: _Spectra) -> tuple[Floats, Floats]:
-    """Distances and level shares of one episode, shape (J, B) each; no share where levels do not count."""
+    """Return distances and level shares of one episode, shape (J, B) each; shares are NaN without levels."""
     sums = targets.squares[:, None] + units.squares
     total = sums - 2.0 * (targets.all @ units.all.T)
     level = targets.level_squares[:, None] + units.level_squares - 2.0 * (targets.level @ units.level.T)

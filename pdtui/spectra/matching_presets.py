@@ -14,36 +14,35 @@ from pdtui.core.errors import PdtuiError
 
 Window = Literal["blackman", "hann", "hamming", "rectangular"]
 
-
-# A window is a sum of so many cosines, and a constant fills as many bins from frequency 0 up.
+# Each window is a sum of this many cosines, and a constant fills as many bins from frequency 0 up.
 _COSINE_TERMS: dict[Window, int] = {"blackman": 3, "hann": 2, "hamming": 2, "rectangular": 1}
 
 
 @dataclass(frozen=True)
 class MatchingPreset:
-    """Every choice that the method leaves open; `pdtui.spectra.matching_presets` lists what each may be.
+    """The choices that the method leaves open.
 
-    Windows are the periodic variant and lie wholly inside the series: window d starts at sample ``d·hop``
-    and nothing is padded. The transform is divided by the window's sum, so that a constant c has |STFT| = c
-    in the bin of frequency 0; every distance then scales alike and no rank changes.
+    Windows are periodic and lie wholly inside the series: window d starts at sample ``d·hop``, and nothing is
+    padded. The transform is divided by the sum of the window, so that a constant c has |STFT| = c at
+    frequency 0. This scales all distances alike and changes no rank.
 
     Attributes:
-        name: how the command line calls it.
+        name: name on the command line.
         window: shape of the window.
-        length: of the window, samples.
-        hop: between windows, samples.
+        length: length of the window, samples.
+        hop: distance between the starts of windows, samples.
         spectrogram: ``power`` |STFT|² (section 3.2), or ``magnitude`` |STFT| (the authors' released code).
-        scaling: of the series before the transform: ``observed``, attributes as the policy observes them;
-            ``raw``, in their physical units; ``standardised``, attributes and units less their mean, in parts
-            of their standard deviation over all episodes.
-        level: ``kept``, or ``removed``: a distance then leaves out the bins that a constant fills.
+        scaling: scale of the series before the transform: ``observed``, attributes as the policy observes
+            them; ``raw``, attributes in their physical units; ``standardised``, attributes and units minus
+            their mean and divided by their standard deviation over all episodes.
+        level: ``kept``, or ``removed`` to leave the bins that a constant fills out of distances.
         angles: ``unwrapped`` over time, or ``wrapped`` to (−π, π].
-        predominant: frequency at which phases are compared: the strongest of ``any``, as in the paper (for an
-            attribute that is mostly mean level it is 0, and the "phase" the sign of the unit's mean), or the
-            strongest ``moving`` one, above the bins that a constant fills.
-        phase_mean: which ρ the conclusions go by. Both are reported; ``plain`` is the paper's, but means
-            nothing for phases near ±π.
-        changed: what differs from the preset of this name, as ``NAME=VALUE``.
+        predominant: frequency at which phases are compared: ``any``, the strongest of all as in the paper
+            (for an attribute that is mostly mean level this is 0, and its "phase" the sign of the unit's
+            mean), or ``moving``, the strongest above the bins that a constant fills.
+        phase_mean: the ρ on which conclusions rest; both are reported. ``plain`` is the paper's, but is
+            meaningless for phases near ±π.
+        changed: differences from the preset of this name, as ``NAME=VALUE``.
     """
 
     name: str
@@ -63,7 +62,7 @@ class MatchingPreset:
 
     @property
     def weights(self) -> Floats:
-        """The window divided by its sum, shape (length,)."""
+        """The window, divided by its sum, shape (length,)."""
         window: Floats = get_window(self.window, self.length)
         window /= window.sum()
         return window
@@ -75,12 +74,12 @@ class MatchingPreset:
 
     @property
     def level_bins(self) -> int:
-        """How many bins, from frequency 0 up, a constant fills with this window."""
+        """Number of bins, from frequency 0 up, that a constant fills with this window."""
         return _COSINE_TERMS[self.window]
 
     @property
     def first_bin(self) -> int:
-        """Lowest bin that a distance counts."""
+        """Lowest bin that distances include."""
         return self.level_bins if self.level == "removed" else 0
 
     @property
@@ -89,7 +88,7 @@ class MatchingPreset:
         return self.level_bins if self.predominant == "moving" or self.level == "removed" else 0
 
     def frequencies(self, dt: float) -> Floats:
-        """Frequency of each bin in Hz, shape (F,), for samples `dt` seconds apart."""
+        """Return the frequency of each bin in Hz for samples `dt` seconds apart, shape (F,)."""
         frequencies: Floats = np.asarray(np.fft.rfftfreq(self.length, dt), np.float64)
         return frequencies
 
@@ -106,7 +105,7 @@ _RANGES = {"length": (4, 65536), "hop": (1, 65536)}
 
 
 def preset_options() -> dict[str, tuple[str, ...] | tuple[int, int]]:
-    """What can be set: for each name its values, or the lowest and highest of a number of samples."""
+    """Return for each choice its possible values, or its lowest and highest number of samples."""
     hints = get_type_hints(MatchingPreset)
     named = {
         name: tuple(get_args(hint))
@@ -117,20 +116,20 @@ def preset_options() -> dict[str, tuple[str, ...] | tuple[int, int]]:
 
 
 def preset_values(preset: MatchingPreset) -> dict[str, Any]:
-    """Every choice by the name under which it can be set."""
+    """Return the choices of a preset by name."""
     everything = asdict(preset)
     return {name: everything[name] for name in everything if name in preset_options()}
 
 
 def find_preset(name: str, settings: Sequence[str] = ()) -> MatchingPreset:
-    """A preset by its name, with some of its choices changed.
+    """Return a preset by name, with some of its choices changed.
 
     Args:
         name: ``paper`` or ``authors``.
-        settings: ``NAME=VALUE`` each; the last of a name counts.
+        settings: changes, each ``NAME=VALUE``; the last one of a name counts.
 
     Raises:
-        PdtuiError: there is no preset or choice of that name, or the choice cannot be that.
+        PdtuiError: there is no such preset or choice, or the choice does not allow that value.
     """
     if name not in PRESETS:
         raise PdtuiError(f"unknown preset '{name}'; there are {', '.join(PRESETS)}")
@@ -149,8 +148,8 @@ def find_preset(name: str, settings: Sequence[str] = ()) -> MatchingPreset:
 
 
 def describe_preset_options() -> str:
-    """One line that lists every name and its values."""
-    return "; ".join(f"{name}={_listed(name)}" for name in preset_options())
+    """Return one line that lists all choices and their values."""
+    return "; ".join(f"{name}={_describe_values(name)}" for name in preset_options())
 
 
 def _parse(setting: str) -> tuple[str, str | int]:
@@ -162,14 +161,14 @@ def _parse(setting: str) -> tuple[str, str | int]:
     if name in _RANGES:
         low, high = _RANGES[name]
         if not value.isdecimal() or not low <= int(value) <= high:
-            raise PdtuiError(f"setting '{name}': expected {_listed(name)}, got '{value}'")
+            raise PdtuiError(f"setting '{name}': expected {_describe_values(name)}, got '{value}'")
         return name, int(value)
     if value not in preset_options()[name]:
-        raise PdtuiError(f"setting '{name}': expected {_listed(name)}, got '{value}'")
+        raise PdtuiError(f"setting '{name}': expected {_describe_values(name)}, got '{value}'")
     return name, value
 
 
-def _listed(name: str) -> str:
+def _describe_values(name: str) -> str:
     if name in _RANGES:
         low, high = _RANGES[name]
         return f"{low}…{high} samples"

@@ -1,4 +1,4 @@
-"""Step 1, monitor: roll the policy out unstimulated and record every hidden unit and kinematic attribute."""
+"""Step 1, monitor: run the policy without stimulation and record all hidden units and attributes."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ StepProgress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class MonitoredEpisode:
-    """One unstimulated roll-out.
+    """One episode without stimulation.
 
     Row t holds one control step: the activations with which the policy chose the action, and the attributes
-    of the state that this action led to (so a torque stands beside the activations that commanded it).
+    of the state that this action led to, so that a torque is beside the activations that commanded it.
 
     Attributes:
-        seed: of the reset.
-        activations: outputs after the activation functions, shape (T, U).
-        attributes: in their physical units, shape (T, J). An attribute that wraps (a yaw) is unwrapped: its
-            jumps at ±π are no motion of the robot, but would dominate its spectrum.
-        ended: why the episode ended before T, empty where it did not.
+        seed: seed of the reset.
+        activations: outputs of the hidden units after their activation functions, shape (T, U).
+        attributes: in their physical units, shape (T, J). Angles are unwrapped, because their jumps at ±π are
+            no motion of the robot but would dominate the spectrum.
+        ended: why the episode ended early; empty if it did not.
     """
 
     seed: int
@@ -38,21 +38,21 @@ class MonitoredEpisode:
 
     @property
     def steps(self) -> int:
-        """Control steps recorded."""
+        """Number of control steps recorded."""
         return len(self.activations)
 
 
 def monitor_episodes(
     robot: Robot, policy: Policy, seeds: Sequence[int], steps: int, progress: StepProgress | None = None
 ) -> list[MonitoredEpisode]:
-    """Roll the policy out once a seed, with its mean action and no stimulation (section 3.2, "monitoring").
+    """Run one episode per seed with the policy's mean action and no stimulation (section 3.2, "monitoring").
 
     Args:
-        robot: the world; it is reset.
-        policy: acts.
-        seeds: one of each episode (the paper: five).
-        steps: T, at most; an episode ends earlier where the robot does.
-        progress: called with (episodes done, episodes).
+        robot: the robot; it is reset.
+        policy: the policy.
+        seeds: one seed per episode; the paper uses five.
+        steps: largest number of control steps per episode.
+        progress: called with the number of episodes finished and of all episodes.
     """
     episodes = []
     for seed in seeds:

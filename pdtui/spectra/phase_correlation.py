@@ -15,21 +15,22 @@ from pdtui.spectra.scaled_series import BLOCK, attribute_series, map_unit_blocks
 from pdtui.spectra.spectrogram import Complexes, short_time_transform, spectrogram
 
 DISAGREE = 0.1
-"""Difference of the plain and the circular ρ from which both are reported."""
+"""Difference between the plain and the circular ρ above which both are reported."""
 _SILENT = 1e-12
+"""Product of two amplitudes at or below which there is no phase: far below any signal, above rounding."""
 
 
 @dataclass(frozen=True)
 class PhaseCorrelations:
-    """Correlations of every pair of attribute and unit.
+    """Correlations ρ of J attributes with U units.
+
+    Both are NaN for a unit or attribute that has no amplitude, and so no phase, at the predominant frequency.
 
     Attributes:
         bins: predominant bin of each attribute, shape (J,).
-        plain: ρ from the plain mean of the wrapped phase differences, as in the paper, shape (J, U). A phase
-            near ±π flips between the two ends, and the plain mean of such phases means nothing.
+        plain: ρ from the plain mean of the wrapped phase differences, as in the paper, shape (J, U). Phases
+            near ±π alternate between the two ends, which makes their plain mean meaningless.
         circular: ρ from the circular mean (the angle of the mean phasor), shape (J, U).
-
-    Both are NaN for a unit or attribute that is silent at the predominant frequency: it has no phase.
     """
 
     bins: NDArray[np.intp]
@@ -37,7 +38,7 @@ class PhaseCorrelations:
     circular: Floats
 
     def rho(self, preset: MatchingPreset) -> Floats:
-        """The one that the preset goes by, shape (J, U)."""
+        """Return the ρ that the preset selects, shape (J, U)."""
         return self.plain if preset.phase_mean == "plain" else self.circular
 
     @property
@@ -47,7 +48,7 @@ class PhaseCorrelations:
 
 
 def phase_correlation(phase: Floats) -> Floats:
-    """``ρ = 1 − |2p| / π`` (section 3.2): 1 in phase, −1 in antiphase, 0 in quadrature; p in rad."""
+    """Return ``ρ = 1 − |2p| / π`` (section 3.2): 1 in phase, −1 in antiphase, 0 in quadrature; p in rad."""
     return 1.0 - np.abs(2.0 * phase) / np.pi
 
 
@@ -58,19 +59,19 @@ def correlate_phases(
     *,
     block: int = BLOCK,
 ) -> PhaseCorrelations:
-    """Sign and strength with which units go along with attributes.
+    """Compute with which sign and how closely units follow attributes.
 
     The predominant frequency ``ω* = argmax_ω Σ_d SG(d, ω | s)`` sums over the windows of all episodes. The
     phase difference at ω* is wrapped to (−π, π] and averaged over all windows of all episodes.
 
     Args:
-        episodes: unstimulated roll-outs, at least one of a window's length (`match` says so where none is).
-        attributes: of the robot; their scales apply.
-        preset: of the spectrum.
-        block: units at a time.
+        episodes: unstimulated episodes; at least one has to be one window long, which `match_units` checks.
+        attributes: the robot's attributes, with their scales.
+        preset: choices of the method.
+        block: units per block.
     """
     used = usable_episodes(episodes, preset)
-    with np.errstate(invalid="ignore", over="ignore"):  # matching names what is not finite
+    with np.errstate(invalid="ignore", over="ignore"):  # match_units reports what is not finite
         targets = [
             short_time_transform(series, preset) for series in attribute_series(used, attributes, preset)
         ]
@@ -94,7 +95,7 @@ def correlate_phases(
 
 @np.errstate(invalid="ignore", over="ignore")
 def _correlate(units: Complexes, waves: Complexes) -> tuple[Floats, Floats]:
-    """Both ρ of B units, shape (B, D, J), and the attributes, shape (J, D); shape (J, B) each."""
+    """Return both ρ, shape (J, B) each, of units, shape (B, D, J), and attributes, shape (J, D)."""
     plain = np.full((len(waves), len(units)), np.nan)
     circular = plain.copy()
     for row, wave in enumerate(waves):
@@ -102,9 +103,9 @@ def _correlate(units: Complexes, waves: Complexes) -> tuple[Floats, Floats]:
         size = np.abs(product)
         heard = (size > _SILENT) & np.isfinite(size)
         difference = np.angle(product)
-        # np.angle gives −π for a negative real with imaginary part −0; the wrap's interval is (−π, π].
+        # np.angle returns −π for a negative real with imaginary part −0, but phases are in (−π, π].
         difference[difference == -np.pi] = np.pi
-        # The unit phasor of the difference, without taking an angle's sine and cosine back.
+        # The sum of unit phasors, without the sine and cosine of the angles.
         phasor = np.divide(product, size, out=np.zeros_like(product), where=heard).sum(axis=1)
         count = heard.sum(axis=1)
         known = count > 0

@@ -1,4 +1,4 @@
-"""The recorded series as matching compares them: scaled as the preset says, a block of units at a time."""
+"""The recorded series, scaled as the preset says, in blocks of units."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.monitor import MonitoredEpisode
 
-# Spectra of so many units and one episode of 1000 steps (2 MB) stay in a core's own cache.
+# Units per block: the spectra of 64 units over one episode of 1000 steps (2 MB) fit into a core's own cache.
 BLOCK = 64
 _Result = TypeVar("_Result")
 
 
 def usable_episodes(episodes: Sequence[MonitoredEpisode], preset: MatchingPreset) -> list[MonitoredEpisode]:
-    """The episodes that hold at least one window."""
+    """Return the episodes that are at least one window long."""
     return [episode for episode in episodes if episode.steps >= preset.length]
 
 
 def attribute_series(
     episodes: Sequence[MonitoredEpisode], attributes: Sequence[Attribute], preset: MatchingPreset
 ) -> list[Floats]:
-    """The attributes of each episode, shape (T, J) each, at the scale at which they are compared."""
+    """Return the scaled attributes of each episode, shape (T, J) each."""
     series = [np.array(episode.attributes, np.float64) for episode in episodes]
     if preset.angles == "wrapped":
         for column, attribute in enumerate(attributes):
@@ -47,7 +47,7 @@ def attribute_series(
 def unit_series(
     episodes: Sequence[MonitoredEpisode], units: slice, preset: MatchingPreset
 ) -> list[NDArray[Any]]:
-    """Some units of each episode, shape (T, B) each, at the scale at which they are compared."""
+    """Return the scaled activations of B units of each episode, shape (T, B) each."""
     series = [episode.activations[:, units] for episode in episodes]
     return _standardised(series) if preset.scaling == "standardised" else series
 
@@ -55,19 +55,19 @@ def unit_series(
 def map_unit_blocks(
     work: Callable[[slice], _Result], units: int, block: int = BLOCK
 ) -> Iterator[tuple[slice, _Result]]:
-    """Do some work for every block of units, on every core; memory grows by a block for each of them.
+    """Call a function with each block of units, on all cores; memory grows by one block per core.
 
     Args:
-        work: called with a block; numpy and scipy let go of the interpreter's lock, so threads are enough.
-        units: how many there are.
-        block: units at a time.
+        work: called with a block; numpy and scipy release the interpreter's lock, so threads are enough.
+        units: number of units.
+        block: units per block.
 
     Returns:
-        each block and its result, in order.
+        The blocks and their results, in order.
     """
     blocks = [slice(low, min(low + block, units)) for low in range(0, units, block)]
     threads = min(os.cpu_count() or 1, max(1, len(blocks)))
-    # Threads of the matrix products beside these would only wait for each other.
+    # More threads within the matrix products would only wait for these.
     with ThreadPoolExecutor(threads) as pool, _libraries().limit(limits=1, user_api="blas"):
         yield from zip(blocks, pool.map(work, blocks), strict=True)
 
@@ -80,7 +80,7 @@ def _libraries() -> ThreadpoolController:
 def _standardised(series: Sequence[NDArray[Any]]) -> list[Floats]:
     together = np.concatenate(series).astype(np.float64)
     mean, spread = together.mean(axis=0), together.std(axis=0)
-    # The mean of equal numbers is not exactly that number: a series that never moves is all zeros.
+    # The mean of equal numbers is not exactly that number; a constant series has to become all zeros.
     still = np.ptp(together, axis=0) == 0
     mean[still], spread[still] = together[0, still], 1.0
     return [(values - mean) / spread for values in series]

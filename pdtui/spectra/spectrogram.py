@@ -1,4 +1,4 @@
-"""Step 2, spectrum: the short-time Fourier transform of every series."""
+"""Step 2, spectrum: the short-time Fourier transform of each series."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ Complexes = NDArray[np.complex128]
 
 
 def short_time_transform(series: NDArray[Any], preset: MatchingPreset) -> Complexes:
-    """Short-time Fourier transform of many series at once.
+    """Return the short-time Fourier transform of N series.
 
     ``STFT(d, ω) = Σ_t w(t) x(d·hop + t) exp(−iωt) / Σ_t w(t)``, so phases count from each window's start.
 
     Args:
         series: shape (T, N).
-        preset: window, length and hop.
+        preset: sets window, length and hop.
 
     Returns:
-        shape (N, D, F): D whole windows, none where T is shorter than a window.
+        The transform in D whole windows and F bins, shape (N, D, F); D is 0 if T is shorter than a window.
     """
     if len(series) < preset.length:
         return np.empty((series.shape[1], 0, preset.bins), np.complex128)
-    # One series after the other: the transform then reads memory in order.
+    # With one series after the other, the transform reads memory in order. It costs as much as scipy's
+    # ShortTimeFFT, whose result would still have to be transposed to (N, D, F).
     samples = np.ascontiguousarray(series.T, np.float64)
     windows = sliding_window_view(samples, preset.length, axis=1)[:, :: preset.hop]
     spectra: Complexes = scipy.fft.rfft(windows * preset.weights, axis=-1, overwrite_x=True)
@@ -37,7 +38,7 @@ def short_time_transform(series: NDArray[Any], preset: MatchingPreset) -> Comple
 
 
 def spectrogram(spectra: Complexes, preset: MatchingPreset) -> Floats:
-    """``SG = |STFT|²`` (``power``, section 3.2) or ``|STFT|`` (``magnitude``), shape (N, D, F)."""
+    """Return ``SG = |STFT|²`` (``power``, section 3.2) or ``|STFT|`` (``magnitude``), shape (N, D, F)."""
     power: Floats = np.square(spectra.real)
     power += np.square(spectra.imag)
     return power if preset.spectrogram == "power" else np.sqrt(power, out=power)
