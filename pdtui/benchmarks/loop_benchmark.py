@@ -82,8 +82,8 @@ def _actions(loop: ControlLoop, seed: int, steps: int) -> list[np.ndarray]:
     actions = []
     for _ in range(steps):
         actions.append(loop.policy.act(observation).action)
-        observation, _, terminated, _, _ = loop.robot.step(actions[-1])
-        if terminated:
+        observation, _, terminated, truncated, _ = loop.robot.step(actions[-1])
+        if terminated or truncated:
             observation, _ = loop.robot.reset()
             loop.policy.reset()
     return actions
@@ -93,7 +93,8 @@ def _bare(loop: ControlLoop, seed: int, actions: list[np.ndarray]) -> float:
     loop.robot.reset(seed=seed)
     start = time.perf_counter()
     for action in actions:
-        if loop.robot.step(action)[2]:
+        _, _, terminated, truncated, _ = loop.robot.step(action)
+        if terminated or truncated:
             loop.robot.reset()
     return len(actions) / (time.perf_counter() - start)
 

@@ -52,9 +52,10 @@ class StepRecord(NamedTuple):
         digest: of the simulator's state after the step.
         ended: why the episode ended with this step, empty if it did not.
         diverged: whether the simulation cannot go on.
-        finished: whether the robot's task is done, though it can go on.
+        finished: whether the robot's task is done; where `ended` is empty, the robot can go on.
         obstacles: in the robot's way, as `Robot.obstacles`, shape (N, 3): the same array in every step of a
             world, which is not recorded.
+        fell: whether the episode ended with a fall: neither finished nor out of time.
     """
 
     step: int
@@ -74,3 +75,4 @@ class StepRecord(NamedTuple):
     diverged: bool = False
     finished: bool = False
     obstacles: Floats = NO_OBSTACLES
+    fell: bool = False

@@ -19,7 +19,7 @@ from pdtui.core.robot_data import RobotState
 from pdtui.core.step_record import StepRecord
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.recurrent_state import PolicyState
-from pdtui.robots.robot import Robot
+from pdtui.robots.robot import Robot, is_fall
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.stimulation.latch import Latch
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -107,8 +107,8 @@ class ControlLoop:
     def advance(self, events: Sequence[Event] = ()) -> StepRecord:
         """Apply the events, then run one control step.
 
-        A robot that fell in the step before starts its next episode first. A simulation that diverges gives
-        a record that says so; the loop cannot go on after it.
+        Where the episode ended with the step before, the next one starts first. A simulation that diverges
+        gives a record that says so; the loop cannot go on after it.
 
         Raises:
             EventError: an event that does not fit the map or the present state.
@@ -126,15 +126,16 @@ class ControlLoop:
             self._observation = self.robot.observe()
         behaviors = self.latch.active
         acted = self.policy.act(self._observation, stimulation, self._noise)
-        diverged, ended, reward, cost, finished = False, "", 0.0, 0.0, False
+        diverged, fell, ended, reward, cost, finished = False, False, "", 0.0, 0.0, False
         try:
             self._observation, gained, terminated, truncated, details = self.robot.step(acted.action)
             reward, cost = float(gained), float(details["cost"])
             finished = bool(details.get("finished", False))
+            fell = is_fall(terminated, details)
             if terminated or truncated:
                 ended = str(details.get("reason", "the episode is over"))
         except SimulationDiverged as error:
-            diverged, ended = True, str(error)
+            diverged, fell, ended = True, True, str(error)
         self.attributes = self.robot.read_attributes()
         record = StepRecord(
             self.step,
@@ -154,6 +155,7 @@ class ControlLoop:
             diverged,
             finished,
             self.robot.obstacles,
+            fell,
         )
         self.step += 1
         self.latch.end_step()

@@ -28,7 +28,7 @@ class DriveSummary:
     Attributes:
         steps: control steps.
         seconds: simulated time, s.
-        falls: episodes that ended.
+        falls: episodes that ended with a fall.
         involvement: control steps in which a key was pressed.
         mean: mean of every attribute, by name.
     """
@@ -115,7 +115,7 @@ def drive_headless(
             if recorder is not None:
                 recorder.write(record)
             done += 1
-            falls += bool(record.ended)
+            falls += record.fell
             involvement += any(event.key for event in record.events)
             total += record.attributes
             if reason := ended():

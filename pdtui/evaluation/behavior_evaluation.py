@@ -161,7 +161,7 @@ def _run_job(loop: ControlLoop, job: _Job) -> BehaviorRun | TaskRun:
 def run_behavior(built: ControlLoop, name: str, seed: int) -> BehaviorRun:
     """Run one episode with a behavior, or with the policy alone where the name is empty.
 
-    If the robot falls, the mean is over the steps from `STIMULATED_FROM` to the fall.
+    If the episode ends early, the mean is over the steps from `STIMULATED_FROM` to its end.
     """
     loop = ControlLoop(built.robot, built.policy, built.map, seed)
 
@@ -170,9 +170,9 @@ def run_behavior(built: ControlLoop, name: str, seed: int) -> BehaviorRun:
 
     records = list(run_episode(loop, STEPS, press))
     rows = [record.attributes for record in records]
-    fell = bool(records[-1].ended)
-    window = rows[min(STIMULATED_FROM, len(rows) - 1) :] if fell else rows[-WINDOW:]
-    return BehaviorRun(np.mean(window, axis=0), fell)
+    ended = bool(records[-1].ended)
+    window = rows[min(STIMULATED_FROM, len(rows) - 1) :] if ended else rows[-WINDOW:]
+    return BehaviorRun(np.mean(window, axis=0), records[-1].fell)
 
 
 def _summarise(

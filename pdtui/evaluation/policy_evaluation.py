@@ -72,7 +72,7 @@ def evaluate_policy(
         seconds = loop.step * loop.robot.control_dt
         net_speeds += (np.linalg.norm(record.poses[:1, :2] - start, axis=1) / seconds).tolist()
         returns.append(total)
-        finished += not record.ended
+        finished += not record.fell
         if progress is not None:
             progress(done, len(seeds))
     return PolicyEvaluation(

@@ -65,9 +65,9 @@ def run_task(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bo
     before = loop.attributes
     records = list(run_episode(loop, walk + task.steps, press))
     rows = [before, *(record.attributes for record in records)]
-    fell = bool(records[-1].ended)
+    fell = records[-1].fell
     if len(rows) <= walk + 1:
-        return TaskRun(TaskVerdict(False, 0.0, {}), True)
+        return TaskRun(TaskVerdict(False, 0.0, {}), fell)
     return TaskRun(_judge(task, loop, np.array(rows), walk, fell), fell)
 
 

@@ -91,7 +91,7 @@ def evaluate_command_following(
         asked.append(wanted)
         errors.append(np.abs(settled - wanted).mean(axis=0))
         biases.append(np.abs(settled.mean(axis=0) - wanted))
-        finished += not records[-1].ended
+        finished += not records[-1].fell
         if progress is not None:
             progress(done, len(seeds))
     rows = []

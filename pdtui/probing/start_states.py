@@ -86,10 +86,10 @@ def _length(robot: Robot, policy: Policy, seed: int, most: int) -> int:
     policy.reset()
     for step in range(most):
         try:
-            observation, _, terminated, _, _ = robot.step(policy.act(observation).action)
+            observation, _, terminated, truncated, _ = robot.step(policy.act(observation).action)
         except SimulationDiverged:
             return step
-        if terminated:
+        if terminated or truncated:
             # The state after the last step is a fall, so a walk that does without it is a step shorter.
             return step
     return most
@@ -101,10 +101,10 @@ def _walk(robot: Robot, policy: Policy, seed: int, at: int, survive: int) -> Sta
     start = StartState(seed, 0, robot.snapshot(), policy.snapshot()) if at == 0 else None
     for step in range(1, at + survive + 1):
         try:
-            observation, _, terminated, _, _ = robot.step(policy.act(observation).action)
+            observation, _, terminated, truncated, _ = robot.step(policy.act(observation).action)
         except SimulationDiverged:
             return None
-        if terminated:
+        if terminated or truncated:
             return None
         if step == at:
             start = StartState(seed, at, robot.snapshot(), policy.snapshot())

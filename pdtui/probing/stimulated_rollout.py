@@ -13,7 +13,7 @@ from pdtui.core.errors import SimulationDiverged
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.start_states import StartState
-from pdtui.robots.robot import Robot
+from pdtui.robots.robot import Robot, is_fall
 from pdtui.stimulation.pid_magnitude import PidMagnitude
 from pdtui.stimulation.stimulation_map import PidGains
 
@@ -46,10 +46,10 @@ class RolloutOutcome(NamedTuple):
     """What one roll-out measures.
 
     Attributes:
-        means: mean of each attribute over the measured steps up to a fall, shape (J,); for an angle, the mean
-            change since the start, unwrapped. NaN if the robot fell before the measured steps.
+        means: mean of each attribute over the measured steps of the episode, shape (J,); for an angle, the mean
+            change since the start, unwrapped. NaN if it ended before the measured steps.
         error: mean distance from the target over the measured steps; NaN for a fixed stimulation.
-        steps_survived: control steps until the robot fell, or all of them.
+        steps_survived: control steps until the episode ended, or all of them.
         fell: whether the robot fell or the simulation diverged.
     """
 
@@ -85,7 +85,8 @@ def run_rollout(
         if controller is not None:
             stimulation = controller.stimulate(values)
         try:
-            observation, _, fell, _, _ = robot.step(policy.act(observation, stimulation).action)
+            action = policy.act(observation, stimulation).action
+            observation, _, terminated, truncated, info = robot.step(action)
         except SimulationDiverged:
             fell = True
             break
@@ -97,11 +98,12 @@ def run_rollout(
             total += np.where(angles, turned, values)
             counted += 1
             errors += controller.distance(values) if controller is not None else 0.0
-        if fell:
+        if terminated or truncated:
+            fell = is_fall(terminated, info)
             break
     means = total / counted if counted else np.full(len(angles), np.nan)
     error = errors / counted if counted and controller is not None else float("nan")
-    return RolloutOutcome(means, error, steps_survived, bool(fell))
+    return RolloutOutcome(means, error, steps_survived, fell)
 
 
 class _Controller:

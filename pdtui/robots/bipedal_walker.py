@@ -61,13 +61,13 @@ class FlatBipedalWalker(stock.BipedalWalker):
     def step(self, action: NDArray[np.float32]) -> Any:
         observation, reward, terminated, truncated, info = super().step(action)
         x = float(self.hull.position.x)
-        finished = x > FINISH
+        finished = x > FINISH and not self.game_over
         if self.game_over:
             info["reason"] = "fell: the hull touched the ground"
         elif not 0.0 <= x <= _GROUND:
-            terminated, info["reason"] = True, "walked off the end of the ground"
+            terminated, finished, info["reason"] = True, False, "walked off the end of the ground"
         elif terminated and finished:
-            terminated = False
+            terminated = False  # stock Gymnasium ends the episode at the finish
         return observation, reward, terminated, truncated, {**info, "finished": finished}
 
     def _generate_terrain(self, hardcore: bool) -> None:

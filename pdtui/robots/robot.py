@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -18,12 +19,18 @@ from pdtui.robots.task import Task, find_task
 from pdtui.robots.training_recipe import TrainingRecipe
 
 
+def is_fall(terminated: bool, info: Mapping[str, Any]) -> bool:
+    """Return whether a step of a robot ended with a fall: it terminated, but not because the task is done."""
+    return bool(terminated) and not info.get("finished", False)
+
+
 class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     """A Gymnasium environment with named attributes, link poses and a snapshot.
 
-    `step` puts ``cost`` (float) into its info and, when the episode ends, ``reason`` (str). Where the
-    robot's task is done although it can go on, ``finished`` is true: training and scores end there, a drive
-    does not.
+    `step` puts ``cost`` (float) into its info and, when the episode ends, ``reason`` (str). An episode that
+    terminates ends with a fall, unless ``finished`` (bool) in the info says that the robot's task is done. A
+    robot that has finished without terminating can go on: training and scores end there, a drive does not. An
+    episode that is truncated has run out of time. Nobody steps a robot past the end of its episode.
 
     Attributes:
         name: as maps, sessions and the command line call it.

@@ -18,7 +18,7 @@ class RunTrace:
     Attributes:
         attributes: of the robot.
         walked: their values at each control step before the behavior was latched, shape (W, J).
-        values: from then on, shape (T, J), angles unwrapped; it ends where the robot fell.
+        values: from then on, shape (T, J), angles unwrapped; it ends where the episode did.
         fell: whether it fell.
     """
 

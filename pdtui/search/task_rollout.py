@@ -11,7 +11,7 @@ from pdtui.core.attributes import Floats, unwrap_angles
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy
-from pdtui.robots.robot import Robot
+from pdtui.robots.robot import Robot, is_fall
 from pdtui.robots.task import RunTrace, Task, TaskVerdict
 
 
@@ -39,16 +39,16 @@ def judge_stimulations(
 ) -> list[TaskVerdict]:
     """Judge each plan from the same walk.
 
-    The walk is unstimulated; where it falls before its end, no plan has done its task.
+    The walk is unstimulated; where it ends before its time, no plan has done its task.
     """
     options = {"start": task.start} if task.start else None
     observation, _ = robot.reset(seed=seed, options=options)
     policy.reset()
     walked = [robot.read_attributes()]
     for _ in range(walk_steps(task, seed)):
-        observation, _, fell, _, _ = robot.step(policy.act(observation).action)
+        observation, _, terminated, truncated, _ = robot.step(policy.act(observation).action)
         walked.append(robot.read_attributes())
-        if fell:
+        if terminated or truncated:
             return [TaskVerdict(False, 0.0, {}) for _ in plans]
     start, state = robot.snapshot(), policy.snapshot()
     verdicts = []
@@ -68,12 +68,13 @@ def _watch(
         on = plan.steps is None or step < plan.steps
         acted = policy.act(observation, plan.stimulation if on else NO_STIMULATION)
         try:
-            observation, _, fell, _, _ = robot.step(acted.action)
+            observation, _, terminated, truncated, info = robot.step(acted.action)
         except SimulationDiverged:
             fell = True
             break
         values.append(robot.read_attributes())
-        if fell:
+        if terminated or truncated:
+            fell = is_fall(terminated, info)
             break
     rows = np.array(values).reshape(-1, len(robot.attributes))
-    return RunTrace(robot.attributes, np.array(walked), unwrap_angles(rows, robot.attributes), bool(fell))
+    return RunTrace(robot.attributes, np.array(walked), unwrap_angles(rows, robot.attributes), fell)

@@ -124,14 +124,18 @@ def drive_targets(built: ControlLoop, drive: TrackingDrive) -> TrackingDriveResu
     loop = ControlLoop(built.robot, built.policy, wanted, drive.seed)
     column = built.robot.attribute_index(drive.attribute)
     path = np.full(1 + len(drive.targets) * STEPS_EACH, np.nan)
-    fell = any(loop.advance().ended for _ in range(STEPS_UNTOUCHED))
-    if not fell:
+    for _ in range(STEPS_UNTOUCHED):
+        record = loop.advance()
+        if record.ended:
+            break
+    fell = record.fell
+    if not record.ended:
         path[0] = loop.attributes[column]
         for number in range(len(path) - 1):
             record = loop.advance(_events(loop.step, drive, number))
             path[number + 1] = record.attributes[column]
-            fell = bool(record.ended)
-            if fell:
+            fell = record.fell
+            if record.ended:
                 break
     return _summed_up(drive, path, fell, built.robot.attributes[column].wraps, built.robot.control_dt)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.robot_data import RobotState
-from pdtui.robots.robot import Robot
+from pdtui.robots.robot import Robot, is_fall
 from pdtui.training.sac import TransitionBatch
 
 Actor = Callable[[NDArray[np.float32]], NDArray[np.float32]]
@@ -40,13 +40,14 @@ class WorldBatch:
         after, reward, discount = before.copy(), np.zeros(len(before)), np.ones(len(before))
         for index, robot in enumerate(self.robots):
             try:
-                observation, gained, terminated, _, info = robot.step(actions[index])
+                observation, gained, terminated, truncated, info = robot.step(actions[index])
             except SimulationDiverged:
-                observation, gained, terminated, info = before[index].astype(np.float64), 0.0, True, {}
+                observation, gained, info = before[index].astype(np.float64), 0.0, {}
+                terminated, truncated = True, False
             self.ages[index] += 1
             after[index], reward[index], discount[index] = observation, float(gained), float(not terminated)
             over = self.ages[index] >= robot.episode_steps or info.get("finished", False)
-            self.restarted[index] = terminated or over
+            self.restarted[index] = terminated or truncated or over
             if self.restarted[index]:
                 observation, self.ages[index] = robot.reset()[0], 0
             self.observations[index] = observation
@@ -79,21 +80,21 @@ def score_actor(make: Callable[[], Robot], actor: Actor, seeds: range, steps: in
     observations = np.array([robot.reset(seed=s)[0] for robot, s in zip(robots, seeds, strict=True)])
     speed_column = robots[0].attribute_index("speed")
     returns, speeds, lengths = np.zeros(len(robots)), [0.0] * len(robots), np.zeros(len(robots))
-    fallen, finished = np.zeros(len(robots), bool), np.zeros(len(robots), bool)
+    fallen, over = np.zeros(len(robots), bool), np.zeros(len(robots), bool)
     for _ in range(steps):
         actions = actor(observations.astype(np.float32))
-        for index in np.flatnonzero(~(fallen | finished)):
+        for index in np.flatnonzero(~over):
             robot = robots[index]
             try:
-                observation, reward, terminated, _, info = robot.step(actions[index])
+                observation, reward, terminated, truncated, info = robot.step(actions[index])
             except SimulationDiverged:
-                fallen[index] = True
+                fallen[index] = over[index] = True
                 continue
             observations[index] = observation
             returns[index] += float(reward)
             speeds[index] += float(robot.read_attributes()[speed_column])
             lengths[index] += 1
-            fallen[index] = terminated
-            finished[index] = info.get("finished", False)
+            fallen[index] = is_fall(terminated, info)
+            over[index] = terminated or truncated or info.get("finished", False)
     mean_speed = float(np.mean(np.array(speeds) / np.maximum(lengths, 1)))
     return ActorScore(len(robots), float(returns.mean()), float(returns.std()), mean_speed, int(fallen.sum()))

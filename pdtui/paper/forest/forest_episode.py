@@ -92,7 +92,7 @@ def drive_forest_episode(
         events += record.events
         if distances[-1] >= AHEAD:
             break
-    return _sum_up(loop.seed, rewards, costs, distances, events, bool(record.ended)), tuple(events)
+    return _sum_up(loop.seed, rewards, costs, distances, events, record.fell), tuple(events)
 
 
 def record_forest_episode(
@@ -199,11 +199,11 @@ def drive_with_random_keys(loop: ControlLoop, steps: int) -> ObservedDrive:
             order = order or [int(one) for one in rng.permutation(len(keys)) if one != latched]
             latched = order.pop(0)
             until = step + int(rng.integers(*_HELD))
-        ended = loop.advance(key_events([keys[latched]] if pressed else [], loop)).ended
+        record = loop.advance(key_events([keys[latched]] if pressed else [], loop))
         places.append(where())
         choices.append(latched)
-        if ended:
-            return ObservedDrive(np.array(places), np.array(choices), True)
+        if record.ended:
+            return ObservedDrive(np.array(places), np.array(choices), record.fell)
     return ObservedDrive(np.array(places), np.array(choices), False)
 
 

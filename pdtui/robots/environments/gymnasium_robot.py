@@ -145,7 +145,8 @@ class GymnasiumRobot(Robot):
         """Advance the environment.
 
         An environment that truncates by itself is taken at its word, since it may not go on; the time limits
-        of registrations are not applied (see `make_environment`).
+        of registrations are not applied (see `make_environment`). It has finished where its info says so by
+        ``finished`` or by ``is_success``, as many environments do.
 
         Raises:
             RobotError: the action is not one of the environment's.
@@ -160,6 +161,7 @@ class GymnasiumRobot(Robot):
         self._see(observation)
         self._check_finite()
         details = {**info, "cost": number_of(info.get("cost", 0.0)) or 0.0}
+        details["finished"] = bool(info.get("finished", info.get("is_success", False)))
         if terminated or truncated:
             details["reason"] = str(info.get("reason", _ENDED))
         return self.observe(), self.reward, bool(terminated), bool(truncated), details
@@ -249,19 +251,20 @@ class GymnasiumRobot(Robot):
             self.env.action_space.seed(0)
             actions = [as_vector(self.env.action_space, self.env.action_space.sample()) for _ in range(24)]
             self.reset(seed=0)
-            for action in actions[:4]:
-                self.step(action)
+            if self._follow(actions[:4])[1]:
+                self.reset(seed=0)
             snapshot, first = self.snapshot(), self._follow(actions[4:])
             self.restore(snapshot)
             return self._follow(actions[4:]) == first
         except Exception:  # whatever an environment raises that cannot be copied
             return False
 
-    def _follow(self, actions: list[NDArray[np.float32]]) -> list[int]:
+    def _follow(self, actions: list[NDArray[np.float32]]) -> tuple[list[int], bool]:
+        """A digest of each step, up to the end of the episode, and whether it ended."""
         digests = []
         for action in actions:
-            ended = self.step(action)[2]
-            digests.append(digest_of(self._observation, self.reward, ended))
-            if ended:
-                break
-        return digests
+            _, _, terminated, truncated, _ = self.step(action)
+            digests.append(digest_of(self._observation, self.reward, terminated, truncated))
+            if terminated or truncated:
+                return digests, True
+        return digests, False
