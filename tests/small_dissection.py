@@ -9,7 +9,7 @@ import torch
 from pdtui.dissection.dissection_settings import DissectionSettings
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import save_network
-from pdtui.search.behavior_search_settings import BehaviorSearchSettings
+from pdtui.search.behavior_search import BehaviorSearchSettings
 from pdtui.search.controller_search import ControllerSearchSettings
 from pdtui.search.imprint_candidates import ImprintSettings
 

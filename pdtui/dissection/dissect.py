@@ -15,7 +15,7 @@ from pdtui.core.units import Stimulation, parse_unit
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
 from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_searches import DissectionSearches, TimeBudget
+from pdtui.dissection.dissection_searches import DissectionSearches
 from pdtui.dissection.probe_starts import gather_probe_starts
 from pdtui.dissection.sample_episode import pick_sample_episode
 from pdtui.policies.runtime.live_network import policy_from_network
@@ -25,6 +25,7 @@ from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots import open_robot
+from pdtui.search.plan_search import TimeBudget
 from pdtui.sessions.environment_versions import collect_versions
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_preset
@@ -101,7 +102,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             stage("up and down"),
         )
         searches = DissectionSearches(
-            prober, robot, settings, seed, TimeBudget(began, config.budget_minutes), stage, known
+            prober, robot, settings, seed, TimeBudget(config.budget_minutes, began), stage, known
         )
         behaviors, controllers = searches.run(screen, refined, starts.searches)
         return Dissection(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from pdtui.search.behavior_search_settings import BehaviorSearchSettings
+from pdtui.search.behavior_search import BehaviorSearchSettings
 from pdtui.search.controller_search import ControllerSearchSettings
 from pdtui.search.imprint_candidates import ImprintSettings
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from pdtui.core.units import Stimulation, parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.task import mean_figures
+from pdtui.search.plan_search import TimeBudget
 from pdtui.search.task_rollout import TimedStimulation
 from pdtui.search.task_search import TaskSearch, TaskSearchResult, TaskSearchSettings
 from pdtui.stimulation.map_reader import load_map
@@ -92,9 +92,8 @@ def search_task_into_map(
         if known is not None:
             known.check(robot, pool.policy.layers, pool.policy.sha256)
         begin = [] if known is None else _known(known, task, pool)
-        until = time.monotonic() + 60.0 * minutes
-        pursuit = TaskSearch(pool, wanted, seed, settings)
-        result = pursuit.run(begin, lambda: time.monotonic() >= until, progress)
+        search = TaskSearch(pool, wanted, seed, settings, begin)
+        result = search.run(TimeBudget(minutes).share(), progress)
         dt, addressed = pool.robot.control_dt, result.plan.stimulation.by_address(pool.policy.layers)
         if known is None:
             _new_map(output, robot, pool.policy.name, pool.policy.sha256, import_options)

@@ -1,4 +1,4 @@
-"""What a behavior is meant to reach, and the score by which candidates for it are compared."""
+"""Which goals a robot can reach, and the score by which stimulations are compared for a goal."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from pdtui.robots.robot import Robot
 from pdtui.robots.robot_goals import BehaviorGoal
 
 STANDING = 0.1
-"""m/s; whoever is slower stands already."""
+"""Speed up to which a robot counts as standing, m/s."""
 _QUANTILE = 0.2
-_FALL = 2.0
-_DOUBLING = 0.02
+_FALL_PENALTY = 2.0
+_DOUBLING_PENALTY = 0.02
+"""Penalty for each doubling of the units: it decides between plans that are otherwise as good."""
 
 
 def reachable_goals(robot: Robot, unperturbed: Floats) -> tuple[BehaviorGoal, ...]:
-    """The behaviors of a robot's goals whose attributes it has; no stop for one that stands.
+    """Return the behavior goals whose attributes a robot has, without the stop if the robot stands.
 
     Args:
-        robot: declares its goals.
-        unperturbed: means of its attributes without stimulation, shape (K, J).
+        robot: the robot, which declares its goals.
+        unperturbed: means of the attributes without stimulation, shape (K, J).
     """
     means = dict(zip((one.name for one in robot.attributes), unperturbed.mean(axis=0).tolist(), strict=True))
     return tuple(
@@ -35,10 +36,10 @@ def reachable_goals(robot: Robot, unperturbed: Floats) -> tuple[BehaviorGoal, ..
 
 
 def goal_gains(goal: BehaviorGoal, column: int, result: PlanEffects) -> Floats:
-    """How far each plan goes the goal's way from each start, shape (S, K).
+    """Return how far each plan moves the attribute towards the goal from each start, shape (S, K).
 
-    In the attribute's unit; for a stop, the share of the unperturbed mean that is gone. A roll-out that fell
-    gains nothing, however far it was thrown.
+    The gain is in the attribute's unit; for a stop it is the share by which the mean shrinks. A roll-out that
+    ends in a fall gains nothing.
     """
     if goal.aim.direction == "stop":
         unperturbed = result.unperturbed[:, column]
@@ -47,25 +48,26 @@ def goal_gains(goal: BehaviorGoal, column: int, result: PlanEffects) -> Floats:
         )
     else:
         gain = result.effects[..., column] * goal.aim.sign
-    lost: Floats = np.where(result.falls | ~np.isfinite(gain), np.minimum(np.nan_to_num(gain), 0.0), gain)
-    return lost
+    gains: Floats = np.where(result.falls | ~np.isfinite(gain), np.minimum(np.nan_to_num(gain), 0.0), gain)
+    return gains
 
 
 def goal_scores(goal: BehaviorGoal, column: int, result: PlanEffects, units: Sequence[int]) -> Floats:
-    """Score of each plan, in parts of what is enough; 1 is a behavior that works, shape (S,).
+    """Return the score of each plan in multiples of the gain that is enough, shape (S,).
 
-    Halfway between the mean of the gains over the starts and their lower fifth, because a behavior has to
-    work from any state, and a search has to see that it gets nearer; less twice the share of falls, and a
-    little for every doubling of the units.
+    The score is the average of the gains' mean and lower quintile over the starts: a behavior has to work
+    from any state, but a search also has to see progress. Twice the share of falls and a little for every
+    doubling of the units are subtracted.
 
     Args:
-        goal: what is aimed at.
-        column: of the goal's attribute.
-        result: the plans, probed.
-        units: how many units each plan overwrites.
+        goal: the goal.
+        column: column of the goal's attribute.
+        result: measured effects of the plans.
+        units: number of units that each plan overwrites.
     """
     gain = goal_gains(goal, column, result)
     sure = 0.5 * (gain.mean(axis=1) + np.quantile(gain, _QUANTILE, axis=1)) / goal.enough
     doublings = np.log2(np.maximum(np.array(units, np.float64), 1.0))
-    value: Floats = sure - _FALL * result.falls.mean(axis=1) - _DOUBLING * doublings
-    return value
+    penalties = _FALL_PENALTY * result.falls.mean(axis=1) + _DOUBLING_PENALTY * doublings
+    scores: Floats = sure - penalties
+    return scores

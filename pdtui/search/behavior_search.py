@@ -1,9 +1,11 @@
-"""Search for the units, as few as it takes, and their outputs, that reach a goal."""
+"""Search for a few units, and their outputs, that reach a goal."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from math import inf
 
 import numpy as np
 
@@ -15,11 +17,36 @@ from pdtui.probing.start_states import StartState
 from pdtui.probing.unit_effects import UnitEffects
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.behavior_goals import goal_gains, goal_scores
-from pdtui.search.behavior_search_settings import BehaviorSearchSettings
+from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionSettings, SearchProblem
 from pdtui.search.shared_candidates import SharedCandidates
 from pdtui.search.stimulation_sampler import StimulationSampler
 from pdtui.spectra.monitor import StepProgress
 from pdtui.stimulation.stimulation_map import MeasuredEffect
+
+
+@dataclass(frozen=True, kw_only=True)
+class BehaviorSearchSettings(EvolutionSettings):
+    """How much a search for a behavior does.
+
+    Attributes:
+        random_sets: random pairs and triples of units, probed once and shared by all goals.
+        single_units: best single units, each at its best value, that the search begins with.
+        quick_starts, quick_steps: start states and control steps of the quick score of a child,
+        full_starts, full_steps: and of the full one.
+        final_steps: control steps of the final score and of the held-out figures.
+        satisfied: score at which a round ends early.
+        safe: score from which no round with more units follows; it exceeds 1 because the full score flatters.
+    """
+
+    random_sets: int = 240
+    single_units: int = 40
+    quick_starts: int = 3
+    quick_steps: int = 110
+    full_starts: int = 8
+    full_steps: int = 240
+    final_steps: int = 300
+    satisfied: float = 1.8
+    safe: float = 1.25
 
 
 @dataclass(frozen=True)
@@ -27,17 +54,17 @@ class BehaviorSearchResult:
     """The best stimulation for a goal.
 
     Attributes:
-        goal: what it is for.
+        goal: the goal.
         stimulation: units and outputs v.
-        score: on the held-out starts, in parts of what is enough (see `goals.score`).
-        search_score: on the starts that the search saw; higher by what it owes to luck.
-        change: of the attribute itself on the held-out starts, with its interval and the falls.
-        gain: mean over the held-out starts with its interval, as in `goals.gains`.
-        success: share of the held-out starts on which it gained enough without a fall.
-        falls: share of the held-out starts on which the robot fell.
-        value: mean of the attribute while stimulated, held out.
-        unperturbed: its mean without.
-        rollouts: roll-outs that the search took.
+        score: score from the held-out starts, see `goal_scores`.
+        search_score: score from the starts that the search saw, which is partly luck.
+        change: change of the attribute from the held-out starts, with its interval and the falls.
+        gain: mean gain over the held-out starts with its interval, see `goal_gains`.
+        success: share of the held-out starts from which the gain was enough, without a fall.
+        falls: share of the held-out starts from which the robot fell.
+        value: mean of the attribute with the stimulation, from the held-out starts.
+        unperturbed: mean of the attribute without it.
+        rollouts: number of roll-outs of the search.
     """
 
     goal: BehaviorGoal
@@ -54,160 +81,107 @@ class BehaviorSearchResult:
 
     @property
     def reached(self) -> bool:
-        """Whether it does what the goal asks, on starts that the search never saw: surely enough to ship."""
+        """Whether the stimulation reaches the goal reliably enough to become a behavior of a map."""
         return self.success >= 0.5 and self.gain.effect >= self.goal.enough and self.falls <= 0.2
 
 
 @dataclass(frozen=True)
 class SearchStartStates:
-    """Snapshots for the three stages of a search; no walk is in two of them."""
+    """Start states of the three stages of a search; no two stages share a walk."""
 
     search: tuple[StartState, ...]
     selection: tuple[StartState, ...]
     held_out: tuple[StartState, ...]
 
 
+@dataclass(frozen=True)
 class BehaviorSearch:
-    """Seeded evolutionary search, from single units and random sets to the set that reaches a goal.
+    """Search for the stimulation that reaches a goal, beginning with single units, random sets and imprints.
 
-    Each generation is looked at quickly from a few starts; the most promising are probed longer and from
-    more of them. A round that ends short of the goal is followed by one that may use more units.
-
-    Args:
-        prober: measures.
+    Attributes:
+        prober: runs the roll-outs.
         goal: what to reach.
-        column: of the goal's attribute.
-        starts: of the three stages.
-        seed: of every random choice.
+        column: column of the goal's attribute.
+        starts: start states of the stages.
+        sweeps: effect curves of single units, a later one from more starts.
+        shared: candidates that were probed for all goals.
+        seed: seed of every random choice.
         settings: how much to do.
     """
 
-    def __init__(
-        self,
-        prober: EffectProbe,
-        goal: BehaviorGoal,
-        column: int,
-        starts: SearchStartStates,
-        seed: int,
-        settings: BehaviorSearchSettings,
-    ) -> None:
-        self._prober, self._goal, self._column = prober, goal, column
-        self._starts, self._settings, self._seed = starts, settings, seed
-        self._seen: set[Stimulation] = set()
-        self._elite: list[tuple[float, Stimulation]] = []
-        self._began = prober.pool.rollouts
+    prober: EffectProbe
+    goal: BehaviorGoal
+    column: int
+    starts: SearchStartStates
+    sweeps: Sequence[UnitEffects]
+    shared: SharedCandidates
+    seed: int
+    settings: BehaviorSearchSettings
 
-    def run(
-        self,
-        sweeps: Sequence[UnitEffects],
-        pool: SharedCandidates,
-        deadline: Callable[[], bool],
-        progress: StepProgress | None = None,
-    ) -> BehaviorSearchResult:
-        """Search, select on other starts, and score the winner on held-out ones.
+    def run(self, deadline: Deadline, progress: StepProgress | None = None) -> BehaviorSearchResult:
+        """Search, and measure the best stimulation from the held-out starts.
 
         Args:
-            sweeps: single units, probed; the search starts from them,
-            pool: and from these.
-            deadline: says when time is up.
+            deadline: asked between generations.
             progress: called with (generations done, generations).
         """
-        settings, source = self._settings, self._candidates(sweeps)
-        total = settings.generations * len(settings.max_units)
-        # Nothing stops more than wholly: a stop's score has an end, and the search must know it.
-        end = 1.0 / self._goal.enough if self._goal.aim.direction == "stop" else float("inf")
-        satisfied, safe = min(settings.satisfied, 0.96 * end), min(settings.safe, 0.92 * end)
-        for round_, most in enumerate(settings.max_units):
-            first = self._best_single_units(sweeps) if round_ == 0 else []
-            self._generation([*first, *pool.best(self._goal, self._column, settings.children, most)])
-            idle = 0
-            for number in range(settings.generations):
-                if progress is not None:
-                    progress(round_ * settings.generations + number, total)
-                best = self._elite[0][0]
-                if best >= satisfied or idle >= settings.patience or deadline():
-                    break
-                self._generation([self._child(source, most) for _ in range(settings.children)])
-                idle = 0 if self._elite[0][0] > best + 0.01 else idle + 1
-            if self._elite[0][0] >= safe:
-                break
-        if progress is not None:
-            progress(total, total)
-        return self._finish()
+        began, settings, starts = self.prober.pool.rollouts, self.settings, self.starts
+        quick, full = starts.search[: settings.quick_starts], starts.search[: settings.full_starts]
+        # A stop has a best possible score, since nothing stops more than entirely.
+        limit = 1.0 / self.goal.enough if self.goal.aim.direction == "stop" else inf
+        problem = SearchProblem(
+            first=self._first_plans,
+            vary=StimulationSampler(self._unit_weights(), settings.bounds, self.seed).vary,
+            quick=partial(self._score, starts=quick, steps=settings.quick_steps),
+            full=partial(self._score, starts=full, steps=settings.full_steps),
+            final=partial(self._score, starts=starts.selection, steps=settings.final_steps),
+            satisfied=min(settings.satisfied, 0.96 * limit),
+            safe=min(settings.safe, 0.92 * limit),
+        )
+        search_score, stimulation = EvolutionarySearch(problem, settings).run(deadline, progress)
+        return self._measure(stimulation, search_score, began)
 
-    def _best_single_units(self, sweeps: Sequence[UnitEffects]) -> list[Stimulation]:
-        """Single units and values that went the goal's way from every start, the best first."""
-        scored: dict[Stimulation, float] = {}
-        for sweep in sweeps:
-            robust = sweep.robust_effects(self._column, self._sign)
-            for (row, dose), gain in _entries(robust):
-                # Where a later sweep probed the same again from more starts, it decides.
-                scored[Stimulation((sweep.units[row],), (sweep.values[dose],))] = gain
-        # One value a unit and sign of v is enough: the search scales it itself.
-        best: dict[tuple[int, bool], tuple[float, Stimulation]] = {}
-        for atom, gain in scored.items():
-            key = (atom.units[0], atom.values[0] > 0)
-            if key not in best or gain > best[key][0]:
-                best[key] = (gain, atom)
-        ranked = sorted(best.values(), key=lambda pair: (-pair[0], pair[1].units, pair[1].values))
-        return [atom for _, atom in ranked[: self._settings.single_units]]
-
-    def _candidates(self, sweeps: Sequence[UnitEffects]) -> StimulationSampler:
-        """Draws units twice as often as others where screening saw them go the goal's way, on average."""
-        weights = np.zeros(self._prober.pool.policy.units)
-        for sweep in sweeps:
-            mean = self._sign * np.nan_to_num(sweep.effects[..., self._column]).mean(axis=-1)
-            np.maximum.at(weights, np.array(sweep.units), np.maximum(mean.max(axis=1), 0.0))
-        weights += weights.mean() or 1.0
-        return StimulationSampler(weights, self._settings.bounds, self._seed)
-
-    @property
-    def _sign(self) -> float:
-        return self._goal.aim.sign
-
-    def _child(self, source: StimulationSampler, most: int) -> Stimulation:
-        """A changed or crossed elite that was not tried before."""
-        elite = [plan for _, plan in self._elite]
-        most = min(most, self._prober.pool.policy.units)
-        child = elite[0]
-        for _ in range(20):
-            parent = source.choose_parent(elite)
-            if source.rng.random() < 0.25:
-                child = source.cross_over(parent, source.choose_parent(elite), most)
-            else:
-                child = source.mutate(parent, most)
-            if child not in self._seen:
-                break
-        return child
-
-    def _generation(self, candidates: Sequence[Stimulation]) -> None:
-        fresh = list(dict.fromkeys(plan for plan in candidates if plan not in self._seen))
-        if not fresh:
-            return
-        self._seen.update(fresh)
-        settings = self._settings
-        first = self._score(fresh, self._starts.search[: settings.quick_starts], settings.quick_steps)
-        promoted = [fresh[index] for index in np.argsort(-first, kind="stable")[: settings.promoted]]
-        second = self._score(promoted, self._starts.search[: settings.full_starts], settings.full_steps)
-        self._elite += zip(second.tolist(), promoted, strict=True)
-        self._elite.sort(key=lambda pair: -pair[0])
-        del self._elite[settings.elite :]
-
-    def _probe(self, plans: Sequence[Stimulation], starts: Sequence[StartState], steps: int) -> PlanEffects:
-        # The first third is the transient: evaluation leaves it out too.
-        return self._prober.measure_plans(plans, starts, steps=steps, measure_from=steps // 3)
+    def _first_plans(self, round_: int) -> list[Stimulation]:
+        """Return the best shared candidates of the round's size, and in the first round single units."""
+        settings = self.settings
+        singles = self._best_single_units() if round_ == 0 else []
+        largest = settings.max_units[round_]
+        return [*singles, *self.shared.best(self.goal, self.column, settings.children, largest)]
 
     def _score(self, plans: Sequence[Stimulation], starts: Sequence[StartState], steps: int) -> Floats:
         units = [len(plan.units) for plan in plans]
-        return goal_scores(self._goal, self._column, self._probe(plans, starts, steps), units)
+        return goal_scores(self.goal, self.column, self._probe(plans, starts, steps), units)
 
-    def _finish(self) -> BehaviorSearchResult:
-        settings, column = self._settings, self._column
-        finalists = [plan for _, plan in self._elite[: settings.finalists]]
-        selected = self._score(finalists, self._starts.selection, settings.final_steps)
-        best = finalists[int(np.argmax(selected))]
-        held = self._probe([best], self._starts.held_out, settings.final_steps)
-        gain = goal_gains(self._goal, column, held)[0]
+    def _probe(self, plans: Sequence[Stimulation], starts: Sequence[StartState], steps: int) -> PlanEffects:
+        # The first third is the transient, which evaluation leaves out as well.
+        return self.prober.measure_plans(plans, starts, steps=steps, measure_from=steps // 3)
+
+    def _best_single_units(self) -> list[Stimulation]:
+        """Return single units at values that moved the attribute the goal's way from every start."""
+        gains: dict[tuple[int, float], float] = {}
+        for sweep in self.sweeps:
+            for (row, dose), gain in np.ndenumerate(sweep.robust_effects(self.column, self.goal.aim.sign)):
+                # A later sweep measured from more starts, so it overrides an earlier one.
+                gains[sweep.units[row], sweep.values[dose]] = float(gain)
+        # One value per unit and sign is enough: the search scales it.
+        best: dict[tuple[int, bool], tuple[int, float]] = {}
+        for unit, value in sorted(gains, key=lambda single: -gains[single]):
+            best.setdefault((unit, value > 0), (unit, value))
+        ranked = sorted(best.values(), key=lambda single: (-gains[single], single))
+        return [Stimulation((unit,), (value,)) for unit, value in ranked[: self.settings.single_units]]
+
+    def _unit_weights(self) -> Floats:
+        """Return how often to draw each unit: more often the further it moved the attribute in the sweeps."""
+        weights = np.zeros(self.prober.pool.policy.units)
+        for sweep in self.sweeps:
+            means = self.goal.aim.sign * np.nan_to_num(sweep.effects[..., self.column]).mean(axis=-1)
+            np.maximum.at(weights, np.array(sweep.units), np.maximum(means.max(axis=1), 0.0))
+        return weights + (weights.mean() or 1.0)
+
+    def _measure(self, best: Stimulation, search_score: float, began: int) -> BehaviorSearchResult:
+        column = self.column
+        held = self._probe([best], self.starts.held_out, self.settings.final_steps)
+        gain = goal_gains(self.goal, column, held)[0]
         low, high = bootstrap_interval(gain, 0)
         effects, falls = held.effects[0, :, column], held.falls[0]
         change = MeasuredEffect(
@@ -217,20 +191,15 @@ class BehaviorSearch:
             len(falls),
         )
         return BehaviorSearchResult(
-            goal=self._goal,
+            goal=self.goal,
             stimulation=best,
-            score=float(goal_scores(self._goal, column, held, [len(best.units)])[0]),
-            search_score=self._elite[[plan for _, plan in self._elite].index(best)][0],
+            score=float(goal_scores(self.goal, column, held, [len(best.units)])[0]),
+            search_score=search_score,
             change=change,
             gain=MeasuredEffect(float(gain.mean()), low, high),
-            success=float(np.mean((gain >= self._goal.enough) & ~held.falls[0])),
+            success=float(np.mean((gain >= self.goal.enough) & ~held.falls[0])),
             falls=float(held.falls[0].mean()),
             value=float(np.nanmean(held.means[0, :, column])),
             unperturbed=float(held.unperturbed[:, column].mean()),
-            rollouts=self._prober.pool.rollouts - self._began,
+            rollouts=self.prober.pool.rollouts - began,
         )
-
-
-def _entries(table: Floats) -> list[tuple[tuple[int, int], float]]:
-    rows, columns = table.shape
-    return [((row, column), float(table[row, column])) for row in range(rows) for column in range(columns)]

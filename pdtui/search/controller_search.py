@@ -1,9 +1,10 @@
-"""Search for a unit through which a PID controller holds an attribute at a target."""
+"""Search for units through which a PID controller holds an attribute at a target."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -14,10 +15,12 @@ from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import ControllerPlan
 from pdtui.probing.unit_effects import UnitEffects
+from pdtui.search.plan_search import Deadline, ScoringStage, select_plans
 from pdtui.search.stimulation_sampler import round_to_three_digits
 from pdtui.stimulation.stimulation_map import PidGains
 
-_FALL = 2.0
+_FALL_PENALTY = 2.0
+"""Penalty for a fall, in multiples of the typical error."""
 
 
 @dataclass(frozen=True)
@@ -25,14 +28,14 @@ class ControllerSearchResult:
     """The best controller for an attribute.
 
     Attributes:
-        weights: units, and how much of the controller's output each is overwritten with.
-        base: what is added to it, in the order of the units.
-        pid: gains.
+        weights: units, with the factor from the controller's output to each unit's output.
+        pid: gains of the controller.
         error: mean distance from the targets over the held-out starts, in the attribute's unit.
         uncontrolled: the same distance without stimulation.
         falls: share of the held-out roll-outs on which the robot fell.
-        targets: those that it was measured at.
-        relative: whether they count from the value at the start.
+        targets: targets of the measurement.
+        relative: whether they are offsets from the value at the start.
+        base: outputs of the units where the controller's output is 0; empty for zeros.
     """
 
     weights: Stimulation
@@ -46,19 +49,19 @@ class ControllerSearchResult:
 
     @property
     def holds(self) -> bool:
-        """Whether it more than halves the distance and seldom falls."""
+        """Whether the controller at least halves the distance and the robot seldom falls."""
         return self.error < 0.5 * self.uncontrolled and self.falls <= 0.1
 
 
 @dataclass(frozen=True)
 class ControllerSearchSettings:
-    """How much a search does.
+    """How much a search for a controller does.
 
     Attributes:
-        units: tried alone.
-        pairs: opposite plans on the same units, tried as the two ends of a controller's range.
-        finalists: that the second stage decides between.
-        steps, final_steps: control steps of either stage.
+        units: number of units to try alone.
+        pairs: number of pairs of opposite plans to try as the two ends of a controller's range.
+        finalists: candidates that the second stage decides between.
+        steps, final_steps: control steps of a roll-out in the first and the second stage.
     """
 
     units: int = 10
@@ -70,13 +73,12 @@ class ControllerSearchSettings:
 
 @dataclass(frozen=True)
 class ControllerGoal:
-    """What is to be held.
+    """An attribute to hold, and where.
 
     Attributes:
-        attribute: its name. An angle integrates by itself; of anything else an integral gain is tried, which
-            it needs to settle where the output is not zero.
-        targets: to reach, in the attribute's unit.
-        relative: whether they count from the value at the start.
+        attribute: name of the attribute.
+        targets: targets, in the attribute's unit.
+        relative: whether they are offsets from the value at the start.
     """
 
     attribute: str
@@ -85,7 +87,7 @@ class ControllerGoal:
 
     @property
     def spread(self) -> float:
-        """Size of the errors that the controller will meet, in the attribute's unit."""
+        """Typical size of the errors that the controller will see, in the attribute's unit."""
         size = np.mean(np.abs(self.targets)) if self.relative else np.ptp(self.targets)
         return float(size) or 1.0
 
@@ -97,18 +99,16 @@ class _Candidate(NamedTuple):
 
 
 class ControllerSearch:
-    """Tries controllers on units whose effect grows most evenly with v, and between opposite plans.
+    """Try controllers on the units whose effect is most linear in v, and between opposite plans.
 
     Args:
-        prober: measures.
-        aimed: what is to be held, and where.
+        prober: runs the roll-outs.
+        goal: what to hold, and where.
         settings: how much to do.
     """
 
-    def __init__(
-        self, prober: EffectProbe, aimed: ControllerGoal, settings: ControllerSearchSettings
-    ) -> None:
-        self._prober, self._aimed, self._settings = prober, aimed, settings
+    def __init__(self, prober: EffectProbe, goal: ControllerGoal, settings: ControllerSearchSettings) -> None:
+        self._prober, self._goal, self._settings = prober, goal, settings
 
     def run(
         self,
@@ -117,45 +117,46 @@ class ControllerSearch:
         opposites: Sequence[tuple[Stimulation, Stimulation]],
         search: Sequence[StartState],
         held_out: Sequence[StartState],
-        deadline: Callable[[], bool],
+        deadline: Deadline,
     ) -> ControllerSearchResult | None:
-        """The best controller, or None where nothing moves the attribute or the time is up.
+        """Return the best controller, or None if nothing moves the attribute or the time is over.
 
         Args:
-            sweep: effect curves.
-            column: of the attribute.
-            opposites: plans on the same units that raise and lower the attribute.
-            search: starts of the search.
-            held_out: starts that the search does not see; the first half of them decides between the
-                finalists, the other half gives the figures.
-            deadline: says when time is up.
+            sweep: effect curves of single units.
+            column: column of the attribute.
+            opposites: pairs of plans on the same units that raise and lower the attribute.
+            search: start states of the first stage.
+            held_out: start states that the first stage does not see; one half decides between the finalists,
+                the other gives the figures.
+            deadline: asked before the first roll-out.
         """
         settings = self._settings
-        candidates = self._alone(_steerers(sweep, column)[: settings.units])
+        candidates = self._alone(_rank_by_slope(sweep, column)[: settings.units])
         candidates += self._between(opposites[: settings.pairs])
         if not candidates or deadline():
             return None
-        cost = self._cost(candidates, search, settings.steps)
-        finalists = [candidates[index] for index in np.argsort(cost, kind="stable")[: settings.finalists]]
         half = len(held_out) // 2
-        cost = self._cost(finalists, held_out[:half], settings.final_steps)
-        best = finalists[int(np.argmin(cost))]
+        stages = (
+            ScoringStage(partial(self._score, starts=search, steps=settings.steps), settings.finalists),
+            ScoringStage(partial(self._score, starts=held_out[:half], steps=settings.final_steps), 1),
+        )
+        ((_, best),) = select_plans(candidates, stages)
         without = _Candidate(NO_STIMULATION, (), best.pid)
         errors, falls = self._measure([best, without], held_out[half:], settings.final_steps)
-        aimed = self._aimed
+        goal = self._goal
         return ControllerSearchResult(
             best.weights,
             best.pid,
             float(errors[0]),
             float(errors[1]),
             float(falls[0]),
-            aimed.targets,
-            aimed.relative,
+            goal.targets,
+            goal.relative,
             best.base,
         )
 
     def _alone(self, units: Sequence[tuple[int, float]]) -> list[_Candidate]:
-        """Single units, from 0 either way."""
+        """Propose single units, whose output goes either way from 0."""
         return [
             _Candidate(Stimulation((unit,), (weight,)), (), self._pid(limit, gain * limit, ki))
             for unit, weight in units
@@ -165,7 +166,7 @@ class ControllerSearch:
         ]
 
     def _between(self, opposites: Sequence[tuple[Stimulation, Stimulation]]) -> list[_Candidate]:
-        """From one plan, at −1, to its opposite, at 1, and a little beyond."""
+        """Propose blends from one plan, at −1, to its opposite, at 1, and somewhat beyond."""
         found = []
         for high, low in opposites:
             up, down = np.array(high.values), np.array(low.values)
@@ -181,38 +182,39 @@ class ControllerSearch:
 
     @property
     def _integral(self) -> tuple[float, ...]:
-        return (0.0,) if self._aimed.relative else (0.5, 2.0)
+        # An angle is the integral of what the units change; anything else needs an integral part to settle.
+        return (0.0,) if self._goal.relative else (0.5, 2.0)
 
     def _pid(self, limit: float, gain: float, ki: float) -> PidGains:
-        """A gain of 1 puts out 1 at the errors that the controller will meet."""
-        kp = round_to_three_digits(gain / self._aimed.spread)
-        step = float(f"{self._aimed.spread / 4:.1g}")
-        return PidGains(self._aimed.attribute, kp, round_to_three_digits(kp * ki), 0.0, limit, step)
+        """Scale the gains so that a gain of 1 gives an output of 1 for a typical error."""
+        kp = round_to_three_digits(gain / self._goal.spread)
+        step = float(f"{self._goal.spread / 4:.1g}")
+        return PidGains(self._goal.attribute, kp, round_to_three_digits(kp * ki), 0.0, limit, step)
 
-    def _cost(self, candidates: Sequence[_Candidate], starts: Sequence[StartState], steps: int) -> Floats:
+    def _score(self, candidates: Sequence[_Candidate], starts: Sequence[StartState], steps: int) -> Floats:
         errors, falls = self._measure(candidates, starts, steps)
-        cost: Floats = errors + _FALL * self._aimed.spread * falls
-        return cost
+        scores: Floats = -errors - _FALL_PENALTY * self._goal.spread * falls
+        return scores
 
     def _measure(
         self, candidates: Sequence[_Candidate], starts: Sequence[StartState], steps: int
     ) -> tuple[Floats, Floats]:
-        """Mean error and share of falls of each candidate over targets and starts."""
-        aimed = self._aimed
+        """Return mean error and share of falls of each candidate over targets and starts."""
+        goal = self._goal
         plans = [
-            ControllerPlan(one.weights, one.pid, target, aimed.relative, one.base)
+            ControllerPlan(one.weights, one.pid, target, goal.relative, one.base)
             for one in candidates
-            for target in aimed.targets
+            for target in goal.targets
         ]
         result = self._prober.measure_plans(plans, starts, steps=steps, measure_from=steps // 3)
-        # Whoever fell before the measured steps held nothing: it counts as the largest target.
-        errors = np.nan_to_num(result.errors, nan=float(np.max(np.abs(aimed.targets))))
+        # A roll-out that fell before the measured steps counts as an error of the largest target.
+        errors = np.nan_to_num(result.errors, nan=float(np.max(np.abs(goal.targets))))
         shape = (len(candidates), -1)
         return errors.reshape(shape).mean(axis=1), result.falls.reshape(shape).mean(axis=1)
 
 
-def _steerers(sweep: UnitEffects, column: int) -> list[tuple[int, float]]:
-    """Units with the sign of their slope, those with the steepest and straightest curves first."""
+def _rank_by_slope(sweep: UnitEffects, column: int) -> list[tuple[int, float]]:
+    """Rank units by how steep and straight their effect curves are, each with the sign of its slope."""
     values = np.array(sweep.values)
     curves = np.nan_to_num(sweep.effects[..., column].mean(axis=2))
     curves = np.where(sweep.falls.any(axis=2), 0.0, curves)

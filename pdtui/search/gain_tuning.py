@@ -1,17 +1,17 @@
-"""`pdtui tune`: gains and limit of a behavior of mode ``pid``, by a search over real step responses.
+"""`pdtui tune`: choose gains and limit of a behavior of mode ``pid`` by its step responses.
 
-What is minimised is the integral of the absolute error over steps of the target, a usual measure for tuning
-PID controllers (e.g. Åström and Hägglund, "Advanced PID Control", 2006), with a penalty for falls. A Latin
-hypercube is halved by measuring the better half on twice the seeds, as long as there are seeds; the best
-point is refined by Nelder and Mead's simplex. What was found is compared with the map's gains on seeds that
-the search did not see, and given up unless it is better there.
+The search minimises the integral of the absolute error over steps of the target, a common criterion for PID
+tuning (Åström and Hägglund, "Advanced PID Control", 2006), plus a penalty for falls. Points of a Latin
+hypercube go through successive halving, which measures the better half on twice the seeds; the Nelder-Mead
+method refines the best. The result replaces the map's gains only if it is better on seeds that the search did
+not see.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,26 +22,28 @@ from pdtui.core.errors import MapError
 from pdtui.drive.control_loop import ControlLoop
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.search.gain_search_space import gains_from_point, point_from_gains, sample_gain_points
+from pdtui.search.plan_search import Deadline, ScoringStage, TimeBudget, select_plans
 from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveResult, TrackingDriveRunner
 from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarise_tracking
-from pdtui.stimulation.stimulation_map import Behavior, PidGains
+from pdtui.stimulation.stimulation_map import Behavior, PidGains, StimulationMap
 
 STEPS_OF_ANGLE = (0.0, 0.4, 1.2, 0.3, -0.9, -0.5, 0.0, 0.9, 0.0)
-"""Targets of the search, rad: steps of 0.4, 0.9 and 1.2 and some between them, both ways."""
+"""Targets of an angle, rad: steps of 0.3 to 1.2 in both directions."""
 FALL = 2.0
-"""What each control step after a fall costs, in multiples of the targets' range."""
+"""Cost of each control step after a fall, in multiples of the targets' range."""
 _FIRST_SEEDS = 2
+"""Seeds of the first stage of successive halving."""
 Progress = Callable[..., None]
 
 
 @dataclass(frozen=True)
 class TuningSettings:
-    """How much to search.
+    """How much tuning does.
 
     Attributes:
-        points: of the Latin hypercube.
-        refinements: controllers that the simplex tries.
-        minutes: the search ends, with the best so far, when these are over; None lets it finish.
+        points: points of the Latin hypercube.
+        refinements: controllers that the Nelder-Mead method tries.
+        minutes: time after which the search ends with the best controller so far; None for no limit.
     """
 
     points: int = 48
@@ -51,15 +53,15 @@ class TuningSettings:
 
 @dataclass(frozen=True)
 class TunedGains:
-    """What tuning one behavior came to.
+    """The result of tuning one behavior.
 
     Attributes:
-        behavior: its name.
-        old, new: the map's controller, and the best that was found.
-        before, after: their figures on the seeds that the search did not see.
-        better: whether the new one is better there: no more falls, and a lower cost.
-        tried: controllers.
-        ended_early: whether the minutes were over before the search was.
+        behavior: name of the behavior.
+        old, new: the map's controller, and the best one of the search.
+        before, after: their figures on seeds that the search did not see.
+        better: whether the new one has a lower cost there, and no more falls.
+        tried: number of controllers tried.
+        ended_early: whether the search ran out of time.
     """
 
     behavior: str
@@ -73,7 +75,7 @@ class TunedGains:
 
     @property
     def verdict(self) -> str:
-        """One sentence."""
+        """The result in one sentence."""
         early = "; the minutes were over before the search was" if self.ended_early else ""
         what = "better than the map's" if self.better else "no better than the map's, which stay"
         return (
@@ -96,63 +98,53 @@ def tune_gains(
 ) -> list[TunedGains]:
     """Choose gains and limits of behaviors, one after the other.
 
-    Without `Effort.minutes` the result is a function of the other arguments.
+    Without a time limit the result depends only on the arguments.
 
     Args:
         config: robot, map and policy, or a loop of them.
-        names: of behaviors of mode ``pid``; empty for all that the map has.
-        seeds: half of them for the search, the others to judge what it found; at least 2.
-        settings: how much to search.
-        workers: processes.
+        names: names of behaviors of mode ``pid``; empty for all of the map.
+        seeds: at least 2; one half for the search, the other to compare its result with the map's gains.
+        settings: how much to do.
+        workers: number of processes.
         progress: called with controllers tried, controllers in all, and a note.
 
     Raises:
-        MapError: the map has no such behavior, or one of another mode; fewer than 2 seeds.
-        PdtuiError: robot or policy cannot be had.
+        MapError: the map has no such behavior, or it is of another mode; fewer than 2 seeds.
+        PdtuiError: the robot or the policy cannot be loaded.
     """
     if len(seeds) < 2:
         raise MapError(f"expected at least 2 seeds, half of them to judge by, found {len(seeds)}")
-    deadline = None if settings.minutes is None else time.monotonic() + 60.0 * settings.minutes
+    budget = TimeBudget(settings.minutes)
     with TrackingDriveRunner(config, workers) as runner:
-        behaviors = pid_behaviors(runner.loop.map.source, runner.loop.map.behaviors, names)
+        behaviors = _find_pid_behaviors(runner.loop.map, names)
         results = []
-        for number, behavior in enumerate(behaviors, start=1):
-            share = None if deadline is None else _share(deadline, len(behaviors) - number + 1)
-            results.append(_Search(runner, behavior, seeds, settings, share, progress).run())
+        for number, behavior in enumerate(behaviors):
+            deadline = budget.share(len(behaviors) - number)
+            results.append(_GainSearch(runner, behavior, seeds, settings, deadline, progress).run())
         return results
 
 
-def pid_behaviors(source: str, behaviors: Mapping[str, Behavior], names: Sequence[str]) -> list[Behavior]:
-    """The behaviors of mode ``pid`` of these names, all for none.
-
-    Raises:
-        MapError: there is no such behavior, or none at all.
-    """
-    holding = {name: behavior for name, behavior in behaviors.items() if behavior.pid is not None}
-    known = ", ".join(holding) or "none"
+def _find_pid_behaviors(stimulation_map: StimulationMap, names: Sequence[str]) -> list[Behavior]:
+    """Return the behaviors of mode ``pid`` with these names, or all of them if there are no names."""
+    source, behaviors = stimulation_map.source, stimulation_map.behaviors
+    of_mode = {name: behavior for name, behavior in behaviors.items() if behavior.pid is not None}
+    known = f"of mode pid are: {', '.join(of_mode) or 'none'}"
     for name in names:
         if name not in behaviors:
-            raise MapError(f"{source}: no behavior '{name}'; of mode pid are: {known}")
-        if name not in holding:
-            raise MapError(
-                f"{source}: behavior '{name}': expected mode pid, found fixed; of mode pid are: {known}"
-            )
-    if not holding:
+            raise MapError(f"{source}: no behavior '{name}'; {known}")
+        if name not in of_mode:
+            raise MapError(f"{source}: behavior '{name}': expected mode pid, found fixed; {known}")
+    if not of_mode:
         raise MapError(f"{source}: no behavior of mode pid, so there are no gains to choose")
-    return [holding[name] for name in names or holding]
+    return [of_mode[name] for name in names or of_mode]
 
 
-def _share(deadline: float, left: int) -> float:
-    now = time.monotonic()
-    return now + max(0.0, deadline - now) / left
+class _OutOfTimeError(Exception):
+    """Ends a search early."""
 
 
-class _TimeIsUp(Exception):  # noqa: N818 - it names what happened
-    pass
-
-
-class _Search:
-    """For the controller of one behavior."""
+class _GainSearch:
+    """The search for one behavior's controller."""
 
     def __init__(
         self,
@@ -160,7 +152,7 @@ class _Search:
         behavior: Behavior,
         seeds: Sequence[int],
         settings: TuningSettings,
-        deadline: float | None,
+        deadline: Deadline,
         progress: Progress | None,
     ) -> None:
         assert behavior.pid is not None
@@ -180,41 +172,47 @@ class _Search:
     def run(self) -> TunedGains:
         early = False
         try:
-            self._refine(self._halve())
-        except _TimeIsUp:
+            self._refine(self._select())
+        except _OutOfTimeError:
             early = True
         new = self._best()
         before, after = (self._drive(pid, self._judge) for pid in (self._old, new))
-        falls = [sum(one.fell for one in followed) for followed in (before, after)]
+        falls = [sum(one.fell for one in results) for results in (before, after)]
         better = falls[1] <= falls[0] and sum(map(self._cost, after)) < sum(map(self._cost, before))
-        figures = [summarise_tracking(followed, self._unit) for followed in (before, after)]
+        figures = [summarise_tracking(results, self._unit) for results in (before, after)]
         return TunedGains(
             self._behavior.name, self._old, new, figures[0], figures[1], better, len(self._costs), early
         )
 
     def _best(self) -> PidGains:
-        """Of the controllers that were measured on most seeds."""
+        """Return the best of the controllers that were measured on the most seeds."""
         most = max(map(len, self._costs.values()))
         return min((pid for pid, costs in self._costs.items() if len(costs) == most), key=self._mean)
 
     def _mean(self, pid: PidGains) -> float:
         return float(np.mean(self._costs[pid]))
 
-    def _halve(self) -> PidGains:
-        """The best of the hypercube and the map's own: each round the better half, on twice the seeds."""
+    def _select(self) -> PidGains:
+        """Return the best of the hypercube and the map's own; each stage keeps the better half."""
         points = sample_gain_points(self._settings.points, self._seed)
-        left = list(dict.fromkeys([self._old, *(gains_from_point(p, self._old, self._step) for p in points)]))
+        drawn = (gains_from_point(point, self._old, self._step) for point in points)
+        candidates = list(dict.fromkeys([self._old, *drawn]))
+        ((_, best),) = select_plans(candidates, self._halving_stages(len(candidates)))
+        return best
+
+    def _halving_stages(self, left: int) -> Iterator[ScoringStage[PidGains]]:
         count = min(_FIRST_SEEDS, len(self._search))
-        while True:
-            costs = {pid: self._measure(pid, count) for pid in left}
-            left.sort(key=costs.__getitem__)
-            if count == len(self._search):
-                return left[0]
-            left = left[: max(2, len(left) // 2)]
+        while count < len(self._search):
+            left = max(2, left // 2)
+            yield ScoringStage(partial(self._score, count=count), left)
             count = min(2 * count, len(self._search))
+        yield ScoringStage(partial(self._score, count=count), 1)
+
+    def _score(self, candidates: Sequence[PidGains], count: int) -> list[float]:
+        return [-self._measure(pid, count) for pid in candidates]
 
     def _refine(self, best: PidGains) -> None:
-        """Nelder and Mead's simplex in the logarithms, from the best point, with the parts that it has."""
+        """Refine the best point in logarithms by the Nelder-Mead method, within the parts that it has."""
         start = point_from_gains(best, self._old, self._step)
         if start is None or not self._settings.refinements:
             return
@@ -234,13 +232,13 @@ class _Search:
         )
 
     def _measure(self, pid: PidGains, count: int) -> float:
-        """Cost of a controller on the first so many seeds of the search."""
+        """Return the cost of a controller on the first `count` seeds of the search."""
         known = self._costs.get(pid, [])
         if len(known) < count:
-            if self._costs and self._deadline is not None and time.monotonic() > self._deadline:
-                raise _TimeIsUp
+            if self._costs and self._deadline():
+                raise _OutOfTimeError
             new = self._drive(pid, self._search[len(known) : count])
-            self._costs[pid] = known + [self._cost(followed) for followed in new]
+            self._costs[pid] = known + [self._cost(results) for results in new]
             if self._progress is not None:
                 note = f"{self._behavior.name}: best {self._mean(self._best()):.3g} {self._unit}"
                 self._progress(len(self._costs), self._settings.points + self._settings.refinements + 1, note)
@@ -250,7 +248,7 @@ class _Search:
         name, targets = self._behavior.name, tuple(self._targets)
         return self._runner.run([TrackingDrive(pid.attribute, name, seed, targets, pid) for seed in seeds])
 
-    def _cost(self, followed: TrackingDriveResult) -> float:
-        """Mean |error|; after a fall, `FALL` times the targets' range."""
-        errors = np.abs(followed.errors)
+    def _cost(self, results: TrackingDriveResult) -> float:
+        """Return the mean |error|, where steps after a fall count as `FALL` times the targets' range."""
+        errors = np.abs(results.errors)
         return float(np.where(np.isfinite(errors), errors, FALL * self._range).mean())

@@ -1,9 +1,8 @@
-"""Directions in a layer: show the network a state that it is not in.
+"""Imprints: stimulations that show the network a state that it is not in.
 
-Units that tell the values of an attribute apart are overwritten with what they put out, on average, while
-the attribute had another value. A policy that corrects what it sees (its heading, say) then goes on
-correcting, and one weak unit becomes a strong behavior of many. The same contrast of mean activations is
-known from language models as activation steering; here it overwrites rather than adds.
+The units that best tell apart the values of an attribute are overwritten with their mean activations at one
+of the values. A policy that corrects what it sees, such as its heading, then keeps correcting it. Activation
+steering of language models adds the same contrast of mean activations instead of overwriting with it.
 """
 
 from __future__ import annotations
@@ -21,18 +20,19 @@ from pdtui.search.stimulation_sampler import round_to_three_digits
 from pdtui.spectra.monitor import MonitoredEpisode
 
 _FLOOR = 0.05
+"""Added to the spread within parts, so that a nearly silent unit does not count as telling."""
 
 
 @dataclass(frozen=True)
 class ImprintSettings:
-    """How many imprints there are.
+    """How many imprints to build.
 
     Attributes:
-        episodes: short ones, from the reset on, in which attributes still vary.
-        steps: control steps of each.
-        bins: parts into which the values of an attribute are cut.
-        units: how many of the best units an imprint overwrites.
-        factors: how far beyond the mean activation of that part it goes.
+        episodes: number of short episodes from the reset on, in which attributes still vary.
+        steps: control steps of each episode.
+        bins: number of parts into which an attribute's range is divided.
+        units: numbers of units to overwrite.
+        factors: factors on the difference between a part's mean activations and those of all episodes.
     """
 
     episodes: int = 64
@@ -49,16 +49,16 @@ def build_imprint_candidates(
     settings: ImprintSettings,
     largest: float,
 ) -> tuple[Stimulation, ...]:
-    """Stimulations that show each part of each attribute's range, in the first layer and in all.
+    """Build stimulations that show each part of each attribute's range, in the first layer and in all layers.
 
-    Torques are left out: what a unit knows of them, it commands.
+    Torques are left out, because the units cause them.
 
     Args:
-        episodes: monitored, unstimulated.
-        attributes: of the robot.
+        episodes: monitored episodes.
+        attributes: attributes of the robot.
         layers: widths of the hidden layers.
-        settings: how many.
-        largest: |v| at most.
+        settings: how many to build.
+        largest: largest |v|.
     """
     activations = np.concatenate([episode.activations for episode in episodes])
     values = np.concatenate([episode.attributes for episode in episodes])
@@ -83,9 +83,9 @@ def build_imprint_candidates(
 
 
 def range_parts(values: Floats, attribute: Attribute, count: int) -> NDArray[np.intp]:
-    """Which part of its range each value is in, 0 to `count` − 1, shape (T,).
+    """Return the part of its range that each value is in, 0 to `count` − 1, shape (T,).
 
-    An angle that wraps is cut into equal arcs, anything else into parts that hold equally many values.
+    The range of an angle that wraps is cut into equal arcs, any other into parts with equally many values.
     """
     if attribute.wraps:
         turned = np.array([wrap_angle(float(value)) for value in values])
@@ -95,10 +95,10 @@ def range_parts(values: Floats, attribute: Attribute, count: int) -> NDArray[np.
 
 
 def _contrast(activations: NDArray[np.float32], part: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Mean activations in each part that occurs, and how well each unit tells the parts apart.
+    """Return the mean activations in each part that occurs, and how well each unit tells the parts apart.
 
-    The latter is the spread of the means over the spread within the parts: a unit that only follows the gait
-    varies within each of them.
+    The latter is the spread of the means relative to the spread within parts; a unit that only follows the
+    gait varies within each part.
     """
     groups = [activations[part == number] for number in np.unique(part)]
     means: Floats = np.array([group.mean(axis=0, dtype=np.float64) for group in groups])

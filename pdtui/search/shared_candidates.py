@@ -1,4 +1,4 @@
-"""Sets of units that are probed once and shared by all searches."""
+"""Candidate stimulations that are probed once and shared by all searches."""
 
 from __future__ import annotations
 
@@ -11,18 +11,17 @@ from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.behavior_goals import goal_scores
-from pdtui.search.behavior_search_settings import BehaviorSearchSettings
-from pdtui.search.stimulation_sampler import StimulationSampler
+from pdtui.search.stimulation_sampler import OutputBounds, StimulationSampler
 from pdtui.spectra.monitor import StepProgress
 
 
 class SharedCandidates:
-    """Sets of units, probed once for all goals: where searches begin when no single unit leads the way.
+    """Stimulations of several units, probed once: searches begin with them where no single unit helps.
 
     Args:
-        prober: measures.
-        plans: what to probe.
-        starts: a few of the search starts.
+        prober: runs the roll-outs.
+        plans: stimulations to probe.
+        starts: start states.
         steps: control steps of each roll-out.
         progress: called with (roll-outs done, roll-outs).
     """
@@ -40,26 +39,26 @@ class SharedCandidates:
             self.plans, starts, steps=steps, measure_from=steps // 3, progress=progress
         )
 
-    def best(self, goal: BehaviorGoal, column: int, count: int, most: int) -> list[Stimulation]:
-        """Those of at most so many units that went the goal's way furthest."""
+    def best(self, goal: BehaviorGoal, column: int, count: int, max_units: int) -> list[Stimulation]:
+        """Return the `count` plans of at most `max_units` units with the highest scores for a goal."""
         if not self.plans:
             return []
         scored = goal_scores(goal, column, self.effects, [len(plan.units) for plan in self.plans])
         order = [int(index) for index in np.argsort(-scored, kind="stable")]
-        return [self.plans[index] for index in order if len(self.plans[index].units) <= most][:count]
+        return [self.plans[index] for index in order if len(self.plans[index].units) <= max_units][:count]
 
     def opposites(self, column: int, count: int) -> list[tuple[Stimulation, Stimulation]]:
-        """Pairs of plans on the same units that raise and lower an attribute, the strongest pairs first.
+        """Return pairs of plans on the same units that raise and lower an attribute, the strongest first.
 
-        A pair is as strong as its weaker side; plans that fell are left out.
+        A pair is as strong as its weaker plan; plans that made the robot fall do not count.
         """
         effect = np.nan_to_num(self.effects.effects[..., column]).mean(axis=1)
         effect[self.effects.falls.any(axis=1)] = 0.0
-        same: dict[tuple[int, ...], list[int]] = {}
+        by_units: dict[tuple[int, ...], list[int]] = {}
         for index, plan in enumerate(self.plans):
-            same.setdefault(plan.units, []).append(index)
+            by_units.setdefault(plan.units, []).append(index)
         pairs = []
-        for indices in same.values():
+        for indices in by_units.values():
             high, low = max(indices, key=lambda i: effect[i]), min(indices, key=lambda i: effect[i])
             strength = min(float(effect[high]), -float(effect[low]))
             if strength > 0:
@@ -68,10 +67,8 @@ class SharedCandidates:
         return [(high, low) for _, high, low in pairs[:count]]
 
 
-def draw_random_candidates(units: int, settings: BehaviorSearchSettings, seed: int) -> list[Stimulation]:
-    """Pairs and triples of units, drawn at random."""
-    source = StimulationSampler(np.ones(units), settings.bounds, seed)
+def draw_random_candidates(units: int, count: int, bounds: OutputBounds, seed: int) -> list[Stimulation]:
+    """Draw `count` pairs and triples of a policy's units, with random outputs."""
+    sampler = StimulationSampler(np.ones(units), bounds, seed)
     most = min(3, units)
-    return [
-        source.draw(int(source.rng.integers(min(2, most), most + 1))) for _ in range(settings.random_sets)
-    ]
+    return [sampler.draw(int(sampler.rng.integers(min(2, most), most + 1))) for _ in range(count)]

@@ -1,4 +1,4 @@
-"""How a controlled attribute answers when its target moves: rise time and overshoot."""
+"""Rise time and overshoot of a controlled attribute when its target moves."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ RISE_FROM, RISE_TO = 0.1, 0.9
 
 @dataclass(frozen=True)
 class StepResponse:
-    """The answer to one step of the target.
+    """The response to one step of the target.
 
     Attributes:
-        rise: time from 10 to 90 % of the way from where the attribute was to the target, s; NaN where it did
-            not come so far.
-        overshoot: how far it went beyond the target, as a share of the target's step; 0 where it did not.
+        rise: time from 10 to 90 % of the way to the target, s; NaN if the attribute did not get that far.
+        overshoot: peak beyond the target, as a share of the target's step; 0 if there is none.
     """
 
     rise: float
@@ -28,13 +27,13 @@ class StepResponse:
 
 @dataclass(frozen=True)
 class StepResponseSummary:
-    """The answers to many steps.
+    """The responses to many steps.
 
     Attributes:
-        rise: mean rise time of the steps that have one, s; None where none has.
-        unrisen: steps that did not come to 90 %.
-        steps: of the target, in all.
-        overshoot: mean over the steps; None where there is none.
+        rise: mean rise time of the responses that reached 90 %, s; None if none did.
+        unrisen: number of responses that did not reach 90 %.
+        steps: number of steps of the target.
+        overshoot: mean overshoot; None if there are no steps.
     """
 
     rise: float | None
@@ -44,7 +43,7 @@ class StepResponseSummary:
 
     @classmethod
     def of(cls, responses: Sequence[StepResponse]) -> StepResponseSummary:
-        """Sum up."""
+        """Summarise responses."""
         risen = [one.rise for one in responses if np.isfinite(one.rise)]
         return cls(
             float(np.mean(risen)) if risen else None,
@@ -57,16 +56,16 @@ class StepResponseSummary:
 def measure_step_response(
     start: float, values: Floats, target: float, step: float, dt: float
 ) -> StepResponse:
-    """Measure one step as control engineering does (rise time from 10 to 90 %, peak beyond the target).
+    """Measure the response to one step of the target.
 
     Args:
         start: the attribute when the target moved.
-        values: the attribute after each control step since, shape (T,), an angle without jumps; NaN from
-            where the robot fell.
-        target: where it is to go.
-        step: by how much the target moved. A robot that lags behind has another way to go than that, so the
-            rise is measured on its own way, the overshoot in shares of the step.
-        dt: s per control step.
+        values: the attribute after each control step since then, shape (T,), with angles unwrapped; NaN from
+            a fall on.
+        target: the new target.
+        step: how far the target moved. A robot that lags behind has a different way to go, so the rise is
+            measured on that way, but the overshoot relative to the step.
+        dt: duration of a control step, s.
     """
     way = target - start
     path = np.array([start, *values])
@@ -77,7 +76,7 @@ def measure_step_response(
 
 
 def _first(path: Floats, level: float) -> float:
-    """When a path first is at a level, in control steps, between two of them by a straight line."""
+    """Return when a path first reaches a level, in control steps, interpolated linearly."""
     reached = np.flatnonzero(path >= level)
     if not reached.size:
         return float("nan")

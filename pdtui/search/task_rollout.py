@@ -1,4 +1,4 @@
-"""One run of a task: walk, stimulate for a while, watch, judge."""
+"""One roll-out of a task: walk, stimulate for a while, and judge the result."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from pdtui.robots.task import RunTrace, Task, TaskVerdict
 
 @dataclass(frozen=True)
 class TimedStimulation:
-    """A stimulation that lasts.
+    """A stimulation and how long it lasts.
 
     Attributes:
-        stimulation: what to overwrite.
-        steps: for how many control steps; None for all.
+        stimulation: units and outputs.
+        steps: duration in control steps; None for the whole roll-out.
     """
 
     stimulation: Stimulation = NO_STIMULATION
@@ -29,7 +29,7 @@ class TimedStimulation:
 
 
 def walk_steps(task: Task, seed: int) -> int:
-    """Control steps that a run of this seed walks before the behavior."""
+    """Return how many control steps a roll-out of this seed walks before the behavior begins."""
     low, high = task.walk
     return int(np.random.default_rng(seed).integers(low, high + 1))
 
@@ -37,10 +37,7 @@ def walk_steps(task: Task, seed: int) -> int:
 def judge_stimulations(
     robot: Robot, policy: Policy, task: Task, plans: Sequence[TimedStimulation], seed: int
 ) -> list[TaskVerdict]:
-    """Judge each plan from the same walk.
-
-    The walk is unstimulated; where it ends before its time, no plan has done its task.
-    """
+    """Judge each plan after the same unstimulated walk; if that ends before its time, every plan has failed."""
     options = {"start": task.start} if task.start else None
     observation, _ = robot.reset(seed=seed, options=options)
     policy.reset()

@@ -1,4 +1,4 @@
-"""Drives that follow targets: one behavior of mode ``pid``, one seed, one target after the other."""
+"""Drives in which a behavior of mode ``pid`` tracks one target after another."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from pdtui.search.step_response import StepResponse, measure_step_response
 from pdtui.stimulation.stimulation_map import PidGains
 
 STEPS_UNTOUCHED = 100
-"""Control steps that the policy walks by itself before the first target."""
+"""Control steps without stimulation before the first target."""
 STEPS_EACH = 100
-"""Control steps that every target is held."""
+"""Control steps per target."""
 
 
 @dataclass(frozen=True)
 class TrackingDrive:
-    """One drive.
+    """One drive to run.
 
     Attributes:
-        attribute: what is to follow.
-        behavior: the one that holds it; empty leaves the policy alone.
-        seed: of the reset.
-        targets: in the attribute's unit.
-        pid: other gains than the map's; None for those.
+        attribute: name of the attribute to track.
+        behavior: name of the behavior that holds it; empty for no stimulation.
+        seed: seed of the reset.
+        targets: targets, in the attribute's unit.
+        pid: gains to use instead of the map's; None for the map's.
     """
 
     attribute: str
@@ -45,14 +45,14 @@ class TrackingDrive:
 
 @dataclass(frozen=True)
 class TrackingDriveResult:
-    """How a drive went.
+    """The result of one drive.
 
     Attributes:
-        drive: it.
-        values: the attribute after each control step by target, shape (targets, `STEPS_EACH`); NaN after a
-            fall. An angle does not jump at ±π.
-        errors: target − value, the shorter way round for an angle; of the same shape.
-        responses: to every step of the target; the first target is none.
+        drive: the drive.
+        values: the attribute after each control step, shape (targets, `STEPS_EACH`), with angles unwrapped;
+            NaN after a fall.
+        errors: target − value, the shorter way round for an angle, of the same shape.
+        responses: responses to each step of the target, of which the first target is none.
         fell: whether the robot fell.
     """
 
@@ -64,22 +64,22 @@ class TrackingDriveResult:
 
     @property
     def error(self) -> float:
-        """Mean |error| until the end or the fall; NaN for a robot that fell before the first target."""
+        """Mean |error| until the end or the fall; NaN if the robot fell before the first target."""
         known = np.abs(self.errors[np.isfinite(self.errors)])
         return float(known.mean()) if known.size else float("nan")
 
 
 class TrackingDriveRunner(Closable):
-    """Runs drives on one robot and policy; with one worker in this process, else in others.
+    """Runs drives of one robot and policy, in this process or in worker processes.
 
-    The results do not depend on the number of workers: each drive begins with a reset from its seed.
+    Each drive begins with a reset from its seed, so the results do not depend on the number of workers.
 
     Args:
-        config: robot, map and policy, or a loop of them, which stays in this process; the seed is not used.
-        workers: processes, started by the first call of `run`.
+        config: robot, map and policy, or a loop of them, which stays in this process; its seed is not used.
+        workers: number of processes; the first call of `run` starts them.
 
     Raises:
-        PdtuiError: robot, policy or map cannot be had.
+        PdtuiError: the robot, the policy or the map cannot be loaded.
     """
 
     def __init__(self, config: DriveConfig | ControlLoop, workers: int = 1) -> None:
@@ -93,21 +93,21 @@ class TrackingDriveRunner(Closable):
         self._pool.close()
 
     def attribute(self, name: str) -> Attribute:
-        """The attribute of a name.
+        """Return the attribute of this name.
 
         Raises:
-            RobotError: the robot has none.
+            RobotError: the robot has no such attribute.
         """
         return self.loop.robot.attributes[self.loop.robot.attribute_index(name)]
 
     def run(
         self, drives: Sequence[TrackingDrive], progress: Callable[[int, int], None] | None = None
     ) -> list[TrackingDriveResult]:
-        """Drive them all; results in their order.
+        """Run all drives, and return the results in their order.
 
         Args:
-            drives: what to drive.
-            progress: called with the number of drives finished and of all drives.
+            drives: the drives.
+            progress: called with (drives done, drives).
 
         Raises:
             WorkerError: a worker process died.
@@ -115,14 +115,16 @@ class TrackingDriveRunner(Closable):
         return self._pool.map(drive_targets, drives, progress)
 
 
-def drive_targets(built: ControlLoop, drive: TrackingDrive) -> TrackingDriveResult:
-    """Drive once; the loop given stays as it is but for its robot's and policy's state."""
-    wanted = built.map
+def drive_targets(template: ControlLoop, drive: TrackingDrive) -> TrackingDriveResult:
+    """Run one drive; of the loop given, only the state of its robot and policy changes."""
+    stimulation_map = template.map
     if drive.pid is not None:
-        changed = replace(wanted.behaviors[drive.behavior], pid=drive.pid)
-        wanted = replace(wanted, behaviors={**wanted.behaviors, drive.behavior: changed})
-    loop = ControlLoop(built.robot, built.policy, wanted, drive.seed)
-    column = built.robot.attribute_index(drive.attribute)
+        changed = replace(stimulation_map.behaviors[drive.behavior], pid=drive.pid)
+        stimulation_map = replace(
+            stimulation_map, behaviors={**stimulation_map.behaviors, drive.behavior: changed}
+        )
+    loop = ControlLoop(template.robot, template.policy, stimulation_map, drive.seed)
+    column = template.robot.attribute_index(drive.attribute)
     path = np.full(1 + len(drive.targets) * STEPS_EACH, np.nan)
     for _ in range(STEPS_UNTOUCHED):
         record = loop.advance()
@@ -137,18 +139,18 @@ def drive_targets(built: ControlLoop, drive: TrackingDrive) -> TrackingDriveResu
             fell = record.fell
             if record.ended:
                 break
-    return _summed_up(drive, path, fell, built.robot.attributes[column].wraps, built.robot.control_dt)
+    return _summarise(drive, path, fell, template.robot.attributes[column].wraps, template.robot.control_dt)
 
 
 def _events(step: int, drive: TrackingDrive, number: int) -> list[Event]:
-    """What happens before a control step, counted from the first target."""
+    """Return the events before a control step, which counts from the first target."""
     if not drive.behavior or number % STEPS_EACH:
         return []
     target = Event(step, "target", drive.behavior, drive.targets[number // STEPS_EACH])
     return [Event(step, "behavior", drive.behavior), target] if number == 0 else [target]
 
 
-def _summed_up(drive: TrackingDrive, path: Floats, fell: bool, wraps: bool, dt: float) -> TrackingDriveResult:
+def _summarise(drive: TrackingDrive, path: Floats, fell: bool, wraps: bool, dt: float) -> TrackingDriveResult:
     smooth = np.unwrap(path) if wraps else path
     values = smooth[1:].reshape(len(drive.targets), STEPS_EACH)
     errors = np.array(drive.targets)[:, None] - values

@@ -1,4 +1,4 @@
-"""How precisely a target is held: figures of drives that follow targets."""
+"""How precisely a behavior holds its targets: figures over tracking drives."""
 
 from __future__ import annotations
 
@@ -15,21 +15,17 @@ from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveResult, Tra
 from pdtui.stimulation.stimulation_map import Behavior
 
 HEADINGS = (0.0, 0.4, 0.9, 1.2, 0.9, 0.4, 0.0, -0.4, -0.9, -1.2, -0.9, -0.4, 0.0)
-"""Targets of an angle, rad: the paper's."""
-
-
+"""The paper's targets of an angle, rad."""
 SETTLED = 25
-
-
+"""Last control steps at a target, by which the attribute should have settled."""
 _PART = 0.1
-
-
+"""Step of the targets, as a share of the attribute's natural value."""
 _SIZES = (0, 1, 2, 1, 0, -1, -2, -1, 0)
 
 
 @dataclass(frozen=True)
 class TargetErrorSummary:
-    """Errors at one target, over all seeds: mean of |error| over its steps, and over the last 25 of them."""
+    """Mean |error| at one target over all seeds: over all its control steps, and over the last 25."""
 
     target: float
     error: float
@@ -38,18 +34,18 @@ class TargetErrorSummary:
 
 @dataclass(frozen=True)
 class TrackingSummary:
-    """How well a target is held. A drive counts until its end or its fall.
+    """How well a behavior tracks its targets. A drive counts until its end or a fall.
 
     Attributes:
-        behavior: the behavior of mode ``pid``.
-        attribute, unit: what it holds.
-        seeds: of the drives.
-        targets: in the order in which they were set.
+        behavior: name of the behavior of mode ``pid``.
+        attribute, unit: the attribute that it holds.
+        seeds: seeds of the drives.
+        targets: errors at each target, in the order in which the targets were set.
         error, low, high: mean |error| over seeds with its 95 % interval.
-        settled: the same over the last 25 steps of each target.
+        settled: mean |error| over the last 25 steps of each target.
         responses: rise time and overshoot over all steps of the target and all seeds.
-        falls: seeds on which the robot fell.
-        default_error: mean |error| without the controller, on the same targets; None where not measured.
+        falls: number of seeds on which the robot fell.
+        default_error: mean |error| without the controller at the same targets; None if not measured.
     """
 
     behavior: str
@@ -67,18 +63,18 @@ class TrackingSummary:
 
 
 def summarise_tracking(
-    followed: Sequence[TrackingDriveResult], unit: str, default_error: float | None = None
+    results: Sequence[TrackingDriveResult], unit: str, default_error: float | None = None
 ) -> TrackingSummary:
-    """Figures of one behavior's drives, one a seed, all to the same targets."""
-    drive = followed[0].drive
-    table = np.abs(np.array([one.errors for one in followed]))
-    means = seed_errors(followed)
+    """Summarise drives of one behavior, one per seed, all to the same targets."""
+    drive = results[0].drive
+    table = np.abs(np.array([one.errors for one in results]))
+    means = seed_errors(results)
     low, high = confidence_interval(means[np.isfinite(means)])
     return TrackingSummary(
         drive.behavior,
         drive.attribute,
         unit,
-        tuple(one.drive.seed for one in followed),
+        tuple(one.drive.seed for one in results),
         tuple(
             TargetErrorSummary(target, finite_mean(table[:, row]), finite_mean(table[:, row, -SETTLED:]))
             for row, target in enumerate(drive.targets)
@@ -87,19 +83,19 @@ def summarise_tracking(
         low,
         high,
         finite_mean(table[:, :, -SETTLED:]),
-        StepResponseSummary.of([response for one in followed for response in one.responses]),
-        sum(one.fell for one in followed),
+        StepResponseSummary.of([response for one in results for response in one.responses]),
+        sum(one.fell for one in results),
         default_error,
     )
 
 
-def seed_errors(followed: Sequence[TrackingDriveResult]) -> Floats:
-    """Mean |error| of each drive, shape (seeds,); NaN for one that fell before the first target."""
-    return np.array([one.error for one in followed])
+def seed_errors(results: Sequence[TrackingDriveResult]) -> Floats:
+    """Return the mean |error| of each drive, shape (seeds,); NaN for a fall before the first target."""
+    return np.array([one.error for one in results])
 
 
 def finite_mean(values: Floats) -> float:
-    """Mean of what is no NaN; NaN where nothing is."""
+    """Return the mean of the finite values, NaN if there are none."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else float("nan")
 
@@ -107,15 +103,15 @@ def finite_mean(values: Floats) -> float:
 def choose_tracking_targets(
     runner: TrackingDriveRunner, behavior: Behavior, seeds: Sequence[int]
 ) -> tuple[float, ...]:
-    """Targets that fit an attribute: the paper's headings for an angle, else steps about its natural value.
+    """Choose targets: the paper's headings for an angle, steps about its natural value for anything else.
 
-    A step is a tenth of what the attribute is when nobody touches the policy, and no less than one press of
-    an arrow key.
+    The natural value is the mean without stimulation. A step is a tenth of it, but at least one press
+    of an arrow key.
 
     Args:
-        runner: drive untouched to measure that.
-        behavior: holds the attribute.
-        seeds: of these drives.
+        runner: runs the drives without stimulation.
+        behavior: the behavior that holds the attribute.
+        seeds: seeds of these drives.
     """
     assert behavior.pid is not None
     name = behavior.pid.attribute

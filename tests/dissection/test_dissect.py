@@ -15,7 +15,7 @@ from pdtui.api import dissect
 from pdtui.core.errors import MapError
 from pdtui.core.units import Stimulation
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_searches import DissectionSearches, TimeBudget
+from pdtui.dissection.dissection_searches import DissectionSearches
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.dissection.dissection_tables import render_dissection
 from pdtui.dissection.draft_map import draft_map
@@ -28,6 +28,7 @@ from pdtui.robots.robot_goals import WALKING_GOALS
 from pdtui.search.behavior_goals import goal_gains, goal_scores
 from pdtui.search.behavior_search import BehaviorSearchResult, SearchStartStates
 from pdtui.search.controller_search import ControllerSearchResult
+from pdtui.search.plan_search import TimeBudget
 from pdtui.spectra.matching_presets import PRESETS, find_preset, preset_values
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains
@@ -215,9 +216,9 @@ magnitudes = {{ "0:3" = 9.5, "1:7" = -9.5 }}
     with RolloutPool("ant", policy_file, 1) as crew:
         starts = collect_start_states(crew.robot, crew.policy, 1200, 1, at=5, survive=20)
         searches = DissectionSearches(
-            EffectProbe(crew), crew.robot, effort, 1000, TimeBudget(0.0, None), lambda _: None, (known,)
+            EffectProbe(crew), crew.robot, effort, 1000, TimeBudget(None), lambda _: None, (known,)
         )
-        assert known in searches.pool(SearchStartStates(tuple(starts), (), ())).plans
+        assert known in searches.probe_shared_candidates(SearchStartStates(tuple(starts), (), ())).plans
     path = tmp_path / "mine.toml"
     path.write_text(text)
     quick = partial(dissect, "ant", policy_file, episodes=1, workers=1, settings=effort, budget_minutes=0.0)

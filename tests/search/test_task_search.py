@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,22 +11,18 @@ from click.testing import CliRunner
 
 from pdtui.cli import main
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.search.plan_search import TimeBudget
 from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearch
 from pdtui.stimulation.map_reader import load_map
 
 
-def _never() -> bool:
-    return False
-
-
 def test_what_is_found_scores_above_the_untouched_policy_and_is_found_again() -> None:
-    settings = QUICK_TASK_SEARCH.__class__(
-        **{**vars(QUICK_TASK_SEARCH), "values": (6.0,), "held_out_seeds": 3}
-    )
+    settings = replace(QUICK_TASK_SEARCH, values=(6.0,), held_out_seeds=3)
     results = []
     for _ in range(2):
         with RolloutPool("bipedal_walker", "bipedal_walker", workers=1) as pool:
-            results.append(TaskSearch(pool, pool.robot.find_task("jump"), 1000, settings).run([], _never))
+            search = TaskSearch(pool, pool.robot.find_task("jump"), 1000, settings)
+            results.append(search.run(TimeBudget(None).share()))
     first, again = results
     assert first.plan == again.plan
     assert first.verdicts == again.verdicts
