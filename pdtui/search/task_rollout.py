@@ -37,7 +37,7 @@ def walk_steps(task: Task, seed: int) -> int:
 def judge_stimulations(
     robot: Robot, policy: Policy, task: Task, plans: Sequence[TimedStimulation], seed: int
 ) -> list[TaskVerdict]:
-    """Judge each plan after the same unstimulated walk; if that ends before its time, every plan has failed."""
+    """Judge each plan after the same unstimulated walk; if that ends early, every plan has failed."""
     options = {"start": task.start} if task.start else None
     observation, _ = robot.reset(seed=seed, options=options)
     policy.reset()
