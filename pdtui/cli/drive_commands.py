@@ -154,8 +154,8 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, record: 
     presses = read_keystrokes(keys, config.stimulation_map) if keys is not None else {}
     loop = build_loop(config)
     info, viewer = replace(loop.info, activations=config.activations), config.viewer
-    if viewer is not None and not viewer.listens:
-        click.echo(viewer.absence, err=True)
+    if viewer is not None and not viewer.is_listening:
+        click.echo(viewer.absence_message, err=True)
         viewer = None
     recorder = SessionRecorder(record, info, viewer=viewer) if record is not None else None
     with catch_ending_signals() as ended:

@@ -40,8 +40,8 @@ class DriveServer:
         self._recorder: SessionRecorder | None = None
         if config.recording:
             path, viewer = Path(config.recording), config.viewer
-            if viewer is not None and not viewer.listens:
-                self._builder.notice, viewer = viewer.absence, None
+            if viewer is not None and not viewer.is_listening:
+                self._builder.notice, viewer = viewer.absence_message, None
             info = replace(self._loop.info, activations=config.activations)
             self._recorder = SessionRecorder(path, info, rows_per_write=PACED_ROWS_PER_WRITE, viewer=viewer)
         self._pacer = Pacer(self._loop.robot.control_dt, time.monotonic())

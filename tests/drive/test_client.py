@@ -155,7 +155,7 @@ def test_a_drive_whose_viewer_is_not_there_says_so_and_goes_on(
         seen = _until(connection, lambda snapshot: snapshot.step > 20)
     finally:
         connection.close()
-    assert any(snapshot.notice == nobody.absence for snapshot in seen)
+    assert any(snapshot.notice == nobody.absence_message for snapshot in seen)
     assert read_session(recording).steps > 20
 
 

@@ -12,7 +12,7 @@ import pytest
 from pdtui.core.errors import SessionError
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_repair import examine_session
-from pdtui.sessions.writer.disk_space import free_space, is_full
+from pdtui.sessions.writer.disk_space import free_space, is_disk_full
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded
 
@@ -37,7 +37,7 @@ try:
         steps += 1
         if late and steps == 40:
             recorder.flush()
-            recorder._require_room = lambda: None
+            recorder._require_space = lambda: None
             limit(recorder.bytes + late)
 except PdtuiError as error:
     print(steps, type(error).__name__, error)
@@ -66,7 +66,7 @@ def test_a_recording_ends_whole_before_the_disk_is_full(weights: Path, tmp_path:
     path = tmp_path / "a.rrd"
     steps, name, said = run(path, weights, 4, 2_200_000)
     assert name == "RecordingEnded"
-    assert said.startswith(f"the disk is full; {path} was closed in time and is whole: ")
+    assert said.startswith(f"the disk is full; {path} was closed in time and is complete: ")
     there = examine_session(path)
     assert there.whole
     assert there.steps == int(steps) + 1
@@ -99,11 +99,11 @@ def test_room_is_what_the_disk_and_the_limit_leave(tmp_path: Path) -> None:
     path.write_bytes(b"x" * 1000)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     assert free_space(path) > 0
-    assert not is_full(path)
+    assert not is_disk_full(path)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (1500, before[1]))
         assert free_space(path) == 500
-        assert is_full(path)
+        assert is_disk_full(path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 

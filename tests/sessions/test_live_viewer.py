@@ -74,5 +74,5 @@ def test_addresses_are_ports_hosts_or_both() -> None:
     assert str(ViewerAddress.parse("10.0.0.2:9000")) == "10.0.0.2:9000"
     assert str(ViewerAddress.parse("desk")) == "desk:9876"
     for wrong in ("", "0", "99999", "desk:", "http://desk", "a b"):
-        with pytest.raises(SessionError, match="expected a port, a host or host:port"):
+        with pytest.raises(SessionError, match="expected PORT, HOST or HOST:PORT"):
             ViewerAddress.parse(wrong)

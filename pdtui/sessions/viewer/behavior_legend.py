@@ -1,4 +1,4 @@
-"""What the viewer has to know of a session's behaviors: their colors, and what they hold."""
+"""The behaviors of a session as the viewer shows them: their colors and the attributes of their targets."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from pdtui.stimulation.behavior_colors import behavior_rgb
 from pdtui.stimulation.map_reader import parse_map
 
 IDLE = (150, 150, 150)
-"""Where no behavior is active."""
+"""The color where no behavior is active."""
 
 
 class BehaviorLegend:
-    """Colors by the behavior's row in the map; a behavior that the map does not tell of gets the next.
+    """Assigns colors to behaviors in the order of the map; unknown behaviors get the colors after those.
 
     Args:
-        info: with the map's text. A text that is no map, as another version may have written it, is no error:
-            it determines nothing but colors here.
+        info: the drive. A map text that cannot be parsed, for example from another version, is no error
+            because it only determines colors here.
     """
 
     def __init__(self, info: DriveInfo) -> None:
@@ -27,18 +27,20 @@ class BehaviorLegend:
         except MapError:
             behaviors = {}
         self._rows = {name: row for row, name in enumerate(behaviors)}
-        self.held = {name: one.pid.attribute for name, one in behaviors.items() if one.pid is not None}
-        """The attribute that a behavior holds at a target."""
+        self.target_attributes = {
+            name: one.pid.attribute for name, one in behaviors.items() if one.pid is not None
+        }
+        """Names of the attributes that behaviors hold at a target, by behavior."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All behaviors that have a color."""
+        """The names of all behaviors that have a color."""
         return tuple(self._rows)
 
     def color(self, name: str) -> tuple[int, int, int]:
-        """Of a behavior."""
+        """Return the color of a behavior."""
         return behavior_rgb(self._rows.setdefault(name, len(self._rows)))
 
     def color_of_state(self, names: Sequence[str]) -> tuple[int, int, int]:
-        """Of behaviors that are active together: the color of the latest."""
+        """Return the color of behaviors that are active together: that of the one latched last."""
         return self.color(names[-1]) if names else IDLE

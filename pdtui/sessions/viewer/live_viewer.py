@@ -1,4 +1,4 @@
-"""A drive shown in a Rerun viewer while it is driven; whatever becomes of the viewer, the drive goes on."""
+"""Show a drive live in a Rerun viewer; the drive continues whatever happens to the viewer."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ from pdtui.sessions.writer.arrow_columns import ComponentColumn, time_columns
 from pdtui.sessions.writer.rerun_recording import send_property
 
 _CLOSE_SECONDS = 2.0
+"""How long the end of a drive waits for the viewer, s."""
 _WAITING = 2000
-"""Batches that may wait for the viewer; one that lets more wait has stopped."""
+"""Number of batches that may wait for the viewer; if there are more, the viewer has stopped."""
 
 
 class LiveViewer:
-    """Sends a drive to a viewer from a thread of its own; a viewer that dies or stops is left alone.
+    """Sends a drive to a viewer in a separate thread, and gives up on a viewer that ends or stops.
 
     Args:
-        address: of a viewer that listens.
-        info: of the drive.
-        recording_id: the session's, so that the viewer knows its file to be the same.
+        address: address of a viewer that listens.
+        info: the drive.
+        recording_id: identifier of the session, by which the viewer recognises its file.
     """
 
     def __init__(self, address: ViewerAddress, info: DriveInfo, recording_id: str) -> None:
@@ -39,7 +40,7 @@ class LiveViewer:
         self._thread = threading.Thread(target=self._send_all, name="live view", daemon=True)
         url = f"rerun+http://{address}/proxy"
         self._put(lambda: self._recording.set_sinks(rr.GrpcSink(url)))
-        # The viewer may show the drive before, laid out for another robot: this one's layout comes at once.
+        # At once, because the viewer may still show the previous drive, laid out for another robot.
         self.lay_out(BEGUN)
         self._thread.start()
 
@@ -49,7 +50,7 @@ class LiveViewer:
         self._put(lambda: rr.send_columns(entity, times, ready, recording=self._recording))
 
     def log_static(self, entity: str, archetype: Any) -> None:
-        """Send what holds at all times."""
+        """Send data that apply at all times."""
         self._put(lambda: rr.log(entity, archetype, static=True, recording=self._recording))
 
     def send_property(self, name: str, values: Mapping[str, Any]) -> None:
@@ -57,17 +58,17 @@ class LiveViewer:
         self._put(lambda: send_property(self._recording, name, values))
 
     def lay_out(self, content: DriveContent) -> None:
-        """Lay the drive out anew."""
+        """Lay the drive out again."""
         self._put(
             lambda: self._recording.send_blueprint(session_blueprint(self._info, content), make_active=True)
         )
 
     def close(self) -> None:
-        """Send what waits, if the viewer still takes it, and let go of it."""
+        """Send what is waiting, if the viewer still accepts it, and disconnect."""
         self._put(None)
         self._thread.join(_CLOSE_SECONDS)
         if self._thread.is_alive():
-            # The viewer stopped and left its connection open; the library would wait for it at exit.
+            # The viewer stopped with its connection open, and the library would wait for it at exit.
             atexit.unregister(rr.rerun_shutdown)
 
     def _put(self, task: Callable[[], None] | None) -> None:

@@ -1,4 +1,4 @@
-"""What stands in the robot's way, in the viewer: trunks in the scene, discs in the picture from above."""
+"""Draw obstacles in the viewer: cylinders in the 3D view, discs in the view from above."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from pdtui.core.attributes import Floats
 from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.core.step_record import StepRecord
 from pdtui.sessions.session_schema import OBSTACLES, OBSTACLES_ABOVE
-from pdtui.sessions.viewer.viewer_curves import LogStatic, Send
+from pdtui.sessions.viewer.viewer_curves import LogStatic, SendRows
 from pdtui.sessions.writer.arrow_columns import number_list_column, vector_list_column
 
 _COLOR = (92, 138, 84)
 _HEIGHT = 1.2
-"""Obstacles have no height of their own; this hides no robot behind them, m."""
+"""Drawn height, m. Obstacles have no height of their own; this one does not hide the robot."""
 
 
 class ObstacleWriter:
-    """Writes the obstacles of a world at the step with which it begins: they stand until the next.
+    """Writes the obstacles of a world at its first step; they stay until the next world begins.
 
     Args:
         send: writes a batch of rows.
-        log_static: writes what holds at all times.
+        log_static: writes data that apply at all times.
     """
 
-    def __init__(self, send: Send, log_static: LogStatic) -> None:
+    def __init__(self, send: SendRows, log_static: LogStatic) -> None:
         self._send, self._log_static = send, log_static
         self._present: Floats = NO_OBSTACLES
         self._pending: list[tuple[int, Floats]] = []
         self._styled = False
 
     def add(self, records: Iterable[StepRecord]) -> None:
-        """Take in control steps."""
+        """Add control steps."""
         for record in records:
             if record.obstacles is self._present:
                 continue
@@ -43,7 +43,7 @@ class ObstacleWriter:
             self._present = record.obstacles
 
     def write(self) -> None:
-        """Write what was collected since the last time."""
+        """Write what was added since the last call."""
         pending, self._pending = self._pending, []
         if pending and not self._styled:
             self._styled = True
@@ -57,7 +57,7 @@ class ObstacleWriter:
         radii = obstacles[None, :, 2]
         centers = np.full((1, count, 3), _HEIGHT / 2, np.float32)
         centers[0, :, :2] = obstacles[:, :2]
-        # As with the path, a picture's y axis points down.
+        # As with the path, the y axis of a 2D view points down.
         above = centers[:, :, :2] * np.array([1.0, -1.0], np.float32)
         cylinders = [
             vector_list_column(rr.Cylinders3D.descriptor_centers(), centers),

@@ -1,4 +1,4 @@
-"""The robot's links as solid shapes in the viewer."""
+"""Draw the links of a robot as solid shapes in the viewer."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ _TORSO = (90, 122, 158)
 
 
 class RobotShapes:
-    """Draws capsules, spheres and boxes; what does not change is logged once.
+    """The links of a robot as capsules, spheres and boxes.
 
     Args:
-        links: the robot's shapes.
+        links: the links.
     """
 
     def __init__(self, links: Sequence[Link]) -> None:
-        # A sphere is a capsule of length zero, so that it needs no component of its own.
+        # A sphere is drawn as a capsule of length zero.
         self._round = [link for link in links if link.shape != "box"]
         self._boxes = [link for link in links if link.shape == "box"]
 
     def static(self) -> list[rr.Capsules3D | rr.Boxes3D]:
-        """Sizes and colors."""
+        """Return sizes and colors, which do not change."""
         parts: list[rr.Capsules3D | rr.Boxes3D] = []
         if self._round:
             lengths = [2 * link.size[1] if link.shape == "capsule" else 0.0 for link in self._round]
@@ -52,10 +52,10 @@ class RobotShapes:
         return parts
 
     def columns(self, poses: Floats) -> list[ComponentColumn]:
-        """Where they are.
+        """Return where the shapes are.
 
         Args:
-            poses: body poses of n steps, shape (n, B, 7).
+            poses: poses of the bodies in n steps, shape (n, B, 7).
         """
         columns = []
         if self._round:

@@ -1,4 +1,4 @@
-"""How the viewer lays a session out when it opens one: what is not there takes no room."""
+"""The blueprint of a session: how the viewer lays it out, with no space for what is absent."""
 
 from __future__ import annotations
 
@@ -40,22 +40,22 @@ _CURVES = (
     (190, 170, 110),
 )
 _MOST_NAMED = 8
-"""A longer legend hides the curves; the viewer names a curve under the mouse, too."""
+"""Largest number of curves with a legend; a longer one hides the curves, which are also named on hovering."""
 _MARGIN = 0.08
 
 
 @dataclass(frozen=True)
 class DriveContent:
-    """What of a drive there is to be laid out; as it stands, of one that has begun.
+    """What a blueprint has to lay out.
 
     Attributes:
-        units: stimulated units with curves, counted for each state.
-        units_left_out: whether a state had more than those.
-        targets: behaviors that held a target; None stands for those of the map that may.
-        magnitudes: behaviors that were active.
-        heat_map: whether all activations were drawn; that is done at the end.
-        path: lowest and highest x, y, m; None while they are not known.
-        begun: whether the rest is still to come.
+        units: number of curves of stimulated units, over all states.
+        units_left_out: whether a state had more units than are drawn.
+        targets: behaviors that held a target; None for all behaviors of the map that can.
+        magnitudes: number of behaviors that were active.
+        heat_map: whether the heat map of all activations was drawn, which is done at the end.
+        path: lowest and highest (x, y), m; None if unknown.
+        begun: whether the drive has only begun, so that more will follow.
     """
 
     units: int = 0
@@ -71,17 +71,21 @@ BEGUN = DriveContent(begun=True)
 
 
 def session_blueprint(info: DriveInfo, content: DriveContent = BEGUN) -> rrb.Blueprint:
-    """Robot, path and keys on the left, what is stimulated in the middle, what the robot does right."""
-    columns = [(4, _robot(info, content)), (3, _stimulated(content)), (3, _measured(info, content))]
-    there = [(share, column) for share, column in columns if column is not None]
+    """Lay out robot, path and keys on the left, stimulation in the middle, measurements on the right."""
+    columns = [
+        (4, _lay_out_robot(info, content)),
+        (3, _lay_out_stimulation(content)),
+        (3, _lay_out_measurements(info, content)),
+    ]
+    present = [(share, column) for share, column in columns if column is not None]
     return rrb.Blueprint(
-        rrb.Horizontal(*(column for _, column in there), column_shares=[share for share, _ in there]),
+        rrb.Horizontal(*(column for _, column in present), column_shares=[share for share, _ in present]),
         rrb.TimePanel(timeline=TIME, state="collapsed"),
         collapse_panels=True,
     )
 
 
-def _robot(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
+def _lay_out_robot(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
     keys = rrb.TextLogView(
         contents=[EVENTS, ENDINGS],
         name="Keys and events",
@@ -98,7 +102,7 @@ def _robot(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
     robot = rrb.Spatial3DView(
         contents=[ROBOT, PATH, OBSTACLES],
         name=f"Robot {info.robot}, policy {info.policy}; its path in the colors of the behaviors",
-        # Only the path leaves a trail; the robot and the obstacles are where they are.
+        # Only the path is shown over time; robot and obstacles are shown at the current time.
         overrides={
             PATH: [rr.LineStrips3D.from_fields(radii=0.02).visualizer(), rrb.VisibleTimeRanges(trails)]
         },
@@ -122,7 +126,7 @@ def _robot(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
 
 
 def _bounds(content: DriveContent) -> rrb.VisualBounds2D | None:
-    """Of the whole path, so that the picture holds still while the time runs."""
+    """Return the bounds of the whole path, so that the view does not move during playback."""
     if content.path is None:
         return None
     (left, low), (right, high) = content.path
@@ -132,16 +136,16 @@ def _bounds(content: DriveContent) -> rrb.VisualBounds2D | None:
     )
 
 
-def _stimulated(content: DriveContent) -> rrb.Vertical | None:
+def _lay_out_stimulation(content: DriveContent) -> rrb.Vertical | None:
     rows: list[tuple[int, rrb.View]] = []
     if content.begun or content.magnitudes:
         rows.append((2, rrb.StateTimelineView(origin=BEHAVIORS, name="Behaviors", time_view=_time())))
     if content.begun or content.units:
-        which = "Four units a behavior" if content.units_left_out else "Stimulated units"
+        which = "Four units per behavior" if content.units_left_out else "Stimulated units"
         name = f"{which}: overwritten (bright), natural (dark)"
         rows.append((5, _plot(name, f"{UNITS}/**", named=0 < content.units <= _MOST_NAMED // 2)))
     if content.begun or content.magnitudes:
-        name = "Magnitudes: c of a controller, else the factor on the map's"
+        name = "Magnitudes: c of a controller, otherwise the factor on the map's magnitudes"
         rows.append((3, _plot(name, f"{MAGNITUDES}/**", named=content.magnitudes <= _MOST_NAMED)))
     if content.heat_map:
         heat = rrb.TensorView(
@@ -156,16 +160,16 @@ def _stimulated(content: DriveContent) -> rrb.Vertical | None:
     return rrb.Vertical(*(view for _, view in rows), row_shares=[share for share, _ in rows])
 
 
-def _measured(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
-    """One plot a physical unit, so that its curves share a scale; a target is beside what it is for."""
-    held = BehaviorLegend(info).held
+def _lay_out_measurements(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
+    """Lay out one plot per physical unit, with targets beside their attributes."""
+    target_attributes = BehaviorLegend(info).target_attributes
     plots = []
     for unit in dict.fromkeys(attribute.unit for attribute in info.attributes):
         columns = [column for column, one in enumerate(info.attributes) if one.unit == unit]
         shown = [info.attributes[column] for column in columns]
         targets = [
             f"{TARGETS}/{rr.escape_entity_path_part(name)}"
-            for name, attribute in held.items()
+            for name, attribute in target_attributes.items()
             if (content.targets is None or name in content.targets)
             and attribute in [one.name for one in shown]
         ]
@@ -184,7 +188,7 @@ def _measured(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
 
 
 def _title(attributes: Sequence[Attribute]) -> str:
-    """Names and unit; many that end in one word are named by it."""
+    """Return a title of names and unit; many names that end in the same word are summarised by it."""
     names = [attribute.name for attribute in attributes]
     if len(names) > 4:
         last = {name.split()[-1] if name.split() else name for name in names}
@@ -206,7 +210,7 @@ def _plot(
 
 
 def _time() -> rrb.TimeAxis:
-    """One above the other, the same time has the same place."""
+    """Return a time axis that is shared with the other plots."""
     return rrb.TimeAxis(link="LinkToGlobal")
 
 

@@ -1,4 +1,4 @@
-"""The Rerun viewer: started on a file and bound to this machine only, or found where it listens."""
+"""Find or start the Rerun viewer; a viewer that is started listens on this machine only."""
 
 from __future__ import annotations
 
@@ -19,32 +19,32 @@ _PROBE_SECONDS = 0.5
 
 @dataclass(frozen=True)
 class ViewerAddress:
-    """Where a viewer listens."""
+    """The address on which a viewer listens."""
 
     host: str = LOCAL
     port: int = PORT
 
     @classmethod
     def parse(cls, text: str) -> ViewerAddress:
-        """Read ``PORT``, ``HOST`` or ``HOST:PORT``; what is left out is 127.0.0.1 and 9876.
+        """Parse ``PORT``, ``HOST`` or ``HOST:PORT``; the defaults are 127.0.0.1 and 9876.
 
         Raises:
-            SessionError: it is none of these.
+            SessionError: the text has none of these forms.
         """
         match = re.fullmatch(
             r"(?:(?P<host>[A-Za-z][\w.-]*|\d+(?:\.\d+){3})(?::(?=\d)|$))?(?P<port>\d{1,5})?", text
         )
         port = PORT if match is None or match["port"] is None else int(match["port"])
         if match is None or not text or not 0 < port < 65536:
-            raise SessionError(f"viewer '{text}': expected a port, a host or host:port, such as 9876")
+            raise SessionError(f"viewer '{text}': expected PORT, HOST or HOST:PORT, such as 9876")
         return cls(match["host"] or LOCAL, port)
 
     def __str__(self) -> str:
         return f"{self.host}:{self.port}"
 
     @property
-    def listens(self) -> bool:
-        """Whether somebody listens there; asked first, because the library would wait for seconds."""
+    def is_listening(self) -> bool:
+        """Whether a viewer listens there. Ask before connecting: the library would wait for seconds."""
         try:
             socket.create_connection((self.host, self.port), _PROBE_SECONDS).close()
         except OSError:
@@ -52,18 +52,18 @@ class ViewerAddress:
         return True
 
     @property
-    def absence(self) -> str:
-        """What to say where nobody does, and what to do about it."""
+    def absence_message(self) -> str:
+        """The message for an address on which no viewer listens; it says what to do."""
         start = f"`rerun --bind {LOCAL} --port {self.port}`" if self.host == LOCAL else "a viewer there"
         return f"no viewer listens on {self}: start {start}, then drive again with --viewer"
 
 
 def viewer_command(path: Path, *, web: bool = False) -> list[str]:
-    """The command that opens a session.
+    """Return the command that opens a session in the viewer.
 
     Args:
         path: the session.
-        web: serve it to a browser on this machine instead of opening a window.
+        web: whether it is served to a browser on this machine instead of shown in a window.
 
     Raises:
         SessionError: the viewer is not installed, or there is no display for its window.
@@ -79,11 +79,11 @@ def viewer_command(path: Path, *, web: bool = False) -> list[str]:
 
 
 def find_viewer() -> str:
-    """Beside this interpreter first: that viewer has the version that wrote the files."""
+    """Return the path of the viewer, preferably that beside this interpreter, which has the right version."""
     beside = shutil.which("rerun", path=str(Path(sys.executable).parent))
     found = beside or shutil.which("rerun")
     if found is None:
-        raise SessionError("no program 'rerun' was found; `pip install rerun-sdk` brings it")
+        raise SessionError("the program 'rerun' was not found; `pip install rerun-sdk` installs it")
     return found
 
 

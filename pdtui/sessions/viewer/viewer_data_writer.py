@@ -1,7 +1,7 @@
-"""What only the viewer needs: robot, path, stimulated units, controllers, behaviors and a heat map.
+"""Write what only the viewer needs: robot, path, stimulated units, controllers, behaviors and heat map.
 
-All of it follows from the rows of the drive, so it is written in larger batches: a crash that loses the last
-of it loses no fact.
+All of it follows from the data of the drive, so it is written in larger batches: a crash that loses the last
+batch loses no information.
 """
 
 from __future__ import annotations
@@ -18,30 +18,31 @@ from pdtui.core.step_record import StepRecord
 from pdtui.core.units import format_unit
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_schema import BEHAVIORS, HEAT_MAP, MAGNITUDES, PATH, ROBOT, TARGETS, UNITS
+from pdtui.sessions.viewer.activation_heat_map import ActivationHeatMap
 from pdtui.sessions.viewer.behavior_legend import BehaviorLegend
 from pdtui.sessions.viewer.obstacle_writer import ObstacleWriter
 from pdtui.sessions.viewer.robot_shapes import RobotShapes
 from pdtui.sessions.viewer.session_blueprint import DriveContent
-from pdtui.sessions.viewer.viewer_curves import ActivationHeatMap, Color, LogStatic, Send, ViewerCurves
-from pdtui.sessions.writer.arrow_columns import number_list_column, polyline_column, texts
+from pdtui.sessions.viewer.viewer_curves import Color, LogStatic, SendRows, ViewerCurves
+from pdtui.sessions.writer.arrow_columns import number_list_column, polyline_column, text_column
 
 _UNITS_DRAWN = 4
-"""Units drawn of a state: an imprint of sixty would be a tangle, and the heat map has them all."""
+"""Number of units drawn per state. More would be a tangle, and the heat map shows them all."""
 _DRAWN_APART = 0.04
-"""Simulated time between two pictures of the robot, s: what the eye needs. Poses are the largest stream after
-the activations, and a replay has all of them."""
+"""Simulated time between two poses of the robot, s: 25 per second look smooth. Poses are the largest stream
+after the activations, and a replay recomputes them."""
 
 
 class ViewerDataWriter:
-    """Collects control steps and writes what the viewer draws of them.
+    """Collects control steps and writes what the viewer draws.
 
     Args:
-        info: of robot and policy.
+        info: the drive.
         send: writes a batch of rows.
-        log_static: writes what holds at all times.
+        log_static: writes data that apply at all times.
     """
 
-    def __init__(self, info: DriveInfo, send: Send, log_static: LogStatic) -> None:
+    def __init__(self, info: DriveInfo, send: SendRows, log_static: LogStatic) -> None:
         self._send, self._log_static = send, log_static
         self._shapes = RobotShapes(info.links)
         self._draw_every = max(1, round(_DRAWN_APART / info.dt))
@@ -79,7 +80,7 @@ class ViewerDataWriter:
         self._heat_drawn = False
 
     def add(self, records: Sequence[StepRecord]) -> None:
-        """Take in control steps."""
+        """Add control steps."""
         self._pending += len(records)
         self._obstacles.add(records)
         for record in records:
@@ -91,7 +92,7 @@ class ViewerDataWriter:
                 if state and state not in self._states:
                     self._states[state] = tuple(behavior.name for behavior in behaviors)
                     self._new_state = True
-            # The path does not run through the air to where an episode starts or a rewind leads.
+            # The path does not connect to the place where an episode starts or to which a rewind leads.
             self._jumped |= record.episode != self._episode or any(event.jumps for event in record.events)
             self._episode = record.episode
             if record.step % self._draw_every == 0:
@@ -114,11 +115,11 @@ class ViewerDataWriter:
 
     @property
     def pending(self) -> int:
-        """Control steps that are not written yet."""
+        """The number of control steps that are not written yet."""
         return self._pending
 
     def write(self) -> None:
-        """Write what was collected since the last time."""
+        """Write what was added since the last call."""
         if self._drawn:
             steps, poses, states, jumps = zip(*self._drawn, strict=True)
             self._write_robot(steps, np.array(poses), states, np.array(jumps))
@@ -128,7 +129,7 @@ class ViewerDataWriter:
             curves.write()
 
     def write_changes(self) -> None:
-        """Write at which steps other behaviors became active, and other obstacles stood around."""
+        """Write the steps at which the active behaviors or the obstacles changed."""
         self._obstacles.write()
         if self._new_state:
             colors = [self._color(state) for state in self._states]
@@ -136,11 +137,11 @@ class ViewerDataWriter:
             self._new_state = False
         if self._changes:
             steps, states = zip(*self._changes, strict=True)
-            self._send(BEHAVIORS, steps, [texts(rr.StateChange.descriptor_state(), states)])
+            self._send(BEHAVIORS, steps, [text_column(rr.StateChange.descriptor_state(), states)])
             self._changes = []
 
     def finish(self) -> None:
-        """Write what can only be drawn at the end."""
+        """Write the rest, including what can only be drawn at the end."""
         self.write_changes()
         for curves in (self._units, self._targets, self._magnitudes):
             curves.finish(self._last)
@@ -151,7 +152,7 @@ class ViewerDataWriter:
             self._heat_drawn = True
 
     def content(self) -> DriveContent:
-        """What there is to be laid out, so far."""
+        """Return what the blueprint has to lay out so far."""
         low, high = self._bounds
         return DriveContent(
             units=len(self._units.keys),
@@ -166,7 +167,7 @@ class ViewerDataWriter:
         return self._legend.color_of_state(self._states.get(state, ()))
 
     def _outputs(self, state: str, record: StepRecord) -> dict[tuple[str, int], tuple[float, float]]:
-        """Natural and overwritten outputs of the units that the state changed most when it first came."""
+        """Return natural and overwritten outputs of the units that the state changed most when it began."""
         units, values, natural = record.stimulation.units, record.stimulation.values, record.natural
         if units and state not in self._shown_units:
             change = np.abs(np.subtract(values, natural))
@@ -194,9 +195,9 @@ class ViewerDataWriter:
         )
         pieces = np.zeros((len(steps), 2, 3), np.float32)
         pieces[:, 0, :2], pieces[:, 1, :2] = before, here
-        # A picture's y axis points down, and only in a picture does the viewer fit the path to the frame.
+        # The y axis of a 2D view points down, and only a 2D view can be fitted to the path.
         above = pieces[:, :, :2] * np.array([1.0, -1.0], np.float32)
-        packed = {state: _packed(self._color(state)) for state in set(states)}
+        packed = {state: _pack_color(self._color(state)) for state in set(states)}
         colors = number_list_column(
             rr.LineStrips3D.descriptor_colors(), np.array([packed[state] for state in states], np.uint32)
         )
@@ -209,6 +210,6 @@ class ViewerDataWriter:
         self._send(PATH, steps, columns)
 
 
-def _packed(color: Color) -> int:
+def _pack_color(color: Color) -> int:
     red, green, blue = color
     return red << 24 | green << 16 | blue << 8 | 255

@@ -1,4 +1,4 @@
-"""NumPy blocks as Arrow columns for `send_columns`, without a copy and without converters."""
+"""Build Arrow columns for `rerun.send_columns` from NumPy arrays, without copies."""
 
 from __future__ import annotations
 
@@ -45,66 +45,68 @@ class TimeColumn:
 
 
 def stack_rows(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """What `numpy.stack` gives for arrays (width,) of one width, in half the time for many short ones."""
+    """Stack arrays of shape (width,) like `numpy.stack`, which takes twice as long for many short arrays."""
     return np.concatenate(arrays).reshape(len(arrays), -1)
 
 
 def time_columns(steps: Sequence[int], dt: float) -> list[TimeColumn]:
-    """Both timelines: the control step, and the simulated time at which it starts."""
+    """Return both timelines: the control step, and the simulated time at which it starts."""
     numbers = np.array(steps, dtype=np.int64)
     nanoseconds = np.rint(numbers * (dt * 1e9)).astype("timedelta64[ns]")
     return [TimeColumn(STEP, pa.array(numbers)), TimeColumn(TIME, pa.array(nanoseconds))]
 
 
 def number_list_column(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
-    """A block (n, width) as n lists; a block (n,) as n lists of one number."""
-    return _listed(descriptor, pa.array(block.reshape(-1)), _regular(len(block), block.size // len(block)))
+    """Return an array (n, width) as n lists, or an array (n,) as n lists of one number."""
+    return _list_column(
+        descriptor, pa.array(block.reshape(-1)), _even_offsets(len(block), block.size // len(block))
+    )
 
 
 def nested_list_column(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
-    """A block (n, width) as n lists of one list each: only so can the viewer select one of its numbers."""
-    inner = _regular(len(block), block.shape[1])
+    """Return an array (n, width) as n lists of one list each, from which the viewer can select a number."""
+    inner = _even_offsets(len(block), block.shape[1])
     values = pa.ListArray.from_arrays(inner, pa.array(block.reshape(-1)))
-    return _listed(descriptor, values, _regular(len(block), 1))
+    return _list_column(descriptor, values, _even_offsets(len(block), 1))
 
 
 def vector_list_column(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
-    """A block (n, m, k) as n lists of m vectors of length k."""
+    """Return an array (n, m, k) as n lists of m vectors of length k."""
     count, width, length = block.shape
     item = pa.field("item", pa.from_numpy_dtype(block.dtype), nullable=False)
     values = pa.FixedSizeListArray.from_arrays(pa.array(block.reshape(-1)), type=pa.list_(item, length))
-    return _listed(descriptor, values, _regular(count, width))
+    return _list_column(descriptor, values, _even_offsets(count, width))
 
 
 def polyline_column(descriptor: rr.ComponentDescriptor, block: NDArray[Any]) -> ComponentColumn:
-    """A block (n, m, k) as n lists of one polyline through m points of k coordinates."""
+    """Return an array (n, m, k) as n lists of one polyline through m points with k coordinates."""
     points = vector_list_column(descriptor, block).array
     item = pa.field("item", points.type.value_type, nullable=False)
     strips = pa.ListArray.from_arrays(points.offsets, points.values, type=pa.list_(item))
-    return _listed(descriptor, strips, _regular(len(block), 1))
+    return _list_column(descriptor, strips, _even_offsets(len(block), 1))
 
 
 def ragged_list_column(
     descriptor: rr.ComponentDescriptor | str, lists: Sequence[Sequence[Any]], kind: pa.DataType
 ) -> ComponentColumn:
-    """One list of its own length a row."""
+    """Return one list per row; their lengths may differ."""
     flat = [value for row in lists for value in row]
     offsets = pa.array([0, *accumulate(map(len, lists))], pa.int32())
-    return _listed(descriptor, pa.array(flat, kind), offsets)
+    return _list_column(descriptor, pa.array(flat, kind), offsets)
 
 
-def texts(descriptor: rr.ComponentDescriptor | str, values: Iterable[str]) -> ComponentColumn:
-    """One text a row."""
+def text_column(descriptor: rr.ComponentDescriptor | str, values: Iterable[str]) -> ComponentColumn:
+    """Return one text per row."""
     array = pa.array(list(values), pa.utf8())
-    return _listed(descriptor, array, _regular(len(array), 1))
+    return _list_column(descriptor, array, _even_offsets(len(array), 1))
 
 
 @lru_cache(maxsize=32)
-def _regular(count: int, width: int) -> pa.Array:
+def _even_offsets(count: int, width: int) -> pa.Array:
     return pa.array(np.arange(count + 1, dtype=np.int32) * np.int32(width))
 
 
-def _listed(descriptor: rr.ComponentDescriptor | str, values: Any, offsets: pa.Array) -> ComponentColumn:
+def _list_column(descriptor: rr.ComponentDescriptor | str, values: Any, offsets: pa.Array) -> ComponentColumn:
     if isinstance(descriptor, str):
         descriptor = rr.ComponentDescriptor(descriptor)
     return ComponentColumn(descriptor, pa.ListArray.from_arrays(offsets, values))

@@ -1,7 +1,7 @@
-"""How much a recording may still grow: on a full disk, it has to end while its end still fits.
+"""Measure the disk space that a recording has left, so that it can be ended before the disk is full.
 
-The library writes in a thread of its own. What fails there is said at the second flush after it, or, where
-nobody waits for flushes, never. So the room is looked at before rows are handed over.
+The library writes in a separate thread. A failure there is reported by the second flush after it, or never if
+nobody waits for flushes. The space is therefore checked before rows are handed over.
 """
 
 from __future__ import annotations
@@ -10,19 +10,26 @@ import os
 import resource
 from pathlib import Path
 
+from rich import filesize
+
+from pdtui.core.errors import SessionError
+
 _SLACK = 1_000_000
+"""Space that is always left free, bytes: other programs write to the disk, too."""
 _FOOTER_OF_CHUNK = 256
-"""The footer lists all chunks, at 150 to 200 bytes each."""
+"""Size of a chunk's entry in the index at the end of the file, bytes; measured were 150 to 200."""
 
 _PICTURE_COLUMNS = 768
-_AT_LEAST_A_STEP = 2000
+"""Width of the heat map of all activations; it has one byte per unit and column."""
+_LEAST_STEP_BYTES = 2000
+"""Smallest size that is assumed of a control step, bytes, besides its activations."""
 
 
 def free_space(path: Path) -> int:
-    """Bytes by which a file may grow: what its disk has left, and the process's limit on a file's size.
+    """Return by how many bytes a file can grow: the free space of its disk, within the limit on file sizes.
 
     Raises:
-        OSError: no such file.
+        OSError: the file does not exist.
     """
     disk = os.statvfs(path)
     free = disk.f_bavail * disk.f_frsize
@@ -32,8 +39,8 @@ def free_space(path: Path) -> int:
     return min(free, max(0, limit - path.stat().st_size))
 
 
-def is_full(path: Path) -> bool:
-    """Whether a write that failed did so for lack of room."""
+def is_disk_full(path: Path) -> bool:
+    """Return whether a failed write was due to a full disk."""
     try:
         return free_space(path) < _SLACK
     except OSError:
@@ -41,34 +48,47 @@ def is_full(path: Path) -> bool:
 
 
 class DiskReserve:
-    """Keeps account of what a recording needs to end whole.
+    """Computes the space that a recording needs to be ended properly.
 
     Args:
         path: the recording.
-        units: hidden units, for the picture of all activations.
-        rows: control steps that may be on their way to the file.
+        units: number of hidden units, which the heat map of all activations depends on.
+        rows: number of control steps that may be on their way to the file.
     """
 
     def __init__(self, path: Path, units: int, rows: int) -> None:
         self._path, self._rows = path, rows
         self._fixed = _SLACK + _PICTURE_COLUMNS * units
-        self._least = _AT_LEAST_A_STEP + 8 * units
+        self._least = _LEAST_STEP_BYTES + 8 * units
 
-    @property
-    def to_begin(self) -> int:
-        """Bytes without which no recording is begun."""
-        return self._fixed + self._least * self._rows
+    def require_space_to_begin(self) -> None:
+        """Create the recording's folder and check that there is space to begin the recording.
+
+        Raises:
+            SessionError: the disk is full, or the folder cannot be written.
+        """
+        needed = self._fixed + self._least * self._rows
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            free = free_space(self._path.parent)
+        except OSError as error:
+            raise SessionError(f"{self._path}: cannot be written: {error.strerror}") from error
+        if free < needed:
+            raise SessionError(
+                f"{self._path}: cannot be written: the disk is full: {filesize.decimal(free)} are free, "
+                f"a recording needs {filesize.decimal(needed)} to begin"
+            )
 
     def needed(self, steps: int, chunks: int) -> int:
-        """Bytes for the rows on their way, the picture, the outcome and the footer.
+        """Return the space for the rows on their way, the heat map, the outcome and the index, bytes.
 
         Args:
-            steps: control steps so far; they tell how large one is.
-            chunks: that were written so far.
+            steps: number of control steps so far, from which the size of a step is estimated.
+            chunks: number of chunks written so far.
         """
         step = max(self._least, 2 * self._path.stat().st_size // max(steps, self._rows))
         return self._fixed + _FOOTER_OF_CHUNK * chunks + step * self._rows
 
     def is_short(self, steps: int, chunks: int) -> bool:
-        """Whether no more than the recording's end still fits."""
+        """Return whether there is space only for the end of the recording."""
         return free_space(self._path) < self.needed(steps, chunks)

@@ -20,16 +20,16 @@ from pdtui.sessions.writer.arrow_columns import (
     number_list_column,
     ragged_list_column,
     stack_rows,
-    texts,
+    text_column,
 )
 
 
 def step_record_columns(
     records: Sequence[StepRecord], kept: ActivationsKept = "all"
 ) -> list[ComponentColumn]:
-    """One row a control step: everything of a `StepRecord` but its events and poses.
+    """Return columns with one row per control step: a `StepRecord` except its events and poses.
 
-    What no step of the batch has (behaviors, stimulation) gets no column; activations do as `kept` says.
+    Behaviors and stimulation get no column if no step of the batch has any; `kept` decides about activations.
     """
     of: Any = StepRecord._make(zip(*records, strict=True))
     actions = stack_rows(of.action)
@@ -49,12 +49,15 @@ def step_record_columns(
         )
     if any(stimulation.units for stimulation in of.stimulation):
         columns.append(
-            ragged_list_column("stimulation", [_overwrites(record) for record in records], pa.float64())
+            ragged_list_column(
+                "stimulation", [_flatten_stimulation(record) for record in records], pa.float64()
+            )
         )
     if any(of.behaviors):
         names = [[behavior.name for behavior in behaviors] for behaviors in of.behaviors]
         states = [
-            [value for behavior in behaviors for value in _state(behavior)] for behaviors in of.behaviors
+            [value for behavior in behaviors for value in _flatten_behavior(behavior)]
+            for behaviors in of.behaviors
         ]
         columns += [
             ragged_list_column("behaviors", names, pa.utf8()),
@@ -64,36 +67,36 @@ def step_record_columns(
 
 
 def to_half(activations: NDArray[np.float32]) -> NDArray[np.float16]:
-    """As float16; what is beyond its range (±65504) becomes infinite, without a warning."""
+    """Convert to float16; values beyond its range (±65504) become infinite, without a warning."""
     with np.errstate(over="ignore"):
         return activations.astype(np.float16)
 
 
 def event_columns(events: Sequence[Event], first: int) -> list[ComponentColumn]:
-    """One row an event.
+    """Return columns with one row per event.
 
     Args:
-        events: in the order in which they were applied.
+        events: the events, in the order in which they were applied.
         first: number of the first of them in the session.
     """
     numbers = np.arange(first, first + len(events), dtype=np.int64)
     return [
-        texts(rr.TextLog.descriptor_text(), [_log_line(event) for event in events]),
-        texts(rr.TextLog.descriptor_level(), ["INFO"] * len(events)),
+        text_column(rr.TextLog.descriptor_text(), [_log_line(event) for event in events]),
+        text_column(rr.TextLog.descriptor_level(), ["INFO"] * len(events)),
         number_list_column("number", numbers),
-        texts("kind", [event.kind for event in events]),
-        texts("name", [event.name for event in events]),
+        text_column("kind", [event.kind for event in events]),
+        text_column("name", [event.name for event in events]),
         number_list_column("value", np.array([event.value for event in events], np.float64)),
-        texts("key", [event.key for event in events]),
+        text_column("key", [event.key for event in events]),
     ]
 
 
 def ending_columns(records: Sequence[StepRecord]) -> list[ComponentColumn]:
-    """One row an episode that ended by itself."""
+    """Return columns with one row per episode that ended by itself."""
     levels = ["ERROR" if record.diverged else "WARN" for record in records]
     return [
-        texts(rr.TextLog.descriptor_text(), [record.ended for record in records]),
-        texts(rr.TextLog.descriptor_level(), levels),
+        text_column(rr.TextLog.descriptor_text(), [record.ended for record in records]),
+        text_column(rr.TextLog.descriptor_level(), levels),
     ]
 
 
@@ -101,12 +104,12 @@ def _log_line(event: Event) -> str:
     return f"[{event.key}] {describe_event(event)}" if event.key else describe_event(event)
 
 
-def _overwrites(record: StepRecord) -> list[float]:
+def _flatten_stimulation(record: StepRecord) -> list[float]:
     stimulation = record.stimulation
     triples = zip(stimulation.units, stimulation.values, record.natural, strict=True)
     return [value for triple in triples for value in triple]
 
 
-def _state(behavior: ActiveBehavior) -> list[float]:
+def _flatten_behavior(behavior: ActiveBehavior) -> list[float]:
     values = [getattr(behavior, field) for field in ACTIVE_FIELDS]
     return [math.nan if value is None else float(value) for value in values]
