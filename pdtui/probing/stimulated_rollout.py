@@ -46,8 +46,8 @@ class RolloutOutcome(NamedTuple):
     """What one roll-out measures.
 
     Attributes:
-        means: mean of each attribute over the measured steps of the episode, shape (J,); for an angle, the mean
-            change since the start, unwrapped. NaN if it ended before the measured steps.
+        means: mean of each attribute over the measured steps of the episode, shape (J,); for an angle, the
+            mean change since the start, unwrapped. NaN if it ended before the measured steps.
         error: mean distance from the target over the measured steps; NaN for a fixed stimulation.
         steps_survived: control steps until the episode ended, or all of them.
         fell: whether the robot fell or the simulation diverged.
