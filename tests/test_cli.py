@@ -159,6 +159,16 @@ def test_a_map_of_another_policy_needs_force(
     assert refused.exit_code == 1
     assert "made for a policy with SHA-256 000000000000…" in refused.output
     assert run("drive", "ant", "--map", other, "--headless", "--steps", 5, "--force").exit_code == 0
+    for command in (
+        ("evaluate", other, "--update", "--force", "--seeds", "100"),
+        ("tune", other, "--all", "--force", "--seeds", "200-201", "--points", 1, "--refinements", 0),
+    ):
+        result = run(*command)
+        assert result.exit_code == 1
+        assert result.output.startswith("pdtui: --")
+        assert "another policy" in result.output
+        assert result.output.count("\n") == 1
+    assert other.read_text() == text
 
 
 def test_a_robot_without_a_map_is_driven_by_its_policy_alone(tmp_path: Path) -> None:

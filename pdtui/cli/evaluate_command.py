@@ -23,6 +23,7 @@ from pdtui.cli.shared_options import (
     start_option,
     workers_option,
 )
+from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
 
 if TYPE_CHECKING:
@@ -126,6 +127,8 @@ def evaluate(
         raise click.UsageError("--target, --policy-only, --update and --experiment exclude each other")
     if start and not policy_only:
         raise click.UsageError("--start needs --policy-only; tasks and experiments have their own starts")
+    if update and force:
+        raise MapError("--update does not go with --force: the map would get another policy's figures")
     if others and (map_name or policy):
         raise click.UsageError("--map and --policy go with one map; compared maps name their policies")
     if experiment is None and own_options:
@@ -166,12 +169,13 @@ def evaluate(
 def _evaluate_behaviors(config: DriveConfig, seeds: range, workers: int, update: bool, as_json: bool) -> None:
     from pdtui.evaluation.behavior_evaluation import evaluate_map
     from pdtui.evaluation.evaluation_tables import behavior_tables
-    from pdtui.stimulation.map_writer import write_effects
+    from pdtui.stimulation.map_writer import replace_effects, rewrite_map
 
     with progress_bar_or_none("evaluating", quiet=as_json) as advance:
         result = evaluate_map(config, seeds, workers=workers, progress=advance)
     if update:
-        write_effects(Path(config.stimulation_map.source), result.measured())
+        path = Path(config.stimulation_map.source)
+        rewrite_map(path, lambda text: replace_effects(text, result.measured(), str(path)))
     show_result(result.as_dict(), as_json, lambda: behavior_tables(result))
 
 

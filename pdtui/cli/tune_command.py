@@ -15,6 +15,7 @@ from pdtui.cli.shared_options import (
     show_result,
     workers_option,
 )
+from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
 
 
@@ -76,6 +77,8 @@ def tune(
     """
     if bool(behaviors) == every:
         raise click.UsageError("expected either a BEHAVIOR or --all")
+    if force and not dry_run:
+        raise MapError("--force needs --dry-run: the map would get gains tuned for another policy")
     from pdtui.evaluation.tracking_tables import tuned_table
     from pdtui.search.gain_tuning import TuningSettings
     from pdtui.search.gain_tuning import tune_gains as search

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tomlkit
 from rich.console import RenderableType
 from rich.text import Text
 
-from pdtui.core.atomic_file import write_file
+from pdtui.core.atomic_file import check_writable, write_file
 from pdtui.core.errors import MapError
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
@@ -21,9 +20,8 @@ from pdtui.search.plan_search import TimeBudget
 from pdtui.search.task_rollout import TimedStimulation
 from pdtui.search.task_search import TaskSearch, TaskSearchResult, TaskSearchSettings
 from pdtui.stimulation.map_reader import load_map
-from pdtui.stimulation.map_toml import outputs_table
-from pdtui.stimulation.map_writer import add_behavior, rewrite_map
-from pdtui.stimulation.stimulation_map import StimulationMap
+from pdtui.stimulation.map_writer import add_behavior, compose_map, rewrite_map
+from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 
 @dataclass(frozen=True)
@@ -87,26 +85,29 @@ def search_task_into_map(
         PdtuiError: the robot or the policy cannot be had.
     """
     known = load_map(output) if output.exists() else None
+    check_writable(output, MapError)
     with RolloutPool(robot, policy, workers, import_options) as pool:
-        wanted = pool.robot.find_task(task)
+        goal, layers, dt = pool.robot.find_task(task), pool.policy.layers, pool.robot.control_dt
         if known is not None:
-            known.check(robot, pool.policy.layers, pool.policy.sha256)
-        begin = [] if known is None else _known(known, task, pool)
-        search = TaskSearch(pool, wanted, seed, settings, begin)
+            known.check(robot, layers, pool.policy.sha256)
+        begin = [] if known is None else _known_plans(known, task, pool)
+        search = TaskSearch(pool, goal, seed, settings, begin)
         result = search.run(TimeBudget(minutes).share(), progress)
-        dt, addressed = pool.robot.control_dt, result.plan.stimulation.by_address(pool.policy.layers)
-        if known is None:
-            _new_map(output, robot, pool.policy.name, pool.policy.sha256, import_options)
+        new_map = StimulationMap(
+            robot, pool.policy.name, pool.policy.sha256, "space", {}, {}, import_options=import_options
+        )
+    units = result.plan.stimulation.by_address(layers)
     seconds = None if result.plan.steps is None else round(result.plan.steps * dt, 6)
-    entry: dict[str, Any] = {"name": wanted.name, "key": wanted.key, "says": wanted.says}
-    if seconds is not None:
-        entry["period"] = seconds
-    entry |= {"task": wanted.name, "magnitudes": outputs_table(addressed)}
-    rewrite_map(output, lambda text: add_behavior(text, entry, str(output)))
-    return WrittenBehavior(result, addressed, seconds, output)
+    behavior = Behavior(goal.name, goal.key, goal.says, units, period=seconds, task=goal.name)
+    if known is None:
+        text = add_behavior(compose_map(new_map), behavior, str(output))
+        write_file(output, text, MapError)
+    else:
+        rewrite_map(output, lambda text: add_behavior(text, behavior, str(output)))
+    return WrittenBehavior(result, units, seconds, output)
 
 
-def _known(stimulation_map: StimulationMap, task: str, pool: RolloutPool) -> list[TimedStimulation]:
+def _known_plans(stimulation_map: StimulationMap, task: str, pool: RolloutPool) -> list[TimedStimulation]:
     """The map's own behavior for the task."""
     found = []
     for behavior in stimulation_map.behaviors.values():
@@ -116,11 +117,3 @@ def _known(stimulation_map: StimulationMap, task: str, pool: RolloutPool) -> lis
             steps = None if behavior.period is None else round(behavior.period / pool.robot.control_dt)
             found.append(TimedStimulation(Stimulation.of(values), steps))
     return found
-
-
-def _new_map(path: Path, robot: str, policy: str, sha256: str, import_options: ImportOptions) -> None:
-    document = tomlkit.document()
-    document["schema"], document["robot"] = 1, robot
-    given = {name: value for name, value in vars(import_options).items() if value}
-    document["policy"] = {"name": policy, "sha256": sha256, **given}
-    write_file(path, tomlkit.dumps(document), MapError)

@@ -6,11 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import tomlkit
-
 from pdtui.core.errors import MapError
 from pdtui.stimulation.map_reader import load_map, parse_map
-from pdtui.stimulation.stimulation_map import SCHEMA, StimulationMap
+from pdtui.stimulation.map_writer import compose_map
+from pdtui.stimulation.stimulation_map import StimulationMap
 
 
 def shipped_folder(kind: str) -> Path:
@@ -45,8 +44,9 @@ def find_map(name: str) -> Path:
 
 def bare_map(robot: str, policy: str) -> StimulationMap:
     """A map without behaviors, for a robot that has none yet: the policy is on its own."""
-    text = tomlkit.dumps({"schema": SCHEMA, "robot": robot, "policy": {"name": policy, "sha256": ""}})
-    return parse_map(text, f"the map of {robot} without behaviors")
+    source = f"the map of {robot} without behaviors"
+    text = compose_map(StimulationMap(robot, policy, "", "space", {}, {}, source=source))
+    return parse_map(text, source)
 
 
 @dataclass(frozen=True)

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
 
-import tomlkit
-from tomlkit.exceptions import TOMLKitError
-
-from pdtui.core.errors import MapError
 from pdtui.policies.weights.file_search import find_inside
 from pdtui.policies.weights.import_options import NO_NORMALISER, NO_OPTIONS, ImportOptions
+from pdtui.stimulation.map_writer import compose_map, replace_policy
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 
@@ -35,14 +31,9 @@ def resolve_map_policy(
     found = locate_map_policy(stimulation_map, policy, import_options)
     if (found.policy, found.import_options) == (stimulation_map.policy, stimulation_map.import_options):
         return stimulation_map
-    try:
-        document = tomlkit.parse(stimulation_map.text)
-    except TOMLKitError as error:
-        raise MapError(f"{stimulation_map.source}: not a TOML file: {error}") from error
-    table = cast(dict[str, Any], document.setdefault("policy", tomlkit.table()))
-    table["name"] = found.policy
-    table.update({field: value for field, value in asdict(found.import_options).items() if value})
-    return replace(found, text=tomlkit.dumps(document))
+    text = stimulation_map.text or compose_map(stimulation_map)
+    text = replace_policy(text, found.policy, found.import_options, stimulation_map.source)
+    return replace(found, text=text)
 
 
 def locate_map_policy(

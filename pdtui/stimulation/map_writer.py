@@ -1,132 +1,180 @@
-"""New figures and behaviors in a map that somebody edited: everything else stays as it was written."""
+"""Writing maps. In a map that somebody edited, everything but the change stays as it was, comments included.
+
+Every text is read again before it is returned, so that what is written is a map.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import tomlkit
+from tomlkit.exceptions import TOMLKitError
 
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import MapError
+from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.stimulation.map_reader import parse_map
-from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains
+from pdtui.stimulation.map_toml import (
+    array_of,
+    behavior_fields,
+    effect_table,
+    policy_fields,
+    primitive_fields,
+    table_of,
+)
+from pdtui.stimulation.stimulation_map import SCHEMA, Behavior, MeasuredEffect, PidGains, StimulationMap
 
 Value = TypeVar("Value")
 
 
-def effect_table(measured: MeasuredEffect) -> tomlkit.items.InlineTable:
-    """An effect as maps hold it: four digits, and the falls where they were counted."""
-    table = tomlkit.inline_table()
-    for name in ("effect", "low", "high"):
-        table[name] = float(f"{getattr(measured, name):.4g}")
-    if measured.falls is not None and measured.of is not None:
-        table.update({"falls": measured.falls, "of": measured.of})
-    return table
+def compose_map(stimulation_map: StimulationMap, comments: Sequence[str] = ()) -> str:
+    """Return the text of a new map.
+
+    Args:
+        stimulation_map: What the map holds; its `text` is not used.
+        comments: Lines at the top.
+
+    Raises:
+        MapError: Something in it is not allowed in a map.
+    """
+    document = tomlkit.document()
+    for line in comments:
+        document.add(tomlkit.comment(line))
+    document.add("schema", tomlkit.item(SCHEMA))
+    document.add("robot", tomlkit.item(stimulation_map.robot))
+    policy = stimulation_map.policy, stimulation_map.policy_hash, stimulation_map.import_options
+    document.add("policy", table_of(policy_fields(*policy)))
+    document.add("keys", table_of({"default": stimulation_map.default_key}))
+    if primitives := [primitive_fields(one) for one in stimulation_map.primitives.values()]:
+        document.add("primitives", array_of(primitives))
+    if behaviors := [behavior_fields(one) for one in stimulation_map.behaviors.values()]:
+        document.add("behaviors", array_of(behaviors))
+    text = tomlkit.dumps(document)
+    parse_map(text, stimulation_map.source)
+    return text
 
 
 def replace_effects(text: str, measured: Mapping[str, MeasuredEffect], source: str) -> str:
-    """The map's text with what was measured of its behaviors; comments, order and layout stay.
+    """Return the text of a map with other measured effects.
 
     Args:
-        text: of a map.
-        measured: effects by the names of behaviors.
-        source: of the text, for messages.
+        text: The map.
+        measured: Effects by the names of their behaviors.
+        source: Name of the map in messages.
 
     Raises:
-        MapError: the text is no map, or has no such behavior.
+        MapError: The text is no map, or it lacks one of the behaviors.
     """
 
-    def write(table: Any, value: MeasuredEffect) -> None:
-        table["measured"] = effect_table(value)
+    def replace(behavior: Any, effect: MeasuredEffect) -> None:
+        behavior["measured"] = effect_table(effect)
 
-    return _with_fields(text, measured, write, source)
+    return _edit_behaviors(text, source, measured, replace)
 
 
 def replace_gains(text: str, gains: Mapping[str, PidGains], source: str) -> str:
-    """The map's text with other gains and limits of behaviors of mode ``pid``; everything else stays.
+    """Return the text of a map with other gains and limits of behaviors of mode ``pid``.
 
     Args:
-        text: of a map.
-        gains: controllers by the names of behaviors.
-        source: of the text, for messages.
+        text: The map.
+        gains: Controllers by the names of their behaviors.
+        source: Name of the map in messages.
 
     Raises:
-        MapError: as `replace_effects`, or a behavior of another mode.
+        MapError: As `replace_effects`, or a behavior has another mode.
     """
 
-    def write(table: Any, pid: PidGains) -> None:
-        if "pid" not in table:
-            raise MapError(f"{source}: behavior '{table['name']}': expected mode pid, found fixed")
-        table["pid"].update({name: getattr(pid, name) for name in ("kp", "ki", "kd", "limit")})
+    def replace(behavior: Any, pid: PidGains) -> None:
+        if "pid" not in behavior:
+            raise MapError(f"{source}: behavior '{behavior['name']}': expected mode pid, found fixed")
+        behavior["pid"].update({name: getattr(pid, name) for name in ("kp", "ki", "kd", "limit")})
 
-    return _with_fields(text, gains, write, source)
-
-
-def _with_fields(
-    text: str, values: Mapping[str, Value], write: Callable[[Any, Value], None], source: str
-) -> str:
-    known = parse_map(text, source).behaviors
-    missing = [name for name in values if name not in known]
-    if missing:
-        raise MapError(f"{source}: no behavior '{missing[0]}'; there are {', '.join(known)}")
-    document = tomlkit.parse(text)
-    for table in document.get("behaviors", []):
-        if table["name"] in values:
-            write(table, values[table["name"]])
-    changed = tomlkit.dumps(document)
-    parse_map(changed, source)
-    return changed
+    return _edit_behaviors(text, source, gains, replace)
 
 
-def add_behavior(text: str, entry: Mapping[str, Any], source: str) -> str:
-    """The map's text with one behavior more, or with a new one in place of that of the same name.
+def replace_policy(text: str, name: str, import_options: ImportOptions, source: str) -> str:
+    """Return the text of a map that names its policy's file otherwise. The hash stays.
 
     Args:
-        text: of a map.
-        entry: the behavior's fields, as the map is to hold them; ``name`` and ``key`` among them. A behavior
-            that is replaced keeps its key.
-        source: of the text, for messages.
+        text: The map.
+        name: Weights file, or name of a shipped policy.
+        import_options: Answers to what the weights file does not state.
+        source: Name of the map in messages.
 
     Raises:
-        MapError: the text is no map, or is none any more with the behavior.
+        MapError: The text is no map.
     """
-    parse_map(text, source)
-    document = tomlkit.parse(text)
-    behaviors = document.setdefault("behaviors", tomlkit.aot())
-    table = next((one for one in behaviors if one["name"] == entry["name"]), None)
-    if table is None:
-        table = tomlkit.table()
-        behaviors.append(table)
-        table["name"], table["key"] = entry["name"], entry["key"]
-    for field in [name for name in table if name not in ("name", "key")]:
-        del table[field]
-    for field, value in entry.items():
-        if field not in ("name", "key"):
-            table[field] = value
-    changed = tomlkit.dumps(document)
-    parse_map(changed, source)
-    return changed
+
+    def replace(document: Any) -> None:
+        policy = document["policy"]
+        policy.update(policy_fields(name, policy["sha256"], import_options))
+
+    return _edit(text, source, replace)
 
 
-def write_effects(path: Path, measured: Mapping[str, MeasuredEffect]) -> None:
-    """Write figures into a map's file, in one step.
+def add_behavior(text: str, behavior: Behavior, source: str) -> str:
+    """Return the text of a map with one more behavior, or with a new one in place of that of the same name.
+
+    Args:
+        text: The map.
+        behavior: The behavior. One that takes another's place keeps the other's key.
+        source: Name of the map in messages.
 
     Raises:
-        MapError: as `replace_effects`, or the file cannot be written.
+        MapError: The text is no map, or the behavior does not fit into it.
     """
-    rewrite_map(path, lambda text: replace_effects(text, measured, str(path)))
+    fields = behavior_fields(behavior)
+
+    def add(document: Any) -> None:
+        behaviors = document.setdefault("behaviors", tomlkit.aot())
+        table = next((one for one in behaviors if one["name"] == behavior.name), None)
+        if table is None:
+            behaviors.append(table_of(fields))
+            return
+        for name in [name for name in table if name not in ("name", "key")]:
+            del table[name]
+        for name, value in table_of(fields).items():
+            if name not in ("name", "key"):
+                table[name] = value
+
+    return _edit(text, source, add)
 
 
 def rewrite_map(path: Path, change: Callable[[str], str]) -> None:
-    """Replace a map's text, in one step.
+    """Replace the text of a map's file by what `change` makes of it, atomically.
 
     Raises:
-        MapError: what `change` raises, or the file cannot be read or written.
+        MapError: What `change` raises, or the file cannot be read or written.
     """
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise MapError(f"{path}: cannot be read: {error.strerror}") from error
     write_file(path, change(text), MapError)
+
+
+def _edit_behaviors(
+    text: str, source: str, values: Mapping[str, Value], replace: Callable[[Any, Value], None]
+) -> str:
+    def edit(document: Any) -> None:
+        tables = {str(table["name"]): table for table in document.get("behaviors", [])}
+        for name, value in values.items():
+            if name not in tables:
+                raise MapError(f"{source}: no behavior '{name}'; there are {', '.join(tables) or 'none'}")
+            replace(tables[name], value)
+
+    return _edit(text, source, edit)
+
+
+def _edit(text: str, source: str, change: Callable[[Any], None]) -> str:
+    parse_map(text, source)
+    try:
+        document = tomlkit.parse(text)
+    except TOMLKitError as error:
+        raise MapError(f"{source}: not a TOML file: {error}") from error
+    change(document)
+    changed = tomlkit.dumps(document)
+    parse_map(changed, source)
+    return changed
