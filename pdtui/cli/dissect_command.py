@@ -1,4 +1,4 @@
-"""`pdtui dissect`: from a policy to a map and a report."""
+"""`pdtui dissect`: write a map and a report of what a policy's units do."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pdtui.cli.shared_options import (
     core_count,
     import_option_flags,
     json_option,
+    overwrite_option,
     progress_bar_or_none,
     show_result,
     workers_option,
@@ -22,45 +23,71 @@ from pdtui.policies.weights.import_options import ImportOptions
 @click.option(
     "--env",
     metavar="ID",
-    help="Instead of ROBOT: an environment registered with Gymnasium, such as Hopper-v5. With a module in "
-    "front (package.module:Thing-v0), that is imported first.",
+    help="Instead of ROBOT, an environment registered with Gymnasium, such as Hopper-v5. A module in front "
+    "of it (package.module:Name-v0) is imported first.",
 )
-@click.option("--policy", default="", help="Weights to dissect; default: the robot's shipped policy.")
+@click.option("--policy", default="", help="Weights file or shipped policy.  [default: the robot's]")
 @import_option_flags
-@click.option("--preset", type=click.Choice(["paper", "authors"]), default="paper", show_default=True)
+@click.option(
+    "--preset",
+    type=click.Choice(["paper", "authors"]),
+    default="paper",
+    show_default=True,
+    help="Match units as the paper describes it, or as its authors' code does.",
+)
 @click.option(
     "--set",
     "preset_changes",
     multiple=True,
     metavar="NAME=VALUE",
-    help="Change a choice of the preset, such as window=hann or length=32; a wrong name lists all.",
-)
-@click.option("--episodes", type=click.IntRange(1, 1000), default=5, show_default=True)
-@click.option("--seed", type=click.IntRange(1000, 2**31 - 1), default=1000, show_default=True)
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The map; default: maps/ROBOT-dissected.toml."
+    help="Change a setting of the preset, such as window=hann or length=32. An unknown name lists them all. "
+    "May be repeated.",
 )
 @click.option(
-    "--quick", is_flag=True, help="A first look, for about a minute: fewer probes, and hardly a search."
+    "--episodes",
+    type=click.IntRange(1, 1000),
+    default=5,
+    show_default=True,
+    help="Episodes in which units and attributes are monitored.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(1000, 2**31 - 1),
+    default=1000,
+    show_default=True,
+    help="Seed of every random choice.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE.toml",
+    help="File of the map.  [default: maps/ROBOT-dissected.toml]",
+)
+@click.option(
+    "--quick", is_flag=True, help="Take a first look of about a minute: fewer probes, hardly any search."
 )
 @click.option(
     "--report",
     type=click.Path(path_type=Path),
     metavar="FILE.rrd",
-    help="The report for the Rerun viewer; default: beside the map, under its name.",
+    help="File of the report for the Rerun viewer.  [default: the map's name with .rrd]",
 )
 @click.option(
-    "--figures", type=click.Path(path_type=Path), metavar="FOLDER", help="Draw figures as PNGs, too."
+    "--figures", type=click.Path(path_type=Path), metavar="FOLDER", help="Also draw figures as PNG files."
 )
-@click.option("--overwrite", is_flag=True, help="Replace map, report and figures that exist already.")
+@overwrite_option
 @click.option(
-    "--start-from", metavar="MAP", help="Searches begin from this map's behaviors, too: a name or a file."
+    "--start-from",
+    metavar="MAP",
+    help="Also begin the searches from the behaviors of this map, given by name or file.",
 )
 @click.option(
     "--budget",
     type=click.FloatRange(0, min_open=True),
     metavar="MINUTES",
-    help="Searches end, with the best so far, when this is over; every unit is screened all the same.",
+    help="End the searches after this time with the best found so far. Every unit is screened even if that "
+    "takes longer.",
 )
 @workers_option
 @json_option

@@ -1,4 +1,4 @@
-"""`pdtui pursue`: search for a stimulation that does a task."""
+"""`pdtui pursue`: search for a stimulation with which a robot does a task."""
 
 from __future__ import annotations
 
@@ -20,22 +20,31 @@ from pdtui.policies.weights.import_options import ImportOptions
 @click.command()
 @click.argument("robot")
 @click.argument("task")
-@click.option("--policy", default="", help="Weights; default: the robot's shipped policy.")
+@click.option("--policy", default="", help="Weights file or shipped policy.  [default: the robot's]")
 @import_option_flags
-@click.option("--seed", type=click.IntRange(1000, 2**31 - 1), default=1000, show_default=True)
+@click.option(
+    "--seed",
+    type=click.IntRange(1000, 2**31 - 1),
+    default=1000,
+    show_default=True,
+    help="Seed of every random choice.",
+)
 @click.option(
     "--minutes",
     type=click.FloatRange(0, min_open=True),
     default=10.0,
     show_default=True,
-    help="The search ends, with the best so far, when these are over; every unit is tried all the same.",
+    help="End the search after this time with the best found so far. Every unit is tried even if that takes "
+    "longer.",
 )
-@click.option("--quick", is_flag=True, help="A first look: few units, and hardly a search.")
+@click.option("--quick", is_flag=True, help="Take a first look: few units, hardly any search.")
 @click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path),
-    help="The map that gets the behavior, new or of the same policy; default: maps/ROBOT-dissected.toml.",
+    metavar="FILE.toml",
+    help="The map that gets the behavior: a new file, or a map of the same policy.  "
+    "[default: maps/ROBOT-dissected.toml]",
 )
 @workers_option
 @json_option
@@ -51,7 +60,10 @@ def pursue(
     workers: int | None,
     as_json: bool,
 ) -> None:
-    """Search for units that do a TASK of ROBOT, such as 'walker hop', and write the behavior into a map."""
+    """Search for a stimulation with which ROBOT does TASK, and write it into a map.
+
+    For example, `pdtui pursue walker hop`.
+    """
     from pdtui.dissection.search_task_into_map import search_task_into_map
     from pdtui.robots import file_stem
     from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearchSettings
