@@ -1,7 +1,7 @@
 """Drive a trained neural controller from a terminal by stimulating its hidden units.
 
-From Python: `load_policy`, `dissect`, `drive`, `replay`. They load PyTorch and the simulator when they are
-first named, not when pdtui is imported.
+From Python, use `load_policy`, `dissect`, `drive` and `replay`. PyTorch and the simulator are loaded when one
+of them is first accessed, not when pdtui is imported.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Recorded drives as regression tests of a policy.
+"""Pytest plugin: recorded drives as regression tests of a policy.
 
-The plugin comes with the package: pytest finds it by itself. Drive once, keep the session beside the tests,
-and every later run repeats the drive and compares it step by step.
+Pytest finds the plugin by itself. Drive once, keep the session beside the tests, and every later run repeats
+the drive and compares it step by step.
 
 Example::
 
@@ -9,9 +9,9 @@ Example::
     def test_my_policy_still_walks(pdtui_session):
         pdtui_session("sessions/walk.rrd", policy="my_policy.safetensors")
 
-A test fails with the first step that differs and how far each attribute is off. On the machine and with
+A failing test names the first step that differs, and how far each attribute is off. On the machine and with
 the versions that recorded the session, every bit must be the same. Elsewhere, the attributes have to agree
-for the first seconds (see `pdtui.drive.replay.TOLERANCE`); ``strict=True`` asks for the same bits there.
+for the first seconds (see `pdtui.drive.replay.TOLERANCE`), unless ``strict=True`` demands the same bits.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _SHOWN = 8
 
 
 class SessionCheck(Protocol):
-    """What the fixture `pdtui_session` offers."""
+    """Type of the fixture `pdtui_session`."""
 
     def __call__(
         self,
@@ -47,17 +47,17 @@ class SessionCheck(Protocol):
 
 @pytest.fixture
 def pdtui_session(request: pytest.FixtureRequest) -> SessionCheck:
-    """Repeat a recorded drive; the test fails with the first step that differs.
+    """Repeat a recorded drive, and fail the test at the first step that differs.
 
-    The value is called with
+    The fixture is a function. Its arguments are
 
-    - the session: a path from the test's own folder, from pytest's root folder, or absolute;
-    - ``policy``: a weights file (found like the session), a shipped name, or a live network; by default the
-      session's own. Other weights than the session's are run and compared all the same;
-    - ``robot``: where the session's is not known by its name;
-    - ``strict``, ``tolerance``, ``required_steps``: as for `pdtui.drive.replay.replay_session`;
+    - the session: a path relative to the test's folder or pytest's root folder, or absolute;
+    - ``policy``: a weights file (found like the session), the name of a shipped policy, or a live network;
+      by default the session's. Other weights than the session's are run and compared all the same;
+    - ``robot``: the robot, if the session's cannot be built from its name;
+    - ``strict``, ``tolerance``, ``required_steps``: as for `pdtui.drive.replay.replay_session`.
 
-    and returns the `ReplayResult` of a drive that repeats.
+    It returns the `ReplayResult` of a drive that repeats.
     """
     folders = (request.path.parent, request.config.rootpath)
 
@@ -69,7 +69,7 @@ def pdtui_session(request: pytest.FixtureRequest) -> SessionCheck:
         strict: bool = False,
         **tolerance: float,
     ) -> ReplayResult:
-        # Only a test that asks for a drive pays for torch and the simulator.
+        # Imported here, so that only tests that replay a drive load torch and a simulator.
         from pdtui.api import replay
         from pdtui.core.errors import PdtuiError
 
@@ -88,7 +88,7 @@ def pdtui_session(request: pytest.FixtureRequest) -> SessionCheck:
 
 
 def _find(name: str | Path, folders: tuple[Path, ...]) -> Path:
-    """The file of that name in the first folder that has it; the name itself where none has."""
+    """Return the file in the first folder that has it, or the name itself if none has."""
     return next((folder / name for folder in folders if (folder / name).exists()), Path(name))
 
 

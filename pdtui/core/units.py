@@ -12,6 +12,9 @@ from pdtui.core.errors import PolicyError
 ADDRESS = re.compile(r"([\w.]{1,200}):(\d{1,9})")
 """``layer:index``, the layer by its number or its name."""
 
+MAX_LISTED = 6
+"""Largest number of units that a text names one by one."""
+
 _NAME = re.compile(r"[\w.]{1,200}")
 
 
@@ -129,3 +132,10 @@ class Stimulation:
 
 
 NO_STIMULATION = Stimulation()
+
+
+def describe_units(outputs: Mapping[str, float]) -> str:
+    """Return units and their outputs as text, or only their number if there are more than `MAX_LISTED`."""
+    if len(outputs) > MAX_LISTED:
+        return f"{len(outputs)} units"
+    return ", ".join(f"{unit} = {value:g}" for unit, value in outputs.items())

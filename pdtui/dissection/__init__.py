@@ -1,5 +1,7 @@
-"""Policy Dissection: which hidden units move what. One module a step of the method, in the paper's order.
+"""Policy Dissection: finds out which hidden units move what.
 
-monitor -> spectrum -> matching -> phase (section 3.2 of the paper), then probe, combine and hold, which
-measure what a stimulation does instead of guessing it; propose writes the map and report the tables.
+`pdtui.dissection.dissect` runs the method in the paper's order: monitor, transform, match and correlate
+phases (section 3.2, in `pdtui.spectra`), then probe units and search for behaviors, which measures what a
+stimulation does instead of inferring it (`pdtui.probing`, `pdtui.search`). The other modules turn the result
+into a map, data and tables.
 """

@@ -1,4 +1,4 @@
-"""Up and down for each attribute: the best confirmed unit, or two units whose side effects cancel."""
+"""Finds what moves each attribute up and down: a confirmed unit, or two whose side effects cancel."""
 
 from __future__ import annotations
 
@@ -19,21 +19,23 @@ from pdtui.spectra.monitor import MonitoredEpisode, StepProgress
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
 _KEPT = 0.7
+"""Share of the main effect that a second unit has to keep, and share of the side effects that it may keep."""
 _SAME = 0.99
+"""Correlation at which two attributes show the same."""
 
 
 @dataclass(frozen=True)
 class AttributeMover:
-    """What moves one attribute one way.
+    """A stimulation that moves one attribute up or down.
 
     Attributes:
-        column: of the attribute.
+        column: Column of the attribute.
         sign: 1 for up, −1 for down.
-        stimulation: one unit, or two.
-        measured: change of the attribute, over starts that chose nothing.
-        side: largest change of any other attribute, in parts of that attribute's usual spread.
-        main: change of this one, in the same measure.
-        alone: `side` of the best single unit, where a second one was added to cancel it, else None.
+        stimulation: One unit, or two.
+        measured: Change of the attribute, from held-out starts.
+        side: Largest change of any other attribute, in standard deviations of that attribute.
+        main: Change of this attribute, in its standard deviations.
+        alone: `side` of the best single unit if a second one was added to cancel it, else None.
     """
 
     column: int
@@ -46,15 +48,15 @@ class AttributeMover:
 
 
 def movable_columns(attributes: Sequence[Attribute], episodes: Sequence[MonitoredEpisode]) -> list[int]:
-    """Columns that behaviors are proposed for: what the body does, where it varies at all.
+    """Return the columns of the attributes that behaviors may be proposed for.
 
-    Left out are a torque, which is what the policy commands; the reward, which is what the world says of it;
-    what only runs on, such as a position along the way, since it is somewhere else whatever one does; and
-    what shows the same as an earlier column (the speed of a robot that only goes forward).
+    Left out are torques, which the policy commands; the reward; attributes that do not vary; attributes that
+    mostly progress, such as the position along the way; and attributes that show the same as an earlier
+    column, such as the speed of a robot that only walks forward.
 
     Args:
-        attributes: of the robot.
-        episodes: unstimulated.
+        attributes: The robot's attributes.
+        episodes: Episodes without stimulation.
     """
     values = np.concatenate([episode.attributes for episode in episodes])
     kept: list[int] = []
@@ -73,7 +75,7 @@ def movable_columns(attributes: Sequence[Attribute], episodes: Sequence[Monitore
 
 
 def _runs_on(series: Floats) -> bool:
-    """Whether most of what changes is progress, the same way and about as fast in both halves."""
+    """Return whether most change is progress, in the same direction and about as fast in both halves."""
     half = len(series) // 2
     if half < 2:
         return False
@@ -96,21 +98,20 @@ def find_attribute_movers(
     settings: DissectionSettings,
     progress: StepProgress | None = None,
 ) -> tuple[AttributeMover, ...]:
-    """Up and down for each attribute that a confirmed unit moves.
+    """Return a stimulation for up and one for down, for each attribute that a confirmed unit moves.
 
-    Effects are means over the last two thirds of roll-outs that are much longer than those of the sweeps: a
-    unit that only shifts the phase of the gait moves an attribute for half a step, and then not at all.
+    Effects are means over the last two thirds of roll-outs that are much longer than those of the sweeps. A
+    unit that only shifts the phase of the gait moves an attribute for half a stride, and then not at all.
 
     Args:
-        prober: measures.
-        columns: of the attributes; also those whose side effects count.
-        spread: usual standard deviation of every attribute, shape (J,).
-        screen: every unit.
-        refined: the units to choose from.
-        starts: that neither sweep saw. The first half decides between units, the other half gives the
-            figures.
+        prober: Measures effects.
+        columns: Columns of the attributes. Their side effects count, too.
+        spread: Standard deviation of every attribute, shape (J,).
+        screen: Effects of every unit.
+        refined: Effects of the units to choose from.
+        starts: Starts that neither sweep used. The first half chooses units, the other half measures them.
         settings: How many units to try, and for how long.
-        progress: called with (directions done, directions).
+        progress: Called with the directions done and their total.
     """
     found = []
     half, steps = len(starts) // 2, settings.mover_steps
@@ -139,9 +140,9 @@ def find_attribute_movers(
 def _singles(
     column: int, sign: int, screen: UnitEffects, refined: UnitEffects, count: int
 ) -> list[Stimulation]:
-    """The units, each at its best output, that move the attribute that way most surely.
+    """Return the units, each at its best output, that move the attribute that way most reliably.
 
-    Only inside the units' safe ranges, and only those that move it more than units drawn at random.
+    Outputs are within the units' safe ranges, and effects are larger than those of random units.
     """
     robust = refined.robust_effects(column, float(sign)).copy()
     for row, unit in enumerate(refined.units):
@@ -159,7 +160,7 @@ def _singles(
 
 
 def _lasting(result: PlanEffects, column: int, sign: int) -> int | None:
-    """The plan that moved the attribute that way from every start without a fall, and most surely."""
+    """Return the plan that moved the attribute most reliably, from every start and without a fall, if any."""
     weakest = np.where(np.isfinite(result.effects[..., column]), sign * result.effects[..., column], -np.inf)
     sure = np.where(result.falls.any(axis=1), -np.inf, weakest.min(axis=1))
     best = int(np.argmax(sure))
@@ -169,7 +170,7 @@ def _lasting(result: PlanEffects, column: int, sign: int) -> int | None:
 def _cancelling(
     single: Stimulation, column: int, sign: int, columns: Sequence[int], spread: Floats, refined: UnitEffects
 ) -> list[Stimulation]:
-    """Second units that, if effects add up, keep most of the main effect and undo the side effects."""
+    """Return pairs whose second unit, if effects add up, keeps the main effect and cancels side effects."""
     mean = np.nan_to_num(refined.effects).mean(axis=2) / np.where(spread > 0, spread, 1.0)
     mean[refined.falls.any(axis=2)] = np.nan
     others = [other for other in columns if other != column]
@@ -193,14 +194,14 @@ def _cancelling(
 def _parts(
     result: PlanEffects, row: int, column: int, sign: int, columns: Sequence[int], spread: Floats
 ) -> tuple[float, float]:
-    """Main and largest side effect of one plan, in parts of the usual spread."""
+    """Return the main and the largest side effect of a plan, in standard deviations."""
     mean = np.nan_to_num(result.effects[row]).mean(axis=0) / np.where(spread > 0, spread, 1.0)
     others = [abs(float(mean[other])) for other in columns if other != column]
     return sign * float(mean[column]), max(others, default=0.0)
 
 
 def _choose(result: PlanEffects, column: int, sign: int, columns: Sequence[int], spread: Floats) -> int:
-    """The plan of least side effect among those that keep most of the first one's main effect."""
+    """Return the plan of least side effect among those that keep most of the first plan's main effect."""
     main, side = _parts(result, 0, column, sign, columns, spread)
     best, least = 0, _KEPT * side
     for row in range(1, len(result.effects)):

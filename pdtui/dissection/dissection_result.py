@@ -1,4 +1,4 @@
-"""Everything that a dissection found about one policy."""
+"""The result of a dissection."""
 
 from __future__ import annotations
 
@@ -24,32 +24,32 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 
 @dataclass(frozen=True)
 class Dissection:
-    """Everything that was found about one policy.
+    """Everything that a dissection found about one policy.
 
     Attributes:
-        robot: name of the robot.
-        policy: name or path as given.
+        robot: Name of the robot.
+        policy: Name or path of the policy, as given.
         policy_hash: SHA-256 of the weights.
-        layers: widths of the hidden layers.
-        attributes: of the robot.
-        goals: of the robot: what was looked for.
-        dt: s per control step.
-        preset: of the spectra.
-        seed: everything random came from it.
-        matching: discrepancies.
-        phase: correlations.
-        sample_episode: one monitored episode, of the units that match: what pictures show.
-        screen: every unit, at a few values.
-        refined: the best of them, the first matches and the controls, from other starts.
-        controls: units drawn at random.
-        spread: standard deviation of every attribute over the monitored steps, shape (J,).
-        movable: columns of the attributes that up and down were looked for.
-        attribute_movers: up and down for each attribute.
-        behaviors: the best stimulation for each goal.
-        controllers: the best controllers.
-        rollouts, control_steps, minutes: what it took.
-        import_options: what the weights file leaves open.
-        shortened: a sentence on roll-outs shorter than asked for, because the policy falls; or empty.
+        layers: Widths of the hidden layers.
+        attributes: Attributes of the robot.
+        goals: Goals of the robot, which the searches were for.
+        dt: Simulated time per control step, s.
+        preset: Preset of the spectra.
+        seed: Seed of every random choice.
+        matching: Discrepancies of all units and attributes.
+        phase: Phase correlations of all units and attributes.
+        sample_episode: One monitored episode, with the units that match best, for pictures.
+        screen: Effects of every unit at a few outputs.
+        refined: Effects of the best units, the first matches and the controls, from other starts.
+        controls: Units drawn at random.
+        spread: Standard deviation of every attribute over the monitored steps, shape (J,).
+        movable: Columns of the attributes for which up and down were searched.
+        attribute_movers: What moves each attribute up and down.
+        behaviors: Best stimulation for each behavior goal.
+        controllers: Best controllers of attributes.
+        rollouts, control_steps, minutes: What the dissection took.
+        import_options: Answers to what the weights file does not state.
+        shortened: A sentence on roll-outs that were shortened because the policy falls; empty if none was.
     """
 
     robot: str
@@ -86,21 +86,21 @@ class Dissection:
         )
 
     def matches(self, attribute: str, count: int = 5) -> list[str]:
-        """Addresses of the units whose spectrograms are nearest to an attribute's, the nearest first.
+        """Return the addresses of the units whose spectrograms are nearest to an attribute's, nearest first.
 
         Raises:
-            RobotError: the robot has no such attribute.
+            RobotError: The robot has no such attribute.
         """
         ranked = self.matching.ranked_units(self.column(attribute))[:count]
         return [format_unit(int(unit), self.layers) for unit in ranked]
 
     def side_effects(self) -> dict[float, Floats]:
-        """What the refined units do to every attribute, in parts of each attribute's usual spread.
+        """Return what the refined units do to every attribute, in standard deviations of the attribute.
 
         Returns:
-            for each sign of the largest output at which every unit was screened, a matrix of the shape
-            (refined units, J): means over the starts, of which one that left no number counts as no effect;
-            NaN for an attribute that never varies.
+            For each sign of the largest output at which units were screened, a matrix of shape (refined
+            units, J) of means over the starts. A start without a number counts as no effect; an attribute
+            that never varies is NaN.
         """
         largest = max(map(abs, self.screen.values))
         matrices = {}
@@ -113,15 +113,15 @@ class Dissection:
         return matrices
 
     def to_map(self) -> StimulationMap:
-        """The map that the measurements propose; its `text` is what a map's file holds."""
+        """Return the map that the measurements propose; its `text` is what to write into a file."""
         from pdtui.dissection.draft_map import draft_map  # which reads dissections
 
         return parse_map(draft_map(self), f"dissection of {self.policy}")
 
     def column(self, attribute: str) -> int:
-        """Column of an attribute.
+        """Return the column of an attribute.
 
         Raises:
-            RobotError: the robot has no such attribute.
+            RobotError: The robot has no such attribute.
         """
         return column_of(attribute, self.attributes, self.robot)

@@ -1,4 +1,4 @@
-"""What a dissection found, as plain data."""
+"""Findings of a dissection as plain data, which ``--json`` prints and the tables show."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from pdtui.spectra.matching_presets import preset_values
 
 
 def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str, Any]:
-    """The findings as data that JSON can hold; numbers that do not exist are None.
+    """Return the findings as data for JSON. Numbers that do not exist are None.
 
     Args:
-        dissection: the findings.
-        matches: how many of the nearest units to list for each attribute.
+        dissection: The findings.
+        matches: Number of matches listed for each attribute, the nearest first.
     """
     return {
         "robot": dissection.robot,
@@ -67,7 +67,7 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
         "unit": attribute.unit,
         "flaw": matching.flaws.get(attribute.name),
         "unwrapped": attribute.wraps and dissection.preset.angles == "unwrapped",
-        # Of an attribute that is left out there is no predominant frequency.
+        # An attribute that matching left out has no predominant frequency.
         "frequency": float(dissection.preset.frequencies(dissection.dt)[phase.bins[column]])
         if ranked.size
         else None,
@@ -111,7 +111,7 @@ def _confirmation(dissection: Dissection, column: int, one: PrimitiveConfirmatio
         "both_ways": one.both_ways,
         "survived": one.safe_magnitude,
         "rho": _number(rho),
-        # ρ > 0 says that a higher output goes with a higher attribute.
+        # ρ > 0 means that a higher output goes with a higher attribute.
         "sign_agrees": bool(rho * one.value * one.measured.effect > 0),
     }
 
@@ -133,7 +133,7 @@ def _steered(dissection: Dissection, one: AttributeMover) -> dict[str, Any]:
 
 
 def _side_effects(dissection: Dissection) -> dict[str, Any]:
-    """Refined units × attributes at the largest screened outputs, in parts of each attribute's spread."""
+    """Return effects of refined units × attributes at the largest outputs, in standard deviations."""
     matrices = {
         f"{value:g}": [[_number(cell) for cell in row] for row in parts]
         for value, parts in dissection.side_effects().items()

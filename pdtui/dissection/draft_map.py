@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pdtui.core.attributes import BehaviorAim
-from pdtui.core.units import Stimulation, format_unit
+from pdtui.core.units import Stimulation, describe_units, format_unit
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.key_allocator import KeyAllocator
 from pdtui.probing.confirmation import PrimitiveConfirmation, rank_probed_units
@@ -17,8 +17,6 @@ from pdtui.stimulation.stimulation_map import Behavior, MotorPrimitive, PidGains
 
 _MIN_RHO = 0.1
 """Below, ``v = c ρ`` would need a huge magnitude c: such a behavior names the unit instead."""
-_MAX_LISTED = 6
-"""Units that a comment names one by one."""
 
 
 def draft_map(dissection: Dissection) -> str:
@@ -60,7 +58,7 @@ def _comments(dissection: Dissection, confirmed: set[str]) -> list[str]:
         lines.append(f"No unit was confirmed for: {', '.join(missing)}.")
     for behavior in dissection.behaviors:
         if not behavior.reached:
-            best = _describe_units(behavior.stimulation, dissection.layers)
+            best = describe_units(behavior.stimulation.by_address(dissection.layers))
             lines.append(
                 f"Not found: {behavior.goal.name}. The best stimulation, {best}, reached the goal on "
                 f"{behavior.success:.0%} of the held-out starts and fell on {behavior.falls:.0%}."
@@ -73,13 +71,6 @@ def _comments(dissection: Dissection, confirmed: set[str]) -> list[str]:
                 f"{controller.falls:.0%}."
             )
     return lines
-
-
-def _describe_units(stimulation: Stimulation, layers: tuple[int, ...]) -> str:
-    addresses = stimulation.by_address(layers)
-    if len(addresses) > _MAX_LISTED:
-        return f"{len(addresses)} units"
-    return ", ".join(f"{unit} = {value:g}" for unit, value in addresses.items())
 
 
 def _draft_primitives(dissection: Dissection) -> list[MotorPrimitive]:

@@ -1,4 +1,4 @@
-"""Keys for proposed behaviors: easy to remember, and none twice."""
+"""Chooses keys for proposed behaviors."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from pdtui.core.key_table import RESERVED_KEYS
 
 
 class KeyAllocator:
-    """Hands out free keys.
+    """Hands out keys that are free.
 
     Args:
-        taken: keys that other behaviors have.
+        taken: Keys of other behaviors.
     """
 
     def __init__(self, taken: set[str]) -> None:
         self._taken: set[str] = {*taken, *RESERVED_KEYS}
 
     def take_pair(self, name: str) -> tuple[str, str] | None:
-        """Two keys that belong together: a capital, for more of something, and its small letter, for less.
+        """Return a capital letter, for more of something, and its small letter, for less, if any is free.
 
-        A letter of the name if one is free, the first of its words before others, else any; None when all are
-        taken. A letter that is reserved is free in neither size.
+        The first free letter of the first letters of the name's words, of the name, and of the alphabet. If
+        either case of a letter is taken or reserved, the letter is not free.
         """
         initials = "".join(word[0] for word in name.split())
         for letter in (initials + name).lower() + string.ascii_lowercase:

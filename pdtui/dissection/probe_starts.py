@@ -1,4 +1,4 @@
-"""The states that roll-outs begin in, and a shorter plan where the policy does not walk that long."""
+"""Gathers the states in which roll-outs start, and shortens roll-outs if the policy does not walk long."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ from pdtui.probing.start_states import StartState, collect_start_states, measure
 from pdtui.search.behavior_search import SearchStartStates
 
 _SHORTEST = 24
+"""Control steps of the longest roll-out, below which dissecting is refused."""
 _MORE = 4
+"""Walks that are tried for each start state that is needed."""
 
 
 class ProbeStarts(NamedTuple):
-    """Snapshots for each stage; no walk is in two of them.
+    """Start states for each stage of a dissection. No walk serves two stages.
 
     Attributes:
-        screen, refine: for the sweeps.
-        searches: for everything after them.
+        screen, refine: Starts of the sweeps.
+        searches: Starts of everything after them.
         settings: Those asked for, with roll-outs as short as the walks require.
-        shortened: what was made shorter, as a sentence; empty where nothing was.
+        shortened: A sentence on what was shortened; empty if nothing was.
     """
 
     screen: tuple[StartState, ...]
@@ -32,13 +34,13 @@ class ProbeStarts(NamedTuple):
 
 
 def gather_probe_starts(pool: RolloutPool, settings: DissectionSettings, first_seed: int) -> ProbeStarts:
-    """One snapshot a walk, from walks that go on for as long as the longest roll-out from there.
+    """Take one start state from each of several walks that last as long as the longest roll-out from there.
 
-    Where too few of them do (a hopper that falls after two seconds), starts and roll-outs become as short as
-    it takes: what a unit does within a second is still worth knowing.
+    If too few walks do (a hopper may fall after two seconds), starts and roll-outs are shortened: what a unit
+    does within a second is still worth knowing.
 
     Raises:
-        RobotError: the walks are too short even for that.
+        RobotError: The walks are too short even for that.
     """
     counts = (
         settings.screen_starts,
@@ -55,9 +57,9 @@ def gather_probe_starts(pool: RolloutPool, settings: DissectionSettings, first_s
         settings = settings.shortened_to(lasting)
         if settings.longest_rollout < _SHORTEST:
             raise RobotError(
-                f"{pool.robot.name}: expected {total} walks of at least {wanted} steps without a fall among "
-                f"{len(seeds)} seeds, or shorter ones to make do with, but that many last {lasting} steps "
-                "only; dissection needs a policy that stays up for a while"
+                f"{pool.robot.name}: expected {total} walks of {wanted} steps without a fall, but of "
+                f"{len(seeds)} walks only that many last {lasting} steps; dissection needs a policy that "
+                "stays up longer"
             )
         shortened = (
             f"Of {len(seeds)} walks, {sum(length >= wanted for length in lengths)} lasted the {wanted} steps "

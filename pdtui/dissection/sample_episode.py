@@ -1,4 +1,4 @@
-"""What is kept of the monitored episodes: enough to show a match, little enough to keep."""
+"""The part of a monitored episode that a dissection keeps for its pictures."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _MATCHES = 3
 
 @dataclass(frozen=True)
 class SampleEpisode:
-    """One monitored episode, of some units only.
+    """One monitored episode, with the activations of some units only.
 
     Attributes:
-        seed: of the reset.
-        units: flat indices, ascending.
-        activations: of these units, shape (T, len(units)).
-        attributes: in their physical units, angles unwrapped, shape (T, J).
-        compared_activations, compared_attributes: both at the scale at which the preset compares them.
+        seed: Seed of the reset.
+        units: Flat indices of the units, ascending.
+        activations: Activations of these units, shape (T, len(units)).
+        attributes: Attributes in their units, with angles unwrapped, shape (T, J).
+        compared_activations, compared_attributes: Both, at the scale at which the preset compares them.
     """
 
     seed: int
@@ -37,10 +37,10 @@ class SampleEpisode:
     compared_attributes: Floats
 
     def column(self, unit: int) -> int:
-        """Column of a unit by its flat index.
+        """Return the column of a unit, given by its flat index.
 
         Raises:
-            ValueError: the unit was not kept.
+            ValueError: The unit was not kept.
         """
         return self.units.index(unit)
 
@@ -52,14 +52,14 @@ def pick_sample_episode(
     preset: MatchingPreset,
     matches: int = _MATCHES,
 ) -> SampleEpisode:
-    """The first episode that counted in matching, with the nearest units of every attribute.
+    """Return the first episode that matching used, with the units that match each attribute best.
 
     Args:
-        episodes: as they were matched.
-        attributes: of the robot.
-        matching: what came of it.
-        preset: by which.
-        matches: how many units of each attribute.
+        episodes: The monitored episodes.
+        attributes: The robot's attributes.
+        matching: Result of matching.
+        preset: Preset of matching.
+        matches: Number of units kept for each attribute.
     """
     nearest = (matching.ranked_units(column)[:matches] for column in range(len(matching.discrepancy)))
     units = sorted({int(unit) for few in nearest for unit in few})

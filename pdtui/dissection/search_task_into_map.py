@@ -1,4 +1,4 @@
-"""What `pdtui pursue` runs: search for a task's stimulation, then write the behavior into a map."""
+"""Search for a stimulation that does a task and write it into a map, as `pdtui pursue` does."""
 
 from __future__ import annotations
 
@@ -26,7 +26,14 @@ from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 @dataclass(frozen=True)
 class WrittenBehavior:
-    """What was found and where it was written."""
+    """A behavior that was found for a task, and the map that it was written into.
+
+    Attributes:
+        result: Result of the search.
+        units: Outputs by unit address.
+        seconds: Activation period, s; None lasts until another key is pressed.
+        output: File of the map.
+    """
 
     result: TaskSearchResult
     units: dict[str, float]
@@ -34,32 +41,32 @@ class WrittenBehavior:
     output: Path
 
     def as_dict(self) -> dict[str, Any]:
-        """The form that ``--json`` prints."""
-        held = self.result.verdicts
+        """Return the form that ``--json`` prints."""
+        verdicts = self.result.verdicts
         return {
             "task": self.result.task.name,
             "magnitudes": self.units,
             "period": self.seconds,
             "held_out": {
-                "walks": len(held),
-                "done": sum(verdict.success for verdict in held),
+                "walks": len(verdicts),
+                "done": sum(verdict.success for verdict in verdicts),
                 "by_itself": sum(verdict.success for verdict in self.result.untouched),
-                "figures": mean_figures(held),
+                "figures": mean_figures(verdicts),
             },
             "rollouts": self.result.rollouts,
             "map": str(self.output),
         }
 
     def text(self) -> RenderableType:
-        """What the command prints."""
-        told = self.as_dict()
-        held = told["held_out"]
+        """Return what the command prints."""
+        summary = self.as_dict()
+        held_out = summary["held_out"]
         lasts = "" if self.seconds is None else f" for {self.seconds:g} s"
-        figures = ", ".join(f"{name} {value:.2f}" for name, value in held["figures"].items())
+        figures = ", ".join(f"{name} {value:.2f}" for name, value in held_out["figures"].items())
         return Text(
-            f"{told['task']}: {len(self.units)} units{lasts}; done on {held['done']} of {held['walks']} "
-            f"walks that the search did not see, by itself on {held['by_itself']}; {figures}\n"
-            f"wrote {self.output} ({told['rollouts']} roll-outs)"
+            f"{summary['task']}: {len(self.units)} units{lasts}. Done on {held_out['done']} of "
+            f"{held_out['walks']} held-out walks (without stimulation: {held_out['by_itself']}); {figures}.\n"
+            f"wrote {self.output} ({summary['rollouts']} roll-outs)"
         )
 
 
@@ -76,13 +83,25 @@ def search_task_into_map(
     settings: TaskSearchSettings,
     progress: Callable[[int, int], None] | None = None,
 ) -> WrittenBehavior:
-    """Search, and write the behavior into a map: a new file, or one of this policy.
+    """Search for a stimulation that does a task, and write it into a new map or one of the same policy.
 
-    A behavior of the task that the map has already is where the search begins, too, and is replaced.
+    If the map has a behavior for the task, the search also begins from it, and it is replaced.
+
+    Args:
+        robot: Name of the robot.
+        task: Name of one of its tasks.
+        policy: Weights file, or name of a shipped policy.
+        output: File of the map.
+        import_options: Answers to what the weights file does not state.
+        seed: Seed of every random choice.
+        workers: Processes that run roll-outs.
+        minutes: Time after which the search ends with the best found so far.
+        settings: How much to search.
+        progress: Called with the work done and its total.
 
     Raises:
-        MapError: no such task, or the map is of another policy or cannot be written.
-        PdtuiError: the robot or the policy cannot be had.
+        MapError: There is no such task, or the map is of another policy or cannot be written.
+        PdtuiError: The robot or the policy cannot be loaded.
     """
     known = load_map(output) if output.exists() else None
     check_writable(output, MapError)
@@ -108,12 +127,12 @@ def search_task_into_map(
 
 
 def _known_plans(stimulation_map: StimulationMap, task: str, pool: RolloutPool) -> list[TimedStimulation]:
-    """The map's own behavior for the task."""
-    found = []
+    """Return the plans of the map's behaviors for the task."""
+    plans = []
     for behavior in stimulation_map.behaviors.values():
         if behavior.task == task and behavior.mode == "fixed":
             addressed = stimulation_map.units_of(behavior).items()
             values = {parse_unit(address, pool.policy.layers): value for address, value in addressed}
             steps = None if behavior.period is None else round(behavior.period / pool.robot.control_dt)
-            found.append(TimedStimulation(Stimulation.of(values), steps))
-    return found
+            plans.append(TimedStimulation(Stimulation.of(values), steps))
+    return plans

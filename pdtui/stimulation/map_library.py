@@ -1,4 +1,4 @@
-"""Where maps are found: the user's own folder first, then those that are shipped."""
+"""Finds maps: in the user's own folder first, then among those that come with pdtui."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 
 
 def shipped_folder(kind: str) -> Path:
-    """The folder ``maps`` or ``sessions`` that came with pdtui: in the checkout, or as installed."""
+    """Return the folder ``maps`` or ``sessions`` that comes with pdtui, in a checkout or as installed."""
     package = Path(__file__).parents[1]
     installed = package / "shipped" / kind
     return installed if installed.is_dir() else package.parent / kind
 
 
 def search_folders(kind: str) -> tuple[Path, ...]:
-    """Folders to look in, the user's own first."""
+    """Return the folders to look in, the user's own first."""
     own, shipped = Path.cwd() / kind, shipped_folder(kind)
     return (own,) if own.resolve() == shipped.resolve() else (own, shipped)
 
 
 def find_map(name: str) -> Path:
-    """Path of a map: as given, or by its name in the folders.
+    """Return the path of a map, given by its file or its name.
 
     Raises:
-        MapError: there is none; the message lists those that there are.
+        MapError: There is no such map; the message lists those that exist.
     """
     if name.endswith(".toml"):
         if Path(name).is_file():
@@ -43,7 +43,7 @@ def find_map(name: str) -> Path:
 
 
 def bare_map(robot: str, policy: str) -> StimulationMap:
-    """A map without behaviors, for a robot that has none yet: the policy is on its own."""
+    """Return a map without behaviors, with which a policy drives alone."""
     source = f"the map of {robot} without behaviors"
     text = compose_map(StimulationMap(robot, policy, "", "space", {}, {}, source=source))
     return parse_map(text, source)
@@ -51,7 +51,7 @@ def bare_map(robot: str, policy: str) -> StimulationMap:
 
 @dataclass(frozen=True)
 class ListedMap:
-    """A map that can be picked, or the reason why it cannot."""
+    """A map that can be picked, or the problem that prevents it."""
 
     path: Path
     stimulation_map: StimulationMap | None
@@ -59,7 +59,7 @@ class ListedMap:
 
 
 def list_maps() -> list[ListedMap]:
-    """All maps in the folders; one in the user's folder hides a shipped one of the same name."""
+    """Return all maps in the folders. One in the user's folder hides a shipped one of the same name."""
     listed: dict[str, ListedMap] = {}
     for path in _all_paths():
         if path.stem in listed:

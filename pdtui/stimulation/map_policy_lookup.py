@@ -1,4 +1,4 @@
-"""The map as it is driven: with the policy that was asked for, found where it lies, and every choice made."""
+"""Finds the policy of a map: the one that was asked for, or the map's own, where its file lies."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 def resolve_map_policy(
     stimulation_map: StimulationMap, policy: str = "", import_options: ImportOptions = NO_OPTIONS
 ) -> StimulationMap:
-    """Put policy and choices of this drive into the map, and into its text, which the session keeps.
+    """Put the policy and the import options of a drive into a map and its text, which the session keeps.
 
-    Files that the map names by their path from its own folder are named by their path from the working
-    directory, so that the session finds them without the map. Comments stay.
+    A file that the map names by its path from the map's folder is named by its path from the working
+    directory, so that the session finds it without the map. Comments stay.
 
     Args:
-        stimulation_map: as its file has it.
-        policy: weights to use instead of the map's; empty for those.
-        import_options: of this drive; where they are silent, the map's hold.
+        stimulation_map: The map as its file has it.
+        policy: Weights to use instead of the map's; empty for the map's.
+        import_options: Those of the drive; the map's are used where they say nothing.
 
     Raises:
-        PolicyError: the map names a file outside of its own folder and the working directory.
-        MapError: its text cannot be changed.
+        PolicyError: The map names a file outside of its own folder and the working directory.
+        MapError: The text of the map is not a map.
     """
     found = locate_map_policy(stimulation_map, policy, import_options)
     if (found.policy, found.import_options) == (stimulation_map.policy, stimulation_map.import_options):
@@ -39,10 +39,10 @@ def resolve_map_policy(
 def locate_map_policy(
     stimulation_map: StimulationMap, policy: str = "", import_options: ImportOptions = NO_OPTIONS
 ) -> StimulationMap:
-    """As `resolve_map_policy`, but the map's text stays as it is.
+    """Do as `resolve_map_policy`, but leave the map's text as it is.
 
     Raises:
-        PolicyError: the map names a file outside of its own folder and the working directory.
+        PolicyError: The map names a file outside of its own folder and the working directory.
     """
     source = stimulation_map.source
     folder = Path(source).parent
@@ -54,7 +54,7 @@ def locate_map_policy(
 
 
 def _from_here(name: str, folder: Path, source: str) -> str:
-    """The name of a file as the working directory reaches it; as it is where it is found so, or nowhere."""
+    """Return a file's name as seen from the working directory; unchanged if found that way, or nowhere."""
     found = find_inside(name, (folder,), source) if name else None
     if found is None or found == Path(name):
         return name

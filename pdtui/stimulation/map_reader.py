@@ -1,4 +1,4 @@
-"""Maps on disk: TOML made to be edited by hand, checked field by field with line and name."""
+"""Reads maps: TOML files that people edit, checked so that errors name the line and the field."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from pdtui.stimulation.stimulation_map import (
 )
 
 MAX_BYTES = 1_000_000
-"""Of a map's text. 100 behaviors of 60 units have 200,000."""
+"""Largest size of a map's text; 100 behaviors of 60 units take 200,000 bytes."""
 _MAX_DOTS = 64
 _BETWEEN = re.compile(r"[=,{}\[\]\n#]")
 
 
 def load_map(path: Path) -> StimulationMap:
-    """Read and check a map.
+    """Read a map from a file.
 
     Raises:
-        MapError: the file is missing, is no TOML, or a field is wrong; the message names line and field.
+        MapError: The file cannot be read, is not TOML, or has a wrong field; the message names its line.
     """
     try:
         text = read_bounded_file(path, MAX_BYTES).decode("utf-8")
@@ -46,18 +46,22 @@ def load_map(path: Path) -> StimulationMap:
 
 
 def parse_map(text: str, source: str) -> StimulationMap:
-    """Check the text of a map; `source` names it in messages.
+    """Read a map from its text.
+
+    Args:
+        text: The map.
+        source: Name of the map in messages.
 
     Raises:
-        MapError: as `load_map`.
+        MapError: As `load_map`.
     """
     if len(text) > MAX_BYTES:
         raise MapError(f"{source}: expected a map of at most {MAX_BYTES} characters")
     if _has_long_key(text):
-        raise MapError(f"{source}: not a TOML file of ours: a key of more than {_MAX_DOTS} parts")
+        raise MapError(f"{source}: not a map: a key has more than {_MAX_DOTS} parts")
     try:
         data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # a whole number of too many digits is no TOMLDecodeError
+    except (ValueError, RecursionError) as error:  # a number of too many digits raises a plain ValueError
         raise MapError(f"{source}: not a TOML file: {error}") from error
     top = MapTableReader(source, text, "top level", data, "", 0)
     if (schema := top.take("schema", int)) != SCHEMA:
@@ -89,20 +93,19 @@ def parse_map(text: str, source: str) -> StimulationMap:
         if behavior.name in behaviors:
             raise table.error("name", f"'{behavior.name}' is taken by another behavior")
         behaviors[behavior.name] = behavior
-    _check_keys(source, default_key, behaviors)
-    for behavior in behaviors.values():
+    owners = {default_key: "the default key"}
+    for table, behavior in zip(tables["behaviors"], behaviors.values(), strict=True):
+        _check_key(table, behavior, owners)
         for other in behavior.together:
             if other not in behaviors:
-                raise MapError(
-                    f"{source}: behavior '{behavior.name}': together names '{other}', which does not exist"
-                )
+                raise table.error("together", f"names '{other}', which does not exist")
     return StimulationMap(
         robot, name, sha256, default_key, primitives, behaviors, text, source, import_options
     )
 
 
 def _has_long_key(text: str) -> bool:
-    """Whether dots join more parts than any key has: the time that they take grows with their square."""
+    """Return whether dots join so many parts that parsing, whose time grows with their square, never ends."""
     joined = 0
     for part in text.split("."):
         joined = 0 if not part or _BETWEEN.search(part) else joined + 1
@@ -126,7 +129,7 @@ def _primitive(table: MapTableReader) -> MotorPrimitive:
         measured=_measured(table),
     )
     if not -1.0 <= primitive.rho <= 1.0:
-        raise table.error("rho", f"expected a number in −1..1, found {primitive.rho}")
+        raise table.error("rho", f"expected a number from −1 to 1, found {primitive.rho}")
     table.done()
     return primitive
 
@@ -147,7 +150,9 @@ def _behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive]) -> B
     for key in magnitudes:
         if key not in primitives and not ADDRESS.fullmatch(key):
             known = ", ".join(primitives) or "none"
-            raise table.error("magnitudes", f"'{key}': neither layer:index nor a primitive ({known})")
+            raise table.error(
+                "magnitudes", f"'{key}' is neither a layer:index nor a primitive; there are {known}"
+            )
     commands = table.numbers("commands", {})
     if not magnitudes and not commands:
         raise table.error("magnitudes", "expected at least one unit")
@@ -197,14 +202,13 @@ def _behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive]) -> B
     return behavior
 
 
-def _check_keys(source: str, default_key: str, behaviors: dict[str, Behavior]) -> None:
-    owners = {default_key: "the default key"}
-    for behavior in behaviors.values():
-        key, own = behavior.key, f"behavior '{behavior.name}'"
-        if key in RESERVED_KEYS:
-            raise MapError(f"{source}: {own}: key '{key}' is taken: it {RESERVED_KEYS[key]}")
-        if key in owners:
-            raise MapError(f"{source}: key '{key}' is bound to both {owners[key]} and {own}")
-        if not key:
-            raise MapError(f"{source}: {own}: the key is empty")
-        owners[key] = own
+def _check_key(table: MapTableReader, behavior: Behavior, owners: dict[str, str]) -> None:
+    """Check that a behavior's key is free, and add it to the owners of keys."""
+    key, own = behavior.key, f"behavior '{behavior.name}'"
+    if not key:
+        raise table.error("key", f"{own}: the key is empty")
+    if key in RESERVED_KEYS:
+        raise table.error("key", f"{own}: key '{key}' is taken: it {RESERVED_KEYS[key]}")
+    if key in owners:
+        raise table.error("key", f"key '{key}' is bound to both {owners[key]} and {own}")
+    owners[key] = own

@@ -1,4 +1,4 @@
-"""Reading a table of a TOML file field by field, so that a mistake is named by line and field."""
+"""Reads a table of a map field by field, so that errors name the line and the field."""
 
 from __future__ import annotations
 
@@ -10,14 +10,27 @@ from pdtui.core.errors import MapError
 
 NUMBER = (int, float)
 MAX_TEXT = 1000
-"""Characters of one text."""
+"""Largest number of characters in a text."""
 MAX_ENTRIES = 4096
-"""Entries of one list or table of numbers."""
-_MAX_WHOLE = 2**53  # larger ones are no longer what they say once they are floating point
+"""Largest number of entries in a list or a table of numbers."""
+_MAX_WHOLE = 2**53
+"""Largest whole number; beyond, floating point no longer represents every one."""
 
 
 class MapTableReader:
-    """One table of the file, read field by field; what is left over at the end is an error."""
+    """Takes the fields out of one table of a map; a field that is left at the end is an error.
+
+    Args:
+        source: Name of the map in messages.
+        text: Text of the map, in which lines are looked up.
+        where: Name of the table in messages.
+        data: The table.
+        header: Header of the table in the text; empty for the top level.
+        number: Number of the table among those with this header.
+
+    Raises:
+        MapError: The data is no table.
+    """
 
     def __init__(self, source: str, text: str, where: str, data: Any, header: str, number: int) -> None:
         self._source, self._text, self._where = source, text, where
@@ -27,22 +40,26 @@ class MapTableReader:
         self._data = dict(data)
 
     def take(self, name: str, kind: type | tuple[type, ...], default: Any = ...) -> Any:
-        """A field of some kind; one that is missing without a default is an error."""
+        """Take a field of a type, or several.
+
+        Raises:
+            MapError: It has another type or size, or is missing and there is no default.
+        """
         if name not in self._data:
             if default is ...:
-                raise self.error(name, "is missing")
+                raise self.error(name, "missing")
             return default
         value = self._data.pop(name)
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
             raise self.error(name, f"expected {_name(kind)}, found {_kind(value)}")
-        if isinstance(value, NUMBER) and not _is_bearable(value):
-            raise self.error(name, "expected a finite number of bearable size")
+        if isinstance(value, NUMBER) and not _is_usable(value):
+            raise self.error(name, f"expected a finite number; whole numbers are at most {_MAX_WHOLE}")
         if isinstance(value, list | dict) and len(value) > MAX_ENTRIES:
             raise self.error(name, f"expected at most {MAX_ENTRIES} entries, found {len(value)}")
         return value
 
     def text(self, name: str, default: Any = ...) -> str:
-        """A field of printable text."""
+        """Take a field of printable text."""
         value: str = self.take(name, str, default)
         if len(value) > MAX_TEXT:
             raise self.error(name, f"expected at most {MAX_TEXT} characters, found {len(value)}")
@@ -51,14 +68,14 @@ class MapTableReader:
         return value
 
     def choice(self, name: str, choices: tuple[str, ...], default: Any = ...) -> str:
-        """A field that has one of some values."""
+        """Take a field of text that is one of the choices."""
         value = self.text(name, default)
         if value not in choices and value != default:
             raise self.error(name, f"expected one of {', '.join(choices)}, found '{value}'")
         return value
 
     def table(self, name: str, default: Any = ...) -> MapTableReader | None:
-        """A field that is a table itself; None where the default is."""
+        """Take a field that is a table; None if it is missing and that is the default."""
         value = self.take(name, dict, default)
         if value is None:
             return None
@@ -67,31 +84,35 @@ class MapTableReader:
         )
 
     def numbers(self, name: str, default: Any = ...) -> dict[str, float]:
-        """A field that is a table of finite numbers."""
+        """Take a field that is a table of finite numbers."""
         data = self.take(name, dict, default)
         for key, value in data.items():
-            if isinstance(value, bool) or not isinstance(value, NUMBER) or not _is_bearable(value):
+            if isinstance(value, bool) or not isinstance(value, NUMBER) or not _is_usable(value):
                 raise self.error(name, f"'{key[:80]}': expected a finite number, found {_shown(value)}")
         return {key: float(value) for key, value in data.items()}
 
     def done(self) -> None:
-        """Every field was read: one that is left over is an error."""
+        """Check that every field was taken.
+
+        Raises:
+            MapError: One is left.
+        """
         for name in self._data:
-            raise self.error(name, "is not a field of this table")
+            raise self.error(name, "not a field of this table")
 
     def error(self, name: str, problem: str) -> MapError:
-        """An error that names this table's line and a field."""
+        """Return an error that names the line of a field of this table."""
         line = _line_of(self._text, self._header, self._number, name)
-        return MapError(f"{self._source}:{line}: {self._where}: field '{name}' {problem}")
+        return MapError(f"{self._source}:{line}: {self._where}: field '{name}': {problem}")
 
 
-def _is_bearable(value: float) -> bool:
-    """Not infinite, not NaN; TOML's whole numbers have no end either."""
+def _is_usable(value: float) -> bool:
+    """Return whether a number is finite; TOML's whole numbers have no limit of their own."""
     return abs(value) <= _MAX_WHOLE if isinstance(value, int) else math.isfinite(value)
 
 
 def _line_of(text: str, header: str, number: int, field: str) -> int:
-    """Line of a field in the n-th table with this header; of the header where the field is missing."""
+    """Return the line of a field in the n-th table with this header, or of the header if it is missing."""
     lines = text.splitlines()
     start = 0
     if header:

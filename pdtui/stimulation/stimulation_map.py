@@ -19,10 +19,10 @@ class MeasuredEffect:
     """An effect and its 95 % interval, in the attribute's unit.
 
     Attributes:
-        effect: mean change of the attribute.
-        low, high: interval of it.
-        falls: roll-outs in which the robot fell,
-        of: of so many; None where a map does not say.
+        effect: Mean change of the attribute.
+        low, high: Bounds of the interval.
+        falls: Roll-outs in which the robot fell; None if the map does not say.
+        of: All roll-outs; None if the map does not say.
     """
 
     effect: float
@@ -37,13 +37,13 @@ class MotorPrimitive:
     """The unit that steers one attribute.
 
     Attributes:
-        name: how behaviors of the map refer to it.
-        attribute: what it steers.
-        unit: its address, ``layer:index``.
-        rho: correlation ρ with the attribute; `v = c ρ`.
-        discrepancy: distance of the spectrograms, None where matching was not run.
-        value: the output v at which `measured` was taken.
-        measured: change of the attribute at that v.
+        name: Name by which behaviors of the map refer to it.
+        attribute: The attribute that it steers.
+        unit: Address of the unit, ``layer:index``.
+        rho: Correlation ρ with the attribute; ``v = c ρ`` (section 3.3 of the paper).
+        discrepancy: Distance between the spectrograms; None if it was not measured.
+        value: Output v at which `measured` was measured.
+        measured: Change of the attribute at that output.
     """
 
     name: str
@@ -60,10 +60,10 @@ class PidGains:
     """Gains of a behavior that holds an attribute at a target.
 
     Attributes:
-        attribute: the controlled attribute.
-        kp, ki, kd: gains, from the attribute's unit to c.
-        limit: c stays within ±limit, which the robot survives.
-        step: by how much one press of an arrow key moves the target, in the attribute's unit.
+        attribute: The controlled attribute.
+        kp, ki, kd: Gains, from the attribute's unit to the magnitude c.
+        limit: Bound of c, which stays within ±limit.
+        step: Change of the target per press of an arrow key, in the attribute's unit.
     """
 
     attribute: str
@@ -79,22 +79,22 @@ class Behavior:
     """A named stimulation bound to a key.
 
     Attributes:
-        name: what the screen calls it.
-        key: the key that latches it.
-        says: one sentence on what one sees.
-        magnitudes: c for the name of a primitive, v for a ``layer:index``. In mode ``pid`` these are weights
-            that the controller's output multiplies.
-        base: in mode ``pid``, outputs v at which the controller's output is 0, by ``layer:index``: its
-            operating point, to which weight × output is added. A unit that is not named has 0.
-        commands: what the policy is asked for meanwhile, by the names of the robot's commands; in mode
-            ``pid`` weights that the controller's output multiplies.
-        period: activation period T in s; None lasts until another key.
-        together: names of behaviors that may stay latched with this one.
-        mode: ``fixed`` magnitudes, or ``pid``.
-        aim: what it is meant to do to an attribute.
-        task: name of what it is meant to accomplish, where that is more than an aim; empty for none.
-        measured: change of the aim's attribute, against the default.
-        pid: the controller of mode ``pid``.
+        name: Name on the screen.
+        key: Key that latches it.
+        says: One sentence on what one sees.
+        magnitudes: Magnitudes c by the names of primitives, and outputs v by ``layer:index``. In mode
+            ``pid``, weights that are multiplied by the controller's output.
+        base: In mode ``pid``, the outputs v, by ``layer:index``, to which weight × output is added; 0 for a
+            unit that is not named.
+        commands: What the policy is asked for meanwhile, by the names of the robot's commands. In mode
+            ``pid``, weights that are multiplied by the controller's output.
+        period: Activation period T, s; None lasts until another key is pressed.
+        together: Names of behaviors that may stay latched with this one.
+        mode: ``fixed`` for fixed magnitudes, or ``pid``.
+        aim: What it is meant to do to an attribute.
+        task: Name of the task that it is meant to do; empty for none.
+        measured: Change of the aim's attribute, compared with the policy alone.
+        pid: The controller of mode ``pid``.
     """
 
     name: str
@@ -117,15 +117,15 @@ class StimulationMap:
     """All behaviors of one policy.
 
     Attributes:
-        robot: name of the robot.
-        policy: weights file, or name of a shipped policy.
-        policy_hash: SHA-256 of the weights.
-        default_key: the key that clears everything.
-        primitives: by name.
-        behaviors: by name, in the order of the file.
-        text: the file's text.
-        source: where it came from, for messages.
-        import_options: what the weights file leaves open.
+        robot: Name of the robot.
+        policy: Weights file, or name of a shipped policy.
+        policy_hash: SHA-256 of the weights, or empty.
+        default_key: Key that clears every behavior.
+        primitives: Motor primitives by name.
+        behaviors: Behaviors by name, in the order of the file.
+        text: Text of the file.
+        source: Name of the map in messages.
+        import_options: Answers to what the weights file does not state.
     """
 
     robot: str
@@ -139,7 +139,7 @@ class StimulationMap:
     import_options: ImportOptions = NO_OPTIONS
 
     def units_of(self, behavior: Behavior) -> dict[str, float]:
-        """The behavior's outputs v by unit address; ``v = c ρ`` for a primitive (section 3.3)."""
+        """Return a behavior's outputs v by unit address; ``v = c ρ`` for a primitive (section 3.3)."""
         outputs: dict[str, float] = {}
         for name, magnitude in behavior.magnitudes.items():
             if name in self.primitives:
@@ -150,15 +150,15 @@ class StimulationMap:
         return outputs
 
     def behavior_of_key(self, key: str) -> Behavior | None:
-        """The behavior that a key latches."""
+        """Return the behavior that a key latches, if any."""
         return next((behavior for behavior in self.behaviors.values() if behavior.key == key), None)
 
     def check(self, robot: str, layers: tuple[int, ...], policy_hash: str, *, force: bool = False) -> None:
-        """See that the map fits a policy.
+        """Check that the map fits a policy.
 
         Raises:
-            MapError: another robot, another policy (unless forced), or a unit that does not exist. Without
-                behaviors, a map need not say which policy it is for.
+            MapError: The map is for another robot, for another policy and not forced, or names a unit that
+                does not exist. A map without behaviors need not name the policy's hash.
         """
         from pdtui.core.errors import PolicyError
 
@@ -168,7 +168,7 @@ class StimulationMap:
         if said and self.policy_hash != policy_hash and not force:
             raise MapError(
                 f"{self.source}: made for a policy with SHA-256 {self.policy_hash[:12]}…, "
-                f"the policy here has {policy_hash[:12]}…; --force drives all the same"
+                f"the policy here has {policy_hash[:12]}…; --force uses it anyway"
             )
         for behavior in self.behaviors.values():
             for address in {**self.units_of(behavior), **behavior.base}:

@@ -129,9 +129,9 @@ def test_a_map_that_needs_nothing_stays_as_it_is(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("relu", "sine", r"m\.toml:7: policy: field 'activation' expected one of tanh, relu.*found 'sine'"),
-        ('"clip"', "1", r"m\.toml:8: policy: field 'squash' expected text, found a number"),
-        ("normaliser", "normalizer", r"m\.toml:9: policy: field 'normalizer' is not a field of this table"),
+        ("relu", "sine", r"m\.toml:7: policy: field 'activation': expected one of tanh, relu.*found 'sine'"),
+        ('"clip"', "1", r"m\.toml:8: policy: field 'squash': expected text, found a number"),
+        ("normaliser", "normalizer", r"m\.toml:9: policy: field 'normalizer': not a field of this table"),
     ],
 )
 def test_mistakes_in_the_choices_name_line_and_field(old: str, new: str, message: str) -> None:
