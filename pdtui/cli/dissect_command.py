@@ -11,7 +11,9 @@ from pdtui.cli.shared_options import (
     import_option_flags,
     json_option,
     overwrite_option,
+    own_policy_option,
     progress_bar_or_none,
+    search_seed_option,
     show_result,
     workers_option,
 )
@@ -26,7 +28,7 @@ from pdtui.policies.weights.import_options import ImportOptions
     help="Instead of ROBOT, an environment registered with Gymnasium, such as Hopper-v5. A module in front "
     "of it (package.module:Name-v0) is imported first.",
 )
-@click.option("--policy", default="", help="Weights file or shipped policy.  [default: the robot's]")
+@own_policy_option
 @import_option_flags
 @click.option(
     "--preset",
@@ -50,19 +52,13 @@ from pdtui.policies.weights.import_options import ImportOptions
     show_default=True,
     help="Episodes in which units and attributes are monitored.",
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(1000, 2**31 - 1),
-    default=1000,
-    show_default=True,
-    help="Seed of every random choice.",
-)
+@search_seed_option
 @click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path),
     metavar="FILE.toml",
-    help="File of the map.  [default: maps/ROBOT-dissected.toml]",
+    help="File of the map; default: maps/ROBOT-dissected.toml.",
 )
 @click.option(
     "--quick", is_flag=True, help="Take a first look of about a minute: fewer probes, hardly any search."
@@ -71,7 +67,7 @@ from pdtui.policies.weights.import_options import ImportOptions
     "--report",
     type=click.Path(path_type=Path),
     metavar="FILE.rrd",
-    help="File of the report for the Rerun viewer.  [default: the map's name with .rrd]",
+    help="File of the report for the Rerun viewer; default: the map's name with .rrd.",
 )
 @click.option(
     "--figures", type=click.Path(path_type=Path), metavar="FOLDER", help="Also draw figures as PNG files."

@@ -45,19 +45,19 @@ def convert(file: Path, output: Path, robot: str | None, import_options: ImportO
     help="Seed of every random choice.",
 )
 @click.option(
-    "--steps", type=click.IntRange(1), help="Control steps, over all worlds.  [default: the robot's recipe]"
+    "--steps", type=click.IntRange(1), help="Control steps, over all worlds; default: the robot's recipe."
 )
 @click.option("--algorithm", type=click.Choice(["ppo", "sac"]), default="ppo", show_default=True)
 @click.option("--learning-rate", type=click.FloatRange(0, min_open=True), help="Learning rate at the start.")
 @click.option(
     "--forward",
     type=click.Choice(["either", "x"]),
-    help="Direction in which moving forward is rewarded, for the Ant.  [default: x, as in Gymnasium's Ant]",
+    help="Direction in which moving forward is rewarded, for the Ant; default: x, as in Gymnasium's Ant.",
 )
 @click.option(
     "--folder",
     type=click.Path(path_type=Path),
-    help="Folder of the checkpoints.  [default: runs/ROBOT-ALGORITHM-SEED]",
+    help="Folder of the checkpoints; default: runs/ROBOT-ALGORITHM-SEED.",
 )
 def train(
     robot: str,

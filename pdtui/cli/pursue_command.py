@@ -10,7 +10,9 @@ from pdtui.cli.shared_options import (
     core_count,
     import_option_flags,
     json_option,
+    own_policy_option,
     progress_bar_or_none,
+    search_seed_option,
     show_result,
     workers_option,
 )
@@ -20,15 +22,9 @@ from pdtui.policies.weights.import_options import ImportOptions
 @click.command()
 @click.argument("robot")
 @click.argument("task")
-@click.option("--policy", default="", help="Weights file or shipped policy.  [default: the robot's]")
+@own_policy_option
 @import_option_flags
-@click.option(
-    "--seed",
-    type=click.IntRange(1000, 2**31 - 1),
-    default=1000,
-    show_default=True,
-    help="Seed of every random choice.",
-)
+@search_seed_option
 @click.option(
     "--minutes",
     type=click.FloatRange(0, min_open=True),
@@ -43,8 +39,7 @@ from pdtui.policies.weights.import_options import ImportOptions
     "--output",
     type=click.Path(path_type=Path),
     metavar="FILE.toml",
-    help="The map that gets the behavior: a new file, or a map of the same policy.  "
-    "[default: maps/ROBOT-dissected.toml]",
+    help="The map to write the behavior into, new or of the same policy; default: maps/ROBOT-dissected.toml.",
 )
 @workers_option
 @json_option

@@ -41,6 +41,16 @@ map_option = click.option(
 force_option = click.option(
     "--force", is_flag=True, help="Use the map even if it was made for another policy."
 )
+own_policy_option = click.option(
+    "--policy", default="", help="Weights file or shipped policy; default: the robot's policy."
+)
+search_seed_option = click.option(
+    "--seed",
+    type=click.IntRange(1000, 2**31 - 1),  # evaluations use the seeds below
+    default=1000,
+    show_default=True,
+    help="Seed of every random choice.",
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 overwrite_option = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 workers_option = click.option(

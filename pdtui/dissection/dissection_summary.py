@@ -15,7 +15,10 @@ from pdtui.probing.confirmation import (
     measure_matching_hits,
     rank_probed_units,
 )
+from pdtui.search.behavior_search import BehaviorSearchResult
+from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.spectra.matching_presets import preset_values
+from pdtui.stimulation.stimulation_map import MeasuredEffect
 
 
 def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str, Any]:
@@ -44,10 +47,10 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
         ],
         "shortened": dissection.shortened,
         "movable": [dissection.attributes[column].name for column in dissection.movable],
-        "steered": [_steered(dissection, one) for one in dissection.attribute_movers],
+        "steered": [_mover(dissection, one) for one in dissection.attribute_movers],
         "side_effects": _side_effects(dissection),
-        "behaviors": [_behavior(dissection, number) for number in range(len(dissection.behaviors))],
-        "holds": [_hold(dissection, number) for number in range(len(dissection.controllers))],
+        "behaviors": [_behavior(found, dissection.layers) for found in dissection.behaviors],
+        "holds": [_controller(found, dissection.layers) for found in dissection.controllers],
         "rollouts": dissection.rollouts,
         "control_steps": dissection.control_steps,
         "minutes": round(dissection.minutes, 2),
@@ -104,9 +107,7 @@ def _confirmation(dissection: Dissection, column: int, one: PrimitiveConfirmatio
     return {
         "unit": format_unit(one.unit, dissection.layers),
         "value": one.value,
-        "effect": _number(one.measured.effect),
-        "low": _number(one.measured.low),
-        "high": _number(one.measured.high),
+        **_interval(one.measured),
         "confirmed": one.confirmed,
         "both_ways": one.both_ways,
         "survived": one.safe_magnitude,
@@ -116,14 +117,12 @@ def _confirmation(dissection: Dissection, column: int, one: PrimitiveConfirmatio
     }
 
 
-def _steered(dissection: Dissection, one: AttributeMover) -> dict[str, Any]:
+def _mover(dissection: Dissection, one: AttributeMover) -> dict[str, Any]:
     return {
         "attribute": dissection.attributes[one.column].name,
         "direction": "up" if one.sign > 0 else "down",
         "units": one.stimulation.by_address(dissection.layers),
-        "effect": _number(one.measured.effect),
-        "low": _number(one.measured.low),
-        "high": _number(one.measured.high),
+        **_interval(one.measured),
         "falls": one.measured.falls,
         "of": one.measured.of,
         "main": _number(one.main),
@@ -146,14 +145,13 @@ def _side_effects(dissection: Dissection) -> dict[str, Any]:
     }
 
 
-def _behavior(dissection: Dissection, number: int) -> dict[str, Any]:
-    found = dissection.behaviors[number]
+def _behavior(found: BehaviorSearchResult, layers: tuple[int, ...]) -> dict[str, Any]:
     return {
         "name": found.goal.name,
         "attribute": found.goal.aim.attribute,
         "direction": found.goal.aim.direction,
         "enough": found.goal.enough,
-        "units": found.stimulation.by_address(dissection.layers),
+        "units": found.stimulation.by_address(layers),
         "reached": found.reached,
         "effect": _number(found.change.effect),
         "gain": _number(found.gain.effect),
@@ -169,22 +167,25 @@ def _behavior(dissection: Dissection, number: int) -> dict[str, Any]:
     }
 
 
-def _hold(dissection: Dissection, number: int) -> dict[str, Any]:
-    held = dissection.controllers[number]
+def _controller(found: ControllerSearchResult, layers: tuple[int, ...]) -> dict[str, Any]:
     return {
-        "attribute": held.pid.attribute,
-        "units": held.weights.by_address(dissection.layers),
-        "kp": held.pid.kp,
-        "ki": held.pid.ki,
-        "kd": held.pid.kd,
-        "limit": held.pid.limit,
-        "holds": held.holds,
-        "error": _number(held.error),
-        "uncontrolled": _number(held.uncontrolled),
-        "falls": held.falls,
-        "targets": list(held.targets),
-        "relative": held.relative,
+        "attribute": found.pid.attribute,
+        "units": found.weights.by_address(layers),
+        "kp": found.pid.kp,
+        "ki": found.pid.ki,
+        "kd": found.pid.kd,
+        "limit": found.pid.limit,
+        "holds": found.holds,
+        "error": _number(found.error),
+        "uncontrolled": _number(found.uncontrolled),
+        "falls": found.falls,
+        "targets": list(found.targets),
+        "relative": found.relative,
     }
+
+
+def _interval(measured: MeasuredEffect) -> dict[str, float | None]:
+    return {name: _number(getattr(measured, name)) for name in ("effect", "low", "high")}
 
 
 def _number(value: Any) -> float | None:
