@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
+from pkgutil import resolve_name
+
 import click
 import pytest
 
+from pdtui import api
 from pdtui.guide.guide_pages import GUIDE_FOLDER
 from pdtui.guide.reference.command_reference import command_reference
 from pdtui.guide.reference.python_reference import python_reference
@@ -72,3 +77,17 @@ def test_python_comes_from_docstrings() -> None:
     assert "**Args**\n\n- `ball`: its `color`, or its \\*name\\*.\n- `times`: how often.\n" in text
     assert "**Returns**\n\nThe number of throws.\n" in text
     assert "**Raises**\n\n- `ValueError`: no ball.\n" in text
+
+
+def test_the_changelog_names_what_is_there() -> None:
+    """The right columns of the tables of renames."""
+    text = (GUIDE_FOLDER / "changelog.md").read_text(encoding="utf-8")
+    now = [row.split(" | ")[1] for row in text.splitlines() if row.startswith("| `")]
+    assert len(now) >= 14
+    for names in now:
+        first, *others = re.findall(r"`([\w.]+)`", names)
+        owner, _, member = first.rpartition(".")
+        if owner.startswith("pdtui"):
+            resolve_name(first)
+        else:
+            assert {member, *others} <= {field.name for field in dataclasses.fields(getattr(api, owner))}
