@@ -53,13 +53,13 @@ pid = {{ attribute = "yaw", kp = 2.0, ki = 0.1, kd = 0.05, limit = 3.0, step = 0
 """
 
 
-def write_small_weights(path: Path) -> Path:
-    """Weights of an untrained policy for the Ant, 2×16 tanh."""
+def write_small_weights(path: Path, layers: tuple[int, ...] = (16, 16)) -> Path:
+    """Weights of an untrained tanh policy for the Ant."""
     torch.manual_seed(7)
     spec = NetworkSpec(
         robot="ant",
         observations=27,
-        layers=(16, 16),
+        layers=layers,
         activation="tanh",
         actions=8,
         head="squashed_gaussian",

@@ -12,10 +12,20 @@ from pathlib import Path
 import pexpect
 import pytest
 
+from pdtui.drive.drive_config import DriveConfig
+from pdtui.drive.loop_builder import build_loop
 from pdtui.drive.replay import replay_session
 from pdtui.sessions.session_reader import read_session
+from pdtui.sessions.writer.session_recorder import SessionRecorder
+from pdtui.stimulation.stimulation_map import StimulationMap
 
 PATIENCE = 60
+
+
+def _environment() -> dict[str, str]:
+    """This process's environment for a terminal whose size is not what the variables say."""
+    kept = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES")}
+    return {**kept, "TERM": "xterm-256color"}
 
 
 @pytest.fixture
@@ -37,11 +47,8 @@ def screen(map_path: Path, session: Path) -> Iterator[pexpect.spawn[str]]:
         "--record",
         str(session),
     ]
-    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "", "LINES": ""}
-    for name in ("COLUMNS", "LINES"):
-        environment.pop(name)
     child = pexpect.spawn(
-        sys.executable, arguments, dimensions=(24, 80), encoding="utf-8", timeout=PATIENCE, env=environment
+        sys.executable, arguments, dimensions=(24, 80), encoding="utf-8", timeout=PATIENCE, env=_environment()
     )
     yield child
     child.close(force=True)
@@ -83,6 +90,25 @@ def test_a_drive_in_a_terminal_replays_bit_for_bit(screen: pexpect.spawn[str], s
     assert [event.key for event in recorded.events] == ["w", "space"]
     result = replay_session(session)
     assert (result.first_difference, result.steps) == (None, recorded.steps)
+
+
+def test_a_session_without_steps_cannot_be_watched(small_map: StimulationMap, session: Path) -> None:
+    with SessionRecorder(session, build_loop(DriveConfig("ant", small_map, 5)).info):
+        pass
+    arguments = ["-m", "pdtui", "replay", str(session), "--watch"]
+    child = pexpect.spawn(
+        sys.executable,
+        arguments,
+        dimensions=(24, 200),
+        encoding="utf-8",
+        timeout=PATIENCE,
+        env=_environment(),
+    )
+    child.expect(pexpect.EOF)
+    child.wait()
+    said = f"pdtui: {session}: no control step is recorded, so there is nothing to watch"
+    assert (child.before or "").strip() == said
+    assert child.exitstatus == 1
 
 
 def test_a_terminal_that_is_too_small_says_so_and_recovers(screen: pexpect.spawn[str], session: Path) -> None:

@@ -123,7 +123,10 @@ def replay(session: Path, watch: bool, policy: str, judging: dict[str, Any]) -> 
     if watch:
         from pdtui.sessions.session_reader import read_session
 
-        _show(replay_config(read_session(session), str(session), policy), fps=12, watching=True)
+        recorded = read_session(session)
+        if recorded.steps == 0:
+            raise SessionError(f"{session}: no control step is recorded, so there is nothing to watch")
+        _show(replay_config(recorded, str(session), policy), fps=12, watching=True)
         return
     with progress_bar_or_none("replaying") as advance:
         result = replay_session(session, policy=policy, progress=advance, **judging)

@@ -2,39 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import KeystrokeError, MapError, SimulationDiverged
 from pdtui.core.events import Event
-from pdtui.core.robot_data import RobotState
 from pdtui.core.step_record import StepRecord
+from pdtui.drive.rewind_history import STEPS_PER_KEPT_STATE, DriveState, RewindHistory
 from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.runtime.recurrent_state import PolicyState
 from pdtui.robots.robot import Robot, is_fall
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.stimulation.latch import Latch
 from pdtui.stimulation.stimulation_map import StimulationMap
-
-STEPS_PER_KEPT_STATE = 10
-MAX_KEPT_STATES = 240
-
-
-@dataclass(frozen=True)
-class _KeptState:
-    robot: RobotState
-    policy: PolicyState
-    latch: list[Any]
-    noise: Mapping[str, Any]
-    episode: int
 
 
 class ControlLoop:
@@ -72,7 +55,7 @@ class ControlLoop:
         self.latch = Latch(stimulation_map, policy.layers, robot.attributes, robot.control_dt)
         self._noise = np.random.default_rng(seed) if stochastic else None
         self._ended = False
-        self._kept: OrderedDict[int, _KeptState] = OrderedDict()
+        self.history = RewindHistory()
         self._observation, _ = robot.reset(seed=seed, options=self._options)
         policy.reset()
         self.attributes: Floats = robot.read_attributes()
@@ -98,11 +81,6 @@ class ControlLoop:
     @property
     def _options(self) -> dict[str, str] | None:
         return {"start": self.start} if self.start else None
-
-    @property
-    def kept_steps(self) -> tuple[int, ...]:
-        """Steps to which a rewind can go, oldest first."""
-        return tuple(self._kept)
 
     def advance(self, events: Sequence[Event] = ()) -> StepRecord:
         """Apply the events, then run one control step.
@@ -178,7 +156,7 @@ class ControlLoop:
             case "reset":
                 self._start_episode()
             case "rewind" if rehearsing:
-                self.latch.restore_state(self._kept[int(event.value)].latch)
+                self.latch.restore_state(self.history.return_to(event.value, self.step).latch)
             case "rewind":
                 self._rewind(event.value)
             case _:
@@ -190,14 +168,15 @@ class ControlLoop:
 
         So one can see what a key means after those that were pressed before the same step.
         """
-        kept = self.latch.copy_state()
+        latch, position = self.latch.copy_state(), self.history.position
 
         if self._ended:
             self.latch.clear()  # the next step begins an episode
         try:
             yield partial(self._apply, rehearsing=True)
         finally:
-            self.latch.restore_state(kept)
+            self.latch.restore_state(latch)
+            self.history.position = position
 
     def _start_episode(self) -> None:
         self._observation, _ = self.robot.reset(options=self._options)
@@ -209,20 +188,13 @@ class ControlLoop:
 
     def _keep_state(self) -> None:
         noise = self._noise.bit_generator.state if self._noise is not None else {}
-        self._kept[self.step] = _KeptState(
+        state = DriveState(
             self.robot.snapshot(), self.policy.snapshot(), self.latch.copy_state(), noise, self.episode
         )
-        while len(self._kept) > MAX_KEPT_STATES:
-            self._kept.popitem(last=False)
+        self.history.keep(self.step, state)
 
-    def _rewind(self, value: float) -> None:
-        step = int(value) if math.isfinite(value) else -1
-        if step not in self._kept:
-            known = f"{self.kept_steps[0]}..{self.kept_steps[-1]}" if self._kept else "none yet"
-            raise KeystrokeError(
-                f"cannot rewind to step {step}; kept is every {STEPS_PER_KEPT_STATE}th step of {known}"
-            )
-        state = self._kept[step]
+    def _rewind(self, target: float) -> None:
+        state = self.history.return_to(target, self.step)
         self.robot.restore(state.robot)
         self.policy.restore(state.policy)
         self.latch.restore_state(state.latch)

@@ -67,11 +67,10 @@ def _factor_event(row: FixedKey, loop: ControlLoop) -> Event | str:
 
 
 def _rewind_event(row: FixedKey, loop: ControlLoop) -> Event | str:
-    wanted = loop.step - round(REWIND_SECONDS / loop.robot.control_dt)
-    earlier = [kept for kept in loop.kept_steps if kept <= wanted]
-    if not earlier:
+    target = loop.history.step_before(loop.step, round(REWIND_SECONDS / loop.robot.control_dt))
+    if target is None:
         return "nothing to rewind to yet"
-    return Event(loop.step, "rewind", value=float(earlier[-1]), key=row.key)
+    return Event(loop.step, "rewind", value=float(target), key=row.key)
 
 
 def _target_event(row: FixedKey, loop: ControlLoop) -> Event | str:

@@ -19,6 +19,7 @@ from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.drive_snapshot import DriveFacts
 from pdtui.drive.keystrokes import interpret_keys
 from pdtui.drive.loop_builder import build_loop
+from pdtui.drive.message_sender import MessageSender
 from pdtui.drive.pacer import Pacer
 from pdtui.drive.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.writer.session_recorder import SessionRecorder
@@ -30,11 +31,17 @@ PACED_ROWS_PER_WRITE = 4
 class DriveServer:
     """One drive, paced, at the far end of a pipe.
 
-    A snapshot is sent only when the screen has asked for one, so a screen that sleeps never blocks the drive.
+    A snapshot is built only when the screen has asked for one and the last one has been sent, so it is the
+    newest, and a screen that has stopped never blocks the drive.
+
+    Args:
+        connection: the pipe; requests are read from it.
+        sender: sends messages through it.
+        config: the drive.
     """
 
-    def __init__(self, connection: Connection, config: DriveConfig) -> None:
-        self._connection, self._config = connection, config
+    def __init__(self, connection: Connection, sender: MessageSender, config: DriveConfig) -> None:
+        self._connection, self._sender, self._config = connection, sender, config
         self._loop: ControlLoop = build_loop(config)
         self._builder = SnapshotBuilder(self._loop)
         self._recorder: SessionRecorder | None = None
@@ -55,7 +62,7 @@ class DriveServer:
     def facts(self) -> None:
         """Tell the screen what there is to see."""
         loop = self._loop
-        self._connection.send(
+        self._sender.send(
             DriveFacts(
                 title=loop.robot.title,
                 policy=loop.policy.name,
@@ -73,7 +80,7 @@ class DriveServer:
         try:
             while not self._closing:
                 self._serve()
-                if self._snapshot_requested:
+                if self._snapshot_requested and self._sender.idle:
                     self._send_snapshot()
         except Exception as error:
             if not isinstance(error, PdtuiError):
@@ -166,10 +173,7 @@ class DriveServer:
             finished=self._finished,
         )
         self._snapshot_requested = False
-        try:
-            self._connection.send(snapshot)
-        except OSError:
-            self._closing = "the screen went away"
+        self._sender.send(snapshot)
 
     def _close_recording(self) -> None:
         if self._recorder is not None:
@@ -179,6 +183,7 @@ class DriveServer:
 def serve_drive(connection: Connection, config: DriveConfig) -> None:
     """Entry of the process. What ends it early goes up the pipe as an exception or a line of text."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # ctrl+c is the screen's to handle
+    sender = MessageSender(connection)
     simulation: DriveServer | None = None
     early: list[str] = []
 
@@ -191,25 +196,17 @@ def serve_drive(connection: Connection, config: DriveConfig) -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, stop)
     try:
-        simulation = DriveServer(connection, config)
+        simulation = DriveServer(connection, sender, config)
         for reason in early:
             simulation.stop(reason)
         simulation.facts()
         simulation.run()
         outcome = simulation.outcome()
-        _send_quietly(connection, PdtuiError(outcome) if simulation.failed else outcome)
+        sender.send(PdtuiError(outcome) if simulation.failed else outcome)
     except PdtuiError as error:
-        _send_quietly(connection, error)
-    except ConnectionError:
-        return  # the screen went away while robot and policy were loading
+        sender.send(error)
     except Exception as error:
         # A traceback would be drawn over by the screen.
         said = format_error_in_one_line(error) if simulation is None else simulation.outcome()
-        _send_quietly(connection, PdtuiError(f"the simulation failed: {said}"))
-
-
-def _send_quietly(connection: Connection, message: str | PdtuiError) -> None:
-    try:
-        connection.send(message)
-    except OSError:
-        return
+        sender.send(PdtuiError(f"the simulation failed: {said}"))
+    sender.flush()

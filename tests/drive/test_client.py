@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pdtui.core.errors import PdtuiError
+from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.drive.client import DriveClient
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.drive.replay import replay_session
+from pdtui.policies.weights.weights_file import hash_file
 from pdtui.sessions.session_reader import read_session
+from pdtui.sessions.session_repair import examine_session
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
 from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.real_viewer import free_port, real_viewer
+from tests.small_map import write_small_weights
 
 PATIENCE = 60.0
 
@@ -119,6 +124,57 @@ def test_a_killed_simulation_says_where_the_recording_is(connection: DriveClient
     session = read_session(recording)
     assert session.steps >= steps - 3
     assert replay_session(recording).first_difference is None
+
+
+def _screen_that_stops(config: DriveConfig, results: Connection) -> None:
+    """Ask for a snapshot, stop before reading it, and tell the steps of two snapshots once continued."""
+    client = DriveClient(config)
+    while not isinstance(client.poll_message(), DriveFacts):
+        time.sleep(0.01)
+    os.kill(os.getpid(), signal.SIGSTOP)
+    shown = [snapshot.step for snapshot in _until(client, lambda _: True)]
+    shown += [snapshot.step for snapshot in _until(client, lambda _: True)]
+    results.send((shown, client.close()))
+
+
+def test_a_drive_goes_on_behind_a_screen_that_is_stopped(tmp_path: Path, recording: Path) -> None:
+    """The snapshot of 100,000 units does not fit into the buffer of the pipe."""
+    weights = write_small_weights(tmp_path / "wide.safetensors", layers=(100_000,))
+    config = DriveConfig(
+        "ant",
+        StimulationMap("ant", str(weights), hash_file(weights), "space", {}, {}),
+        3,
+        recording=str(recording),
+        activations="off",
+    )
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    screen = context.Process(target=_screen_that_stops, args=(config, theirs))
+    screen.start()
+    assert screen.pid is not None
+    try:
+        _, status = os.waitpid(screen.pid, os.WUNTRACED)
+        assert os.WIFSTOPPED(status)
+        deadline = time.monotonic() + PATIENCE
+        while (steps := _recorded_steps(recording)) < 60 and time.monotonic() < deadline:
+            time.sleep(0.2)
+        assert steps >= 60
+        os.kill(screen.pid, signal.SIGCONT)
+        assert ours.poll(PATIENCE)
+        (_, newest), outcome = ours.recv()
+    finally:
+        os.kill(screen.pid, signal.SIGCONT)
+        screen.join(PATIENCE)
+    assert newest >= steps
+    assert outcome.startswith("stopped: ")
+    assert read_session(recording).outcome == "stopped"
+
+
+def _recorded_steps(recording: Path) -> int:
+    try:
+        return examine_session(recording).steps
+    except SessionError:
+        return 0  # its beginning is still being written
 
 
 def test_what_cannot_be_loaded_comes_up_the_pipe(small_map: StimulationMap, tmp_path: Path) -> None:

@@ -61,6 +61,35 @@ def test_keys_of_one_step_mean_something_after_each_other(loop: ControlLoop) -> 
     assert loop.latch.active == before
 
 
+def test_each_rewind_goes_back_three_more_seconds(loop: ControlLoop) -> None:
+    while loop.step < 205:
+        loop.advance()
+    both = interpret_keys(["backspace", "backspace"], loop)
+    assert both == [
+        Event(205, "rewind", value=140.0, key="backspace"),
+        Event(205, "rewind", value=80.0, key="backspace"),
+    ]
+    first, second = _press(loop, "backspace"), _press(loop, "backspace")
+    assert (first, second) == (both[0], Event(206, "rewind", value=80.0, key="backspace"))
+    while loop.step < 225:
+        loop.advance()
+    # 80 + 18 steps have led here: 60 of them back is step 38, and step 30 is the state kept before it.
+    assert _press(loop, "backspace") == Event(225, "rewind", value=30.0, key="backspace")
+    assert _press(loop, "backspace") == "nothing to rewind to yet"
+
+
+def test_a_rewind_goes_back_along_the_way_that_led_here(loop: ControlLoop) -> None:
+    """Steps that were rewound are no longer behind the robot."""
+    while loop.step < 100:
+        loop.advance()
+    assert _press(loop, "backspace") == Event(100, "rewind", value=40.0, key="backspace")
+    while loop.step < 180:
+        loop.advance()
+    # Steps 0 to 40 and 100 to 180 have led here.
+    assert _press(loop, "backspace") == Event(180, "rewind", value=120.0, key="backspace")
+    assert _press(loop, "backspace") == Event(181, "rewind", value=0.0, key="backspace")
+
+
 def test_many_keys_a_step_are_never_more_than_refused(loop: ControlLoop, small_map: StimulationMap) -> None:
     drawn = random.Random(5)
     keys = [*run_keys(small_map), "z"]
