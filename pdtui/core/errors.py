@@ -1,7 +1,7 @@
 """The exceptions that pdtui raises on purpose.
 
-Every message names the thing at fault, what was expected of it and what is there, so that the command line
-can print it as its only line.
+Every message names the thing at fault, what was expected and what was found, so that the command line can
+print the message alone.
 """
 
 import traceback
@@ -9,19 +9,19 @@ from pathlib import PurePath
 
 
 class PdtuiError(Exception):
-    """Base of every error that a user can cause or must hear of."""
+    """Base class of all errors that a user can cause or needs to know about."""
 
 
 class RobotError(PdtuiError):
-    """A robot is unknown, not installed, or was used in a way that it does not offer."""
+    """A robot is unknown, not installed, or does not support what was asked of it."""
 
 
-class SimulationDiverged(RobotError):  # noqa: N818 - it names what happened
-    """The simulator's state is no longer finite; the episode cannot go on."""
+class SimulationDiverged(RobotError):  # noqa: N818 - it names an event
+    """The state of the simulator is no longer finite, so the episode cannot continue."""
 
 
 class PolicyError(PdtuiError):
-    """A policy file, a network or a unit address is not what was expected."""
+    """A policy file, a network or a unit address is invalid."""
 
 
 class MapError(PdtuiError):
@@ -32,16 +32,16 @@ class KeystrokeError(PdtuiError):
     """A keystroke file or an event cannot be applied."""
 
 
-class DriveEnded(PdtuiError):  # noqa: N818 - it names what happened
-    """A drive was ended from outside; its recording is whole."""
+class DriveEnded(PdtuiError):  # noqa: N818 - it names an event
+    """A drive was ended from outside; its recording is complete."""
 
 
 class SessionError(PdtuiError):
     """A recording cannot be written, read or replayed."""
 
 
-class RecordingEnded(SessionError):  # noqa: N818 - it names what happened
-    """A recording had to end before its drive; what was recorded is whole."""
+class RecordingEnded(SessionError):  # noqa: N818 - it names an event
+    """A recording had to end before its drive; what was recorded is complete."""
 
 
 class PictureError(PdtuiError):
@@ -53,7 +53,7 @@ class ScreenError(PdtuiError):
 
 
 class TrainingError(PdtuiError):
-    """A training run cannot start or go on."""
+    """A training run cannot start or continue."""
 
 
 class WorkerError(PdtuiError):
@@ -61,7 +61,7 @@ class WorkerError(PdtuiError):
 
 
 def format_error_in_one_line(error: BaseException) -> str:
-    """An exception in one line, for where no traceback can be printed: what it is and where it was raised."""
+    """Format an exception and the place where it was raised in one line, for use without a traceback."""
     words = " ".join(traceback.format_exception_only(error)[-1].split())
     frames = traceback.extract_tb(error.__traceback__)
     if not frames:

@@ -13,13 +13,13 @@ class Event:
     """One change of the run.
 
     Attributes:
-        step: it applies before this control step; the first is 0.
-        kind: ``behavior`` latches `name`; ``default`` clears everything; ``target`` moves the target of
-            `name` to `value`; ``factor`` scales the magnitudes of `name` to `value` times the map's;
-            ``reset`` starts the next episode; ``rewind`` restores the state before step `value`.
-        name: of the behavior.
+        step: the control step before which the event applies; the first step is 0.
+        kind: ``behavior`` latches `name`; ``default`` clears all behaviors; ``target`` sets the target of
+            `name` to `value`; ``factor`` sets the magnitudes of `name` to `value` times the map's; ``reset``
+            starts the next episode; ``rewind`` restores the state before step `value`.
+        name: name of the behavior.
         value: target, factor or step.
-        key: what the operator pressed, empty if no key did it.
+        key: the key that the operator pressed; empty if the event has another cause.
     """
 
     step: int
@@ -30,7 +30,7 @@ class Event:
 
     @property
     def jumps(self) -> bool:
-        """Whether the robot is put into another state than the one it was in."""
+        """Whether the event puts the robot into a different state."""
         return EVENT_WORDINGS[self.kind].jumps
 
 
@@ -40,7 +40,7 @@ def describe_event(event: Event) -> str:
 
 
 def group_events_by_step(events: Iterable[Event]) -> dict[int, list[Event]]:
-    """Events by the control step before which they apply, in their order."""
+    """Return events by the control step before which they apply, each list in order."""
     grouped: dict[int, list[Event]] = {}
     for event in events:
         grouped.setdefault(event.step, []).append(event)

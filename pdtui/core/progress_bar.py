@@ -1,4 +1,4 @@
-"""A progress bar on standard error, with the time that is left."""
+"""A progress bar on standard error, with the remaining time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rich.progress import (
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Callable[..., None]]:
-    """Yield a function ``advance(done, total, note="")``."""
+    """Show a progress bar and yield the function ``advance(done, total, note="")`` that updates it."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

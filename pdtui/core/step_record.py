@@ -1,4 +1,4 @@
-"""What one control step leaves behind."""
+"""The record of one control step."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from pdtui.core.units import Stimulation
 
 @dataclass(frozen=True)
 class ActiveBehavior:
-    """A latched behavior as the screen and the session see it.
+    """A latched behavior, as the screen shows it and the session records it.
 
     Attributes:
-        name: of the behavior.
-        remaining: control steps until its period ends; None lasts until another key.
-        factor: by how much the operator scaled the map's magnitudes.
-        target, value, error, magnitude: of the controller in mode ``pid``, else None.
+        name: name of the behavior.
+        remaining: control steps until its period ends; None if it lasts until another key is pressed.
+        factor: factor by which the operator scaled the map's magnitudes.
+        target, value, error, magnitude: state of the controller in mode ``pid``, else None.
     """
 
     name: str
@@ -35,26 +35,26 @@ class ActiveBehavior:
 
 
 class StepRecord(NamedTuple):
-    """One control step, after it happened.
+    """One control step, after it was simulated.
 
     Attributes:
         step: number of the control step; the first is 0.
         episode: number of the episode; the first is 0.
-        events: applied before this step.
-        behaviors: active in this step.
-        stimulation: units and the outputs that overwrote them.
-        natural: what those units would have put out, in the same order.
-        action: shape (A,).
-        activations: every hidden unit, shape (U,), float32.
-        attributes: after the step, shape (J,).
-        poses: body poses after the step, shape (B, 7).
-        reward, cost: of the step.
-        digest: of the simulator's state after the step.
-        ended: why the episode ended with this step, empty if it did not.
-        diverged: whether the simulation cannot go on.
-        finished: whether the robot's task is done; where `ended` is empty, the robot can go on.
-        obstacles: in the robot's way, as `Robot.obstacles`, shape (N, 3): the same array in every step of a
-            world, which is not recorded.
+        events: events that were applied before this step.
+        behaviors: behaviors that were active in this step.
+        stimulation: stimulated units and the values that overwrote their outputs.
+        natural: the outputs that those units would have had, in the same order.
+        action: action of the policy, shape (A,).
+        activations: output of every hidden unit, shape (U,), float32.
+        attributes: attributes after the step, shape (J,).
+        poses: poses of the bodies after the step, shape (B, 7).
+        reward, cost: reward and cost of the step.
+        digest: digest of the simulator's state after the step.
+        ended: why the episode ended with this step; empty if it did not.
+        diverged: whether the simulation diverged, so that it cannot continue.
+        finished: whether the robot's task is done; if `ended` is empty, the episode can continue.
+        obstacles: obstacles as in `Robot.obstacles`, shape (N, 3): the same array in every step of a world.
+            They are not recorded.
         fell: whether the episode ended with a fall: neither finished nor out of time.
     """
 

@@ -1,4 +1,4 @@
-"""Opening files that somebody sent: nothing but files, and no more of them than is bearable."""
+"""Open files from untrusted sources: regular files only, and with a limit on their size."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ from pathlib import Path
 
 
 def open_regular_file(path: Path) -> BufferedReader:
-    """Open a file for reading; a pipe or a device, which might never end, is refused.
+    """Open a regular file for reading; pipes and devices, which might never end, are refused.
 
     Raises:
-        OSError: it cannot be opened, or is no file.
+        OSError: the file cannot be opened or is not a regular file.
     """
-    # A pipe without a writer would be waited for.
+    # Without O_NONBLOCK, opening a pipe would wait for a writer.
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise OSError(None, "expected a file, found something else", str(path))
+        raise OSError(None, "expected a regular file, found something else", str(path))
     return os.fdopen(descriptor, "rb")
 
 
 def read_bounded_file(path: Path, limit: int) -> bytes:
-    """All bytes of a file.
+    """Read all bytes of a regular file.
 
     Args:
         path: the file.
-        limit: bytes that it may have.
+        limit: largest size that is accepted, bytes.
 
     Raises:
-        OSError: it cannot be read, is no file, or is larger.
+        OSError: the file cannot be read, is not a regular file, or is larger.
     """
     with open_regular_file(path) as file:
         content = file.read(limit + 1)
     if len(content) > limit:
-        raise OSError(None, f"expected at most {limit} bytes, the file has more", str(path))
+        raise OSError(None, f"expected at most {limit} bytes, found more", str(path))
     return content

@@ -111,7 +111,7 @@ def test_a_damaged_index_is_noticed(recorded: Recorded, tmp_path: Path) -> None:
 
 def test_a_pipe_is_no_session(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.rrd")
-    with pytest.raises(SessionError, match=r"pipe\.rrd: cannot be read: expected a file"):
+    with pytest.raises(SessionError, match=r"pipe\.rrd: cannot be read: expected a regular file"):
         read_session(tmp_path / "pipe.rrd")
 
 
