@@ -1,4 +1,4 @@
-"""`pdtui evaluate --experiment commands`: how closely a policy follows the commands that it is given."""
+"""How closely a policy follows the commands that it is given."""
 
 from __future__ import annotations
 
@@ -18,18 +18,19 @@ from pdtui.drive.loop_builder import build_loop
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 SETTLED = 100
+"""Control steps at the start of an episode that do not count: the robot has to get into its gait."""
 _ASKED = "asked"
 
 
 @dataclass(frozen=True)
 class CommandTracking:
-    """One command over all seeds.
+    """How closely one command is followed, over all seeds.
 
     Attributes:
-        command, unit: what was asked for.
-        asked: of each seed.
-        error, low, high: mean |attribute − command| over the steps, then over seeds, with its 95 % interval.
-        bias: mean |mean of the attribute − command| over seeds: what is left where the gait is averaged out.
+        command, unit: name and unit of the command.
+        asked: value of the command on each seed.
+        error, low, high: mean |attribute − command| over steps and seeds, with its 95 % interval over seeds.
+        bias: mean over seeds of |mean attribute − command|, which averages the gait out.
     """
 
     command: str
@@ -43,14 +44,14 @@ class CommandTracking:
 
 @dataclass(frozen=True)
 class CommandFollowingResult:
-    """How closely commands are followed.
+    """How closely a policy follows its commands.
 
     Attributes:
-        robot, policy: names.
-        seeds: of the episodes; each draws its own commands.
-        steps: control steps an episode; the first 100 are left out.
-        commands: one by one.
-        finished: episodes without a fall.
+        robot, policy: names of robot and policy.
+        seeds: seeds of the episodes; each draws its own commands.
+        steps: control steps per episode; the first 100 do not count.
+        commands: result of each command.
+        finished: number of episodes without a fall.
     """
 
     robot: str
@@ -61,31 +62,33 @@ class CommandFollowingResult:
     finished: int
 
     def as_dict(self) -> dict[str, Any]:
-        """The form that ``--json`` prints."""
+        """Return what ``--json`` prints."""
         return asdict(self)
 
 
 def evaluate_command_following(
     config: DriveConfig, seeds: Sequence[int], *, progress: Callable[[int, int], None] | None = None
 ) -> CommandFollowingResult:
-    """Ask for commands drawn from the ranges of training, one set a seed, for a whole episode.
+    """Run an episode per seed with constant commands, drawn from the ranges of the training.
 
     Raises:
         RobotError: the robot takes no commands.
-        PdtuiError: robot, policy or map cannot be had.
+        PdtuiError: the robot, policy or map cannot be loaded.
     """
     built = build_loop(config)
     robot, policy = built.robot, built.policy
     ranges = {name: one for name, one in robot.command_ranges.items() if name in robot.commands}
     if not ranges:
-        raise RobotError(f"{robot.name}: it takes no commands that could be followed")
+        raise RobotError(f"{robot.name}: it takes no commands")
     columns = [robot.attribute_index(one.attribute) for one in ranges.values()]
     asked, errors, biases, finished = [], [], [], 0
     for done, seed in enumerate(seeds, start=1):
         rng = np.random.default_rng(seed)
         wanted = np.array([rng.uniform(one.low, one.high) for one in ranges.values()])
-        loop = ControlLoop(robot, policy, _asking(built.map, dict(zip(ranges, wanted, strict=True))), seed)
-        records = list(run_episode(loop, robot.episode_steps, _ask_at_start))
+        loop = ControlLoop(
+            robot, policy, _map_with_commands(built.map, dict(zip(ranges, wanted, strict=True))), seed
+        )
+        records = list(run_episode(loop, robot.episode_steps, _press_at_start))
         values = [record.attributes[columns] for record in records]
         settled = np.array(values[SETTLED:] or values[-1:])
         asked.append(wanted)
@@ -112,11 +115,11 @@ def evaluate_command_following(
     )
 
 
-def _ask_at_start(step: int) -> list[Event]:
+def _press_at_start(step: int) -> list[Event]:
     return [Event(0, "behavior", _ASKED)] if step == 0 else []
 
 
-def _asking(shipped: StimulationMap, commands: dict[str, float]) -> StimulationMap:
-    """The map with one behavior: to ask for these."""
-    behavior = Behavior(_ASKED, "a", "asks for commands", {}, commands=commands)
+def _map_with_commands(shipped: StimulationMap, commands: dict[str, float]) -> StimulationMap:
+    """Return the map with a single behavior, which sets these commands."""
+    behavior = Behavior(_ASKED, "a", "sets commands", {}, commands=commands)
     return replace(shipped, primitives={}, behaviors={_ASKED: behavior})

@@ -1,7 +1,7 @@
-"""`pdtui evaluate a1 --experiment forest`: how far it gets alone, with an operator, and with eyes.
+"""How far a robot gets through a forest alone, with an operator, and with vision.
 
-The paper's task transfer (section 4): a policy that feels only its own body is driven through trees that it
-cannot sense. All conditions meet the same forests for the same time.
+The paper's task transfer (section 4): a policy that senses only its own body is driven through trees that it
+cannot sense. All conditions run in the same forests for the same time.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ CONDITIONS: dict[ForestCondition, str] = {
 }
 PERSON = "state with a person"
 STEPS, REPEATS = 2400, 5
-"""The A1 needs some 1300 steps to the far end without a detour."""
+"""Control steps per episode, of which the A1 needs about 1300 on a straight way; repeats."""
 TRIED_SEEDS, TRIED_STEPS = tuple(range(900, 908)), 900
-"""Of the drives on rough ground from which the operator learns what its keys do."""
+"""Seeds and length of the drives on rough ground to which the operator's key models are fitted."""
 
 
 def evaluate_forest(
@@ -60,41 +60,41 @@ def evaluate_forest(
     workers: int = 2,
     progress: Callable[[int, int], None] | None = None,
 ) -> ForestExperimentResult:
-    """Measure conditions on the same forests, and score recorded drives.
+    """Measure the conditions in the same forests, and score recorded drives.
 
-    An episode ends at a fall or at the forest's far end; what it gathered up to then counts.
+    An episode ends at a fall or at the far end of the forest; what it gained up to then counts.
 
     Args:
         config: robot, map and policy; its seed and start are not used.
-        seeds: of the forests; consecutive ones make a repeat.
-        conditions: to be measured. Vision is left out where its robot or its policy is not there.
+        seeds: seeds of the forests; consecutive seeds form a repeat.
+        conditions: conditions to measure; vision is left out if its robot or policy does not exist.
         sessions: a person's drives, each a repeat of one episode.
-        repeats: into which the seeds are divided.
-        steps: control steps an episode lasts at most.
-        record: folder into which the operator's drives are recorded, each a session and a keystroke file.
-        tried: seeds and steps of the drives from which the operator learns what its keys do.
-        workers: processes.
-        progress: called with episodes done and episodes in all.
+        repeats: number of repeats into which the seeds are divided.
+        steps: largest number of control steps per episode.
+        record: folder for the operator's drives, each a session and a keystroke file.
+        tried: seeds and control steps of the drives to which the key models are fitted.
+        workers: number of worker processes.
+        progress: called with the number of episodes done and the total.
 
     Raises:
-        PdtuiError: robot, policy or map cannot be had or lack what is needed, the seeds cannot be divided, or
-            a session cannot be scored.
+        PdtuiError: the robot, policy or map cannot be loaded or lacks what is needed, the seeds cannot be
+            divided, or a session cannot be scored.
     """
     if conditions and (not seeds or len(seeds) % repeats):
         raise PdtuiError(f"{len(seeds)} seeds cannot be divided into {repeats} equal repeats")
     config = replace(config, seed=0, start=FOREST)
     loop = build_loop(config)
     name, dt, policy = config.robot, loop.robot.control_dt, loop.policy.name
-    people = [(path, *read_forest_episode(path, name, steps)) for path in sessions]
+    person_drives = [(path, *read_forest_episode(path, name, steps)) for path in sessions]
     configs, left_out = _configs(config, conditions)
-    learning = tuple(tried[0]) if "operator" in configs else ()
-    keys = list(operator_keys(config.stimulation_map)) if learning else []
-    if taken := sorted(set(learning) & set(seeds)):
-        raise PdtuiError(f"seed {taken[0]}: on that one the operator learns what its keys do")
+    fit_seeds = tuple(tried[0]) if "operator" in configs else ()
+    keys = list(operator_keys(config.stimulation_map)) if fit_seeds else []
+    if taken := sorted(set(fit_seeds) & set(seeds)):
+        raise PdtuiError(f"seed {taken[0]}: the operator's key models are fitted on that seed")
     if record is not None and (present := sorted(record.glob("*.rrd"))):
         raise SessionError(f"{present[0]}: exists already; drives are recorded into a new folder")
-    total, done = len(learning) + len(configs) * len(seeds), 0
-    responses: dict[str, KeyMotionModel] = {}
+    total, done = len(fit_seeds) + len(configs) * len(seeds), 0
+    key_models: dict[str, KeyMotionModel] = {}
     runs: dict[ForestCondition, list[ForestEpisode]] = {}
 
     def tell(here: int, _: int) -> None:
@@ -103,13 +103,13 @@ def evaluate_forest(
 
     with WorkerPool(f"forests of {name}", workers, _LoopCache(), _LoopCache) as pool:
         drives = pool.map(
-            _try_keys, [(replace(config, start=ROUGH), seed, tried[1]) for seed in learning], tell
+            _observe_keys, [(replace(config, start=ROUGH), seed, tried[1]) for seed in fit_seeds], tell
         )
         done += len(drives)
         if drives:
-            responses = fit_key_motion_models(drives, keys, dt)
+            key_models = fit_key_motion_models(drives, keys, dt)
         for condition, its_config in configs.items():
-            with_it = responses if condition == "operator" else {}
+            with_it = key_models if condition == "operator" else {}
             folder = record if with_it else None
             jobs = [(its_config, seed, steps, with_it, folder) for seed in seeds]
             runs[condition] = pool.map(_run_episode, jobs, tell)
@@ -118,9 +118,11 @@ def evaluate_forest(
         summarise_condition(CONDITIONS[one], configs[one].policy or policy, runs[one], repeats)
         for one in runs
     ]
-    if people:
-        driven = ", ".join(sorted({session_policy for _, _, session_policy in people}))
-        measured.append(summarise_condition(PERSON, driven, [run for _, run, _ in people], len(people)))
+    if person_drives:
+        driven = ", ".join(sorted({session_policy for _, _, session_policy in person_drives}))
+        measured.append(
+            summarise_condition(PERSON, driven, [run for _, run, _ in person_drives], len(person_drives))
+        )
     return ForestExperimentResult(
         name,
         tuple(seeds) if conditions else (),
@@ -129,8 +131,8 @@ def evaluate_forest(
         steps * dt,
         tuple(measured),
         left_out,
-        responses,
-        learning,
+        key_models,
+        fit_seeds,
         tuple(map(str, sessions)),
     )
 
@@ -151,15 +153,15 @@ class _LoopCache:
         return ControlLoop(built.robot, built.policy, built.map, seed, start=config.start)
 
 
-def _try_keys(loops: _LoopCache, job: tuple[DriveConfig, int, int]) -> ObservedDrive:
+def _observe_keys(loops: _LoopCache, job: tuple[DriveConfig, int, int]) -> ObservedDrive:
     config, seed, steps = job
     return drive_with_random_keys(loops.loop(config, seed), steps)
 
 
 def _run_episode(loops: _LoopCache, job: _Episode) -> ForestEpisode:
-    config, seed, steps, responses, folder = job
+    config, seed, steps, key_models, folder = job
     loop = loops.loop(config, seed)
-    operator = build_operator(loop, responses) if responses else None
+    operator = build_operator(loop, key_models) if key_models else None
     if operator is None or folder is None:
         return drive_forest_episode(loop, steps, operator)[0]
     path = folder / f"{file_stem(config.robot)}-forest-seed{seed}.rrd"
@@ -169,7 +171,7 @@ def _run_episode(loops: _LoopCache, job: _Episode) -> ForestEpisode:
 def _configs(
     config: DriveConfig, conditions: Sequence[ForestCondition]
 ) -> tuple[dict[ForestCondition, DriveConfig], dict[str, str]]:
-    """How each condition is driven, and why some are not."""
+    """Return the drive of each condition, and why some are left out."""
     configs: dict[ForestCondition, DriveConfig] = {}
     left_out = {}
     for condition in conditions:
@@ -184,7 +186,7 @@ def _configs(
 
 
 def _with_vision(config: DriveConfig) -> DriveConfig:
-    """The robot that sees, with its shipped policy and no behaviors."""
+    """Return the drive of the robot with vision, with its shipped policy and without behaviors."""
     name = check_robot(f"{config.robot}-vision")
     try:
         find_weights_file(name)

@@ -1,4 +1,4 @@
-"""One episode in the forest, and what counts of it, whoever drove: nobody, a program, or a person."""
+"""One episode in the forest and its score, whoever drives: nobody, a program, or a person."""
 
 from __future__ import annotations
 
@@ -22,24 +22,25 @@ from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 FOREST, ROUGH = "forest", "rough"
-_UNTOUCHED = 60
-_HELD = (30, 110)
+_STEPS_BEFORE_KEYS = 60
+_STEPS_HELD = (30, 110)
+"""Shortest and longest time for which a random key is held, control steps: 0.5 s to 1.8 s."""
 
 
 @dataclass(frozen=True)
 class ForestEpisode:
-    """How one episode went.
+    """The score of one episode.
 
     Attributes:
-        seed: of the forest.
-        reward: the episode's return.
-        distance: along x, m.
-        collisions: trees that the robot ran into.
-        fell: whether it ended with a fall.
-        crossed: whether it ended at the forest's far end.
+        seed: seed of the forest.
+        reward: return of the episode.
+        distance: distance along x, m.
+        collisions: number of trees that the robot ran into.
+        fell: whether the episode ended with a fall.
+        crossed: whether it ended at the far end of the forest.
         steps: control steps.
-        presses: keys pressed.
-        pressed_steps: control steps before which one was pressed.
+        presses: number of key presses.
+        pressed_steps: number of control steps before which a key was pressed.
     """
 
     seed: int
@@ -59,16 +60,16 @@ def drive_forest_episode(
     operator: ScriptedOperator | None = None,
     recorder: SessionRecorder | None = None,
 ) -> tuple[ForestEpisode, tuple[Event, ...]]:
-    """Drive one episode: up to a fall, the forest's far end, or so many steps.
+    """Drive one episode: up to a fall, the far end of the forest, or the last step.
 
     Args:
-        loop: before its first step, in the forest.
-        steps: at most.
+        loop: a drive in the forest, before its first step.
+        steps: largest number of control steps.
         operator: presses the keys; None leaves the policy alone.
-        recorder: takes every step; the caller closes it.
+        recorder: records every step; the caller closes it.
 
     Returns:
-        What counts, and all events.
+        The score, and all events.
     """
     column = loop.robot.attribute_index("distance")
     yaw = loop.robot.attribute_index("yaw")
@@ -78,7 +79,7 @@ def drive_forest_episode(
         if operator is None:
             return []
         x, y = loop.robot.read_poses()[0, :2].tolist()
-        name = operator.look(x, y, float(loop.attributes[yaw]))
+        name = operator.choose_key(x, y, float(loop.attributes[yaw]))
         return key_events([keys[name]] if name else [], loop)
 
     rewards, costs, distances = [], [], []
@@ -92,13 +93,13 @@ def drive_forest_episode(
         events += record.events
         if distances[-1] >= AHEAD:
             break
-    return _sum_up(loop.seed, rewards, costs, distances, events, record.fell), tuple(events)
+    return _score(loop.seed, rewards, costs, distances, events, record.fell), tuple(events)
 
 
 def record_forest_episode(
     loop: ControlLoop, steps: int, operator: ScriptedOperator, path: Path, activations: ActivationsKept
 ) -> ForestEpisode:
-    """As `drive_forest_episode`, saved as a person's drive is: a session, and beside it a keystroke file.
+    """Run `drive_forest_episode` and record it like a person's drive, with a keystroke file beside it.
 
     Raises:
         SessionError: the session exists already, or cannot be written.
@@ -112,18 +113,18 @@ def record_forest_episode(
 
 
 def read_forest_episode(path: Path, robot: str, steps: int) -> tuple[ForestEpisode, str]:
-    """What counts of a recorded drive: its first episode, which its seed determines, up to the same end.
+    """Score the first episode of a recorded drive, up to the same end; its seed determines the forest.
 
     Args:
         path: the session.
-        robot: that it has to be of.
-        steps: at most.
+        robot: name of the robot that the session has to be of.
+        steps: largest number of control steps that count.
 
     Returns:
-        What counts, and the policy's name.
+        The score, and the name of the policy.
 
     Raises:
-        SessionError: it cannot be read, is of another robot or not of a forest, or goes back in time.
+        SessionError: the session cannot be read, is of another robot or start, or was rewound.
     """
     session = read_session(path)
     info = session.info
@@ -135,16 +136,16 @@ def read_forest_episode(path: Path, robot: str, steps: int) -> tuple[ForestEpiso
         )
     back = next((event.step for event in session.events if event.kind == "rewind"), None)
     if back is not None:
-        raise SessionError(f"{path}: step {back} goes back in time; a drive that counts only goes on")
+        raise SessionError(f"{path}: it was rewound at step {back}; a drive that is scored must not be")
     if not session.steps:
-        raise SessionError(f"{path}: it has no steps")
+        raise SessionError(f"{path}: the session has no steps")
     names = [attribute.name for attribute in info.attributes]
     if "distance" not in names:
-        raise SessionError(f"{path}: expected the attribute 'distance', there are {', '.join(names)}")
+        raise SessionError(f"{path}: expected the attribute 'distance'; there are {', '.join(names)}")
     distances = session.attributes[:, names.index("distance")]
     ends = [*np.flatnonzero(session.episodes != 0), *(np.flatnonzero(distances >= AHEAD) + 1), steps]
     count = int(min([session.steps, *ends]))
-    run = _sum_up(
+    run = _score(
         info.seed,
         session.rewards[:count].tolist(),
         session.costs[:count].tolist(),
@@ -155,7 +156,7 @@ def read_forest_episode(path: Path, robot: str, steps: int) -> tuple[ForestEpiso
     return run, info.policy
 
 
-def _sum_up(
+def _score(
     seed: int,
     rewards: Sequence[float],
     costs: Sequence[float],
@@ -178,41 +179,41 @@ def _sum_up(
 
 
 def drive_with_random_keys(loop: ControlLoop, steps: int) -> ObservedDrive:
-    """Press the operator's keys in random order, each held for half a second to two, to see what they do.
+    """Press the operator's keys in random order to observe what they do.
 
     Args:
-        loop: before its first step; its seed decides on the keys, too.
-        steps: at most.
+        loop: the drive, before its first step; its seed also draws the keys.
+        steps: largest number of control steps.
     """
     keys = list(operator_keys(loop.map).values())
     rng = np.random.default_rng(loop.seed)
     yaw = loop.robot.attribute_index("yaw")
 
-    def where() -> list[float]:
+    def read_place() -> list[float]:
         return [*loop.robot.read_poses()[0, :2].tolist(), float(loop.attributes[yaw])]
 
-    places, choices, latched, until = [where()], [], 0, _UNTOUCHED
-    order: list[int] = []
+    places, choices, latched, until = [read_place()], [], 0, _STEPS_BEFORE_KEYS
+    upcoming: list[int] = []
     for step in range(steps):
         pressed = step == until
         if pressed:
-            order = order or [int(one) for one in rng.permutation(len(keys)) if one != latched]
-            latched = order.pop(0)
-            until = step + int(rng.integers(*_HELD))
+            upcoming = upcoming or [int(one) for one in rng.permutation(len(keys)) if one != latched]
+            latched = upcoming.pop(0)
+            until = step + int(rng.integers(*_STEPS_HELD))
         record = loop.advance(key_events([keys[latched]] if pressed else [], loop))
-        places.append(where())
+        places.append(read_place())
         choices.append(latched)
         if record.ended:
             return ObservedDrive(np.array(places), np.array(choices), record.fell)
     return ObservedDrive(np.array(places), np.array(choices), False)
 
 
-def build_operator(loop: ControlLoop, responses: dict[str, KeyMotionModel]) -> ScriptedOperator:
-    """The operator of one drive: it sees this forest."""
+def build_operator(loop: ControlLoop, key_models: dict[str, KeyMotionModel]) -> ScriptedOperator:
+    """Return an operator that sees the forest of this drive."""
     dt = loop.robot.control_dt
     periods = {
         name: max(1, round(loop.map.behaviors[name].period / dt))  # type: ignore[operator]
-        for name in responses
+        for name in key_models
         if name != DEFAULT and loop.map.behaviors[name].period is not None
     }
-    return ScriptedOperator(responses, loop.robot.obstacles, dt, periods)
+    return ScriptedOperator(key_models, loop.robot.obstacles, dt, periods)

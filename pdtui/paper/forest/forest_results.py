@@ -1,4 +1,4 @@
-"""What the forest experiment found: figures of each condition, over repeats."""
+"""The results of the forest experiment: figures of each condition over repeats."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pdtui.paper.forest.key_motion_model import KeyMotionModel
 
 @dataclass(frozen=True)
 class RepeatStatistics:
-    """Mean over repeats, and their standard deviation (n − 1); NaN for a single repeat."""
+    """Mean over repeats and their standard deviation (n − 1), which is NaN for a single repeat."""
 
     mean: float
     std: float
@@ -22,20 +22,20 @@ class RepeatStatistics:
 
 @dataclass(frozen=True)
 class ForestConditionSummary:
-    """One condition over all repeats; figures are per episode.
+    """The figures of one condition over all repeats, per episode.
 
     Attributes:
-        condition: in words.
+        condition: description of the condition.
         policy: name of the weights.
         reward: return.
-        distance: along x, m.
-        collisions: trees that the robot ran into.
-        presses: keys pressed.
-        involvement: control steps before which a key was pressed.
-        falls: episodes that ended with a fall, of `episodes`.
-        crossed: episodes that reached the forest's far end.
-        episodes: in all.
-        runs: every episode.
+        distance: distance along x, m.
+        collisions: number of trees that the robot ran into.
+        presses: number of key presses.
+        involvement: number of control steps before which a key was pressed.
+        falls: number of episodes that ended with a fall.
+        crossed: number of episodes that reached the far end of the forest.
+        episodes: number of episodes.
+        runs: the score of each episode.
     """
 
     condition: str
@@ -53,19 +53,19 @@ class ForestConditionSummary:
 
 @dataclass(frozen=True)
 class ForestExperimentResult:
-    """All conditions that were measured.
+    """The result of the forest experiment.
 
     Attributes:
-        robot: that was driven.
-        seeds: of the forests; empty where only sessions were scored.
-        repeats: into which the seeds are divided in their order.
-        steps: control steps an episode lasts at most.
-        seconds: the same in simulated time.
-        conditions: in the order in which they are printed.
-        left_out: conditions that were not measured, and why.
-        keys: what the operator found out about its keys; empty without it.
-        key_seeds: on which.
-        sessions: files that were scored.
+        robot: name of the robot.
+        seeds: seeds of the forests; empty if only sessions were scored.
+        repeats: number of repeats into which the seeds are divided in their order.
+        steps: largest number of control steps per episode.
+        seconds: the same in simulated time, s.
+        conditions: the figures of each condition.
+        left_out: the conditions that were not measured, and the reasons.
+        keys: the operator's models of its keys; empty if the operator was not measured.
+        key_seeds: seeds of the drives to which these models were fitted.
+        sessions: the session files that were scored.
     """
 
     robot: str
@@ -80,14 +80,14 @@ class ForestExperimentResult:
     sessions: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """The form that ``--json`` prints."""
+        """Return what ``--json`` prints."""
         return asdict(self)
 
 
 def summarise_condition(
     condition: str, policy: str, runs: Sequence[ForestEpisode], repeats: int
 ) -> ForestConditionSummary:
-    """The figures of one condition; consecutive runs make a repeat."""
+    """Return the figures of one condition; consecutive runs form a repeat."""
 
     def spread(name: str) -> RepeatStatistics:
         values = np.array([float(getattr(run, name)) for run in runs]).reshape(repeats, -1).mean(axis=1)

@@ -1,8 +1,7 @@
-"""Finds what keys do from drives with random keys: the responses that predict best where it comes to.
+"""Fits models of keys to drives with random keys.
 
-From many moments of the drives, the second that follows is predicted; the squared errors of all predictions
-are minimised, stretches where the robot stumbled counting less (soft L1). So the responses fit what the
-planner does with them: predict over changes of keys, not only while one is held.
+From many moments of the drives, the 1.2 s that follow are predicted, and a soft L1 norm of the errors is
+minimised, so that stumbles count less. The predictions span changes of keys, as those of the planner do.
 """
 
 from __future__ import annotations
@@ -18,21 +17,23 @@ from pdtui.core.angles import wrap_angle
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError
 from pdtui.paper.forest.key_motion_model import (
-    LOOKS_BACK,
+    STEPS_OBSERVED,
     KeyMotionModel,
     ObservedDrive,
     RobotMotion,
     estimate_motion,
-    roll_drift,
-    roll_heading,
-    roll_speed,
+    integrate_drift,
+    integrate_heading,
+    integrate_speed,
 )
 
-_AHEAD = 1.2
-"""How far is predicted, s."""
-_EVERY = 10
-_STRIDE = 4
-_LEAST = 8
+_STRETCH = 1.2
+"""Length of a predicted stretch, s."""
+_STEPS_BETWEEN_STARTS = 10
+_STEPS_PER_STRIDE = 4
+"""Control steps per step of the integration."""
+_FEWEST_STRETCHES = 8
+"""Stretches with a key that a fit needs."""
 _GUESS = ((0.0, 0.5, 0.2), (1.0, 1.0), (0.0, 0.3))
 _LOW = ((-8.0, 0.0, 0.03), (0.0, 0.05), (-1.0, 0.05))
 _HIGH = ((8.0, 8.0, 1.0), (12.0, 5.0), (1.0, 1.5))
@@ -40,12 +41,12 @@ _HIGH = ((8.0, 8.0, 1.0), (12.0, 5.0), (1.0, 1.5))
 
 @dataclass(frozen=True)
 class _Stretches:
-    """N stretches of T strides: what was seen before, what was latched, and what came.
+    """N stretches of T strides: the motion before, the latched keys, and the motion that followed.
 
     Attributes:
-        starts: before each, N of them.
-        choices: shape (T, N).
-        headings, speeds, drifts: after each stride, shapes (T, N).
+        starts: motion before each stretch, N of them.
+        choices: index of the latched key in each stride, shape (T, N).
+        headings, speeds, drifts: motion after each stride, shapes (T, N).
     """
 
     starts: tuple[RobotMotion, ...]
@@ -61,36 +62,36 @@ class _Stretches:
 def fit_key_motion_models(
     drives: Sequence[ObservedDrive], names: Sequence[str], dt: float
 ) -> dict[str, KeyMotionModel]:
-    """The responses that predict the drives best.
+    """Fit the models that predict the drives best.
 
     Args:
-        drives: with every choice in some of them.
-        names: of the choices, by their numbers.
-        dt: s per control step.
+        drives: observed drives; each key occurs in some of them.
+        names: names of the keys, by their indices.
+        dt: duration of a control step, s.
 
     Raises:
-        RobotError: the robot fell before enough was seen of a choice.
+        RobotError: there are too few stretches with a key, because the robot fell.
     """
     falls = [_falls(drives, number) for number in range(len(names))]
     seen = _stretches(drives, dt)
     for number, name in enumerate(names):
         count = int((seen.choices == number).any(axis=0).sum()) if seen.starts else 0
-        if count < _LEAST:
+        if count < _FEWEST_STRETCHES:
             raise RobotError(
-                f"'{name}': the robot was seen with it in {count} stretches of {_AHEAD} s, expected were "
-                f"{_LEAST}; it fell {falls[number][0]} times in {falls[number][1]} presses"
+                f"'{name}': expected at least {_FEWEST_STRETCHES} stretches of {_STRETCH} s with this key, "
+                f"found {count}; the robot fell {falls[number][0]} times in {falls[number][1]} presses"
             )
-    pace = _STRIDE * dt
+    pace = _STEPS_PER_STRIDE * dt
 
     def heading_errors(table: Floats) -> Floats:
-        found = roll_heading(table[seen.choices], seen.before("heading"), seen.before("rate"), pace)[0]
+        found = integrate_heading(table[seen.choices], seen.before("heading"), seen.before("rate"), pace)[0]
         return found - seen.headings
 
     def speed_errors(table: Floats) -> Floats:
-        return roll_speed(table[seen.choices], seen.before("speed"), pace) - seen.speeds
+        return integrate_speed(table[seen.choices], seen.before("speed"), pace) - seen.speeds
 
     def drift_errors(table: Floats) -> Floats:
-        found = roll_drift(table[seen.choices], seen.before("drift"), pace)
+        found = integrate_drift(table[seen.choices], seen.before("drift"), pace)
         return (found - seen.drifts) * np.minimum(seen.speeds, 1.0)
 
     tables = [
@@ -100,12 +101,12 @@ def fit_key_motion_models(
         )
     ]
     rows = np.hstack(tables)
-    responses = {}
+    key_models = {}
     for name, row, (fell, presses) in zip(names, rows, falls, strict=True):
         pull, hold, lag, drive, drag, slip, settle = row.tolist()
         fallen = fell / max(presses, 1)
-        responses[name] = KeyMotionModel(pull, hold, lag, drive, drag, slip, settle, fallen)
-    return responses
+        key_models[name] = KeyMotionModel(pull, hold, lag, drive, drag, slip, settle, fallen)
+    return key_models
 
 
 def _minimise(
@@ -115,7 +116,7 @@ def _minimise(
     low: Sequence[float],
     high: Sequence[float],
 ) -> Floats:
-    """The table, shape (choices, P), with the least errors."""
+    """Return the parameters with the least errors, shape (choices, P)."""
     shape = (choices, len(guess))
 
     def flat_errors(flat: Floats) -> Floats:
@@ -133,7 +134,7 @@ def _minimise(
 
 
 def _falls(drives: Sequence[ObservedDrive], number: int) -> tuple[int, int]:
-    """Falls with a choice, and presses of it."""
+    """Return the number of falls with a key and the number of its presses."""
     falls = presses = 0
     for drive in drives:
         latched = drive.choices == number
@@ -144,19 +145,19 @@ def _falls(drives: Sequence[ObservedDrive], number: int) -> tuple[int, int]:
 
 def _stretches(drives: Sequence[ObservedDrive], dt: float) -> _Stretches:
     starts, choices, headings, speeds, drifts = [], [], [], [], []
-    strides, half = round(_AHEAD / (_STRIDE * dt)), LOOKS_BACK // 2
-    length = strides * _STRIDE
+    strides, half = round(_STRETCH / (_STEPS_PER_STRIDE * dt)), STEPS_OBSERVED // 2
+    length = strides * _STEPS_PER_STRIDE
     for drive in drives:
         path = drive.places.copy()
         path[:, 2] = np.unwrap(path[:, 2])
-        for first in range(LOOKS_BACK, len(drive.choices) - length - half, _EVERY):
+        for first in range(STEPS_OBSERVED, len(drive.choices) - length - half, _STEPS_BETWEEN_STARTS):
             start = estimate_motion(path[: first + 1], dt)
-            after = first + _STRIDE * np.arange(1, strides + 1)
+            after = first + _STEPS_PER_STRIDE * np.arange(1, strides + 1)
             moved = (path[after + half, :2] - path[after - half, :2]) / (2 * half * dt)
             turns = wrap_angle(float(path[first, 2])) - path[first, 2]
             course = np.arctan2(moved[:, 1], moved[:, 0])
             starts.append(start)
-            choices.append(drive.choices[after - _STRIDE // 2])
+            choices.append(drive.choices[after - _STEPS_PER_STRIDE // 2])
             headings.append(path[after, 2] + turns)
             speeds.append(np.hypot(moved[:, 0], moved[:, 1]))
             drifts.append(np.angle(np.exp(1j * (course - path[after, 2]))))

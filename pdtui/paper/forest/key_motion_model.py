@@ -1,10 +1,10 @@
-"""How keys steer a robot: a model of how its heading, speed and course follow what is latched.
+"""A model of how a robot moves while a key is latched.
 
-Every key pulls at the rate of turning, the speed and the drift (direction of motion less heading), and each
-follows with a lag: a legged robot turns on for a while after the key is gone, and slides on in its old
-direction when it turns. With the heading h against +x, ``rate' = (pull − hold · h − rate) / lag`` and
-``h' = rate``; ``speed' = drive − drag · speed``; ``drift' = (slip − drift) / settle``. A policy that turns
-on and on has no hold; one that sees its heading and comes back to it has.
+Each key acts on the yaw rate, the speed and the drift (direction of motion minus heading), which follow with
+a lag: a legged robot keeps turning for a while after the key is released, and slides on in its old direction
+when it turns. With the heading h relative to +x, ``rate' = (pull − hold · h − rate) / lag`` and
+``h' = rate``; ``speed' = drive − drag · speed``; ``drift' = (slip − drift) / settle``. The hold is zero for a
+policy that keeps turning, and positive for one that senses its heading and returns to it.
 """
 
 from __future__ import annotations
@@ -19,20 +19,21 @@ from numpy.typing import NDArray
 from pdtui.core.angles import wrap_angle
 from pdtui.core.attributes import Floats
 
-LOOKS_BACK = 16
-"""Steps over which speed, course and rate of turning are seen: about one of its strides."""
+STEPS_OBSERVED = 16
+"""Control steps over which the motion is estimated: about one stride."""
 _MOVING = 0.3
+"""Slowest speed at which the direction of motion is meaningful, m/s."""
 
 
 @dataclass(frozen=True)
 class KeyMotionModel:
-    """What the robot does while one key is latched.
+    """How the robot moves while one key is latched; the module gives the equations.
 
     Attributes:
-        pull, hold, lag: of the heading against +x, rad/s, 1/s and s.
-        drive, drag: of the speed, m/s² and 1/s.
-        slip, settle: of the direction of motion less heading, rad and s.
-        falls: of the drives, for each press.
+        pull, hold, lag: parameters of the heading relative to +x, rad/s, 1/s and s.
+        drive, drag: parameters of the speed, m/s² and 1/s.
+        slip, settle: parameters of the drift, rad and s.
+        falls: falls per press of the key.
     """
 
     pull: float
@@ -47,12 +48,12 @@ class KeyMotionModel:
 
 @dataclass(frozen=True)
 class ObservedDrive:
-    """One drive of S steps, as one sees it.
+    """What an observer sees of a drive of S control steps.
 
     Attributes:
         places: x and y in m and heading in rad before each step and after the last, shape (S + 1, 3).
-        choices: number of the choice that was latched in each step, shape (S,).
-        fell: whether it ended with a fall.
+        choices: index of the key that was latched in each step, shape (S,).
+        fell: whether the drive ended with a fall.
     """
 
     places: Floats
@@ -62,8 +63,15 @@ class ObservedDrive:
 
 @dataclass(frozen=True)
 class RobotMotion:
-    """Where a robot is and how it moves: x and y in m, heading in rad, speed in m/s, rate of turning in
-    rad/s, direction of motion less heading in rad."""
+    """Where a robot is and how it moves.
+
+    Attributes:
+        x, y: position, m.
+        heading: rad.
+        speed: m/s.
+        rate: yaw rate, rad/s.
+        drift: direction of motion minus heading, rad.
+    """
 
     x: float
     y: float
@@ -74,13 +82,13 @@ class RobotMotion:
 
 
 def estimate_motion(places: Floats, dt: float) -> RobotMotion:
-    """Where a robot is and how it moves, from its last places.
+    """Estimate a robot's motion from its last places.
 
     Args:
-        places: x, y and heading, the newest last, shape (N, 3) with N ≥ 2; at most `LOOKS_BACK` + 1 count.
-        dt: s between them.
+        places: x, y and heading, the newest last, shape (N, 3), N ≥ 2; the last `STEPS_OBSERVED` + 1 count.
+        dt: time between places, s.
     """
-    places = places[-LOOKS_BACK - 1 :]
+    places = places[-STEPS_OBSERVED - 1 :]
     headings = np.unwrap(places[:, 2])
     times = (np.arange(len(places)) - len(places) + 1) * dt
     spread = times - times.mean()
@@ -94,40 +102,40 @@ def estimate_motion(places: Floats, dt: float) -> RobotMotion:
 
 
 def predict_motion(
-    responses: Sequence[KeyMotionModel], start: RobotMotion, schedule: NDArray[np.int64], dt: float
+    key_models: Sequence[KeyMotionModel], start: RobotMotion, schedule: NDArray[np.int64], dt: float
 ) -> tuple[Floats, RobotMotion]:
-    """Where C schedules lead.
+    """Predict where C schedules of keys lead.
 
     Args:
-        responses: by the numbers in the schedule.
-        start: before the first step.
-        schedule: the choice latched in each of T steps, shape (C, T).
-        dt: s per step of the schedule.
+        key_models: models of the keys, by their indices in the schedule.
+        start: motion before the first step.
+        schedule: index of the key latched in each of T steps, shape (C, T).
+        dt: duration of a step of the schedule, s.
 
     Returns:
-        x, y and heading after each step, shape (C, T, 3); and where the first schedule ends.
+        x, y and heading after each step, shape (C, T, 3), and the motion at the end of the first schedule.
     """
-    table = np.array([astuple(one) for one in responses])[:, :7]
+    table = np.array([astuple(one) for one in key_models])[:, :7]
     count = len(schedule)
     latched = table[schedule.T]
-    headings, rates = roll_heading(
+    headings, rates = integrate_heading(
         latched[..., :3], np.full(count, wrap_angle(start.heading)), np.full(count, start.rate), dt
     )
-    speeds = roll_speed(latched[..., 3:5], np.full(count, start.speed), dt)
-    drifts = roll_drift(latched[..., 5:7], np.full(count, start.drift), dt)
+    speeds = integrate_speed(latched[..., 3:5], np.full(count, start.speed), dt)
+    drifts = integrate_drift(latched[..., 5:7], np.full(count, start.drift), dt)
     x = start.x + np.cumsum(speeds * np.cos(headings + drifts) * dt, axis=0)
     y = start.y + np.cumsum(speeds * np.sin(headings + drifts) * dt, axis=0)
     last = (float(values[-1, 0]) for values in (x, y, headings, speeds, rates, drifts))
     return np.stack([x.T, y.T, headings.T], axis=2), RobotMotion(*last)
 
 
-def roll_heading(latched: Floats, heading: Floats, rate: Floats, dt: float) -> tuple[Floats, Floats]:
-    """Headings in rad and rates of turning in rad/s after each of T steps, shapes (T, C).
+def integrate_heading(latched: Floats, heading: Floats, rate: Floats, dt: float) -> tuple[Floats, Floats]:
+    """Return headings in rad and yaw rates in rad/s after each of T steps, shapes (T, C).
 
     Args:
         latched: pull, hold and lag in each step, shape (T, C, 3).
-        heading, rate: before the first, shapes (C,).
-        dt: s per step.
+        heading, rate: heading and yaw rate before the first step, shapes (C,).
+        dt: duration of a step, s.
     """
     pull, hold, lag = np.moveaxis(latched, -1, 0)
     kept = np.exp(-dt / lag)
@@ -140,8 +148,8 @@ def roll_heading(latched: Floats, heading: Floats, rate: Floats, dt: float) -> t
     return headings, rates
 
 
-def roll_speed(latched: Floats, speed: Floats, dt: float) -> Floats:
-    """Speeds in m/s after each of T steps, shape (T, C), from drive and drag in each, shape (T, C, 2)."""
+def integrate_speed(latched: Floats, speed: Floats, dt: float) -> Floats:
+    """Return speeds in m/s after each of T steps, shape (T, C), from drive and drag, shape (T, C, 2)."""
     drive, drag = np.moveaxis(latched, -1, 0)
     speeds = np.empty(drive.shape)
     for step in range(len(drive)):
@@ -150,8 +158,8 @@ def roll_speed(latched: Floats, speed: Floats, dt: float) -> Floats:
     return speeds
 
 
-def roll_drift(latched: Floats, drift: Floats, dt: float) -> Floats:
-    """Drifts in rad after each of T steps, shape (T, C), from slip and settle in each, shape (T, C, 2)."""
+def integrate_drift(latched: Floats, drift: Floats, dt: float) -> Floats:
+    """Return drifts in rad after each of T steps, shape (T, C), from slip and settle, shape (T, C, 2)."""
     slip, settle = np.moveaxis(latched, -1, 0)
     kept = np.exp(-dt / settle)
     drifts = np.empty(slip.shape)

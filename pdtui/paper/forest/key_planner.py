@@ -1,4 +1,4 @@
-"""Which keys to press next: of many schedules, the one that is expected to come farthest untouched."""
+"""Choice of the next key: of many key schedules, the one that should get farthest without a collision."""
 
 from __future__ import annotations
 
@@ -12,48 +12,51 @@ from pdtui.core.attributes import Floats
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, RobotMotion, predict_motion
 
 HORIZON = 2.56
-"""How far ahead is looked, s."""
+"""Time that is planned ahead, s."""
 _STEP = 0.08
 _STEPS = round(HORIZON / _STEP)
 _FIRST = (3, 6, 10, 16)
 _SECOND = (5, 10, 18)
 _HALF_BODY, _HALF_WIDTH = 0.2, 0.17
 _UNSURE, _UNSURER = 0.1, 0.08
-"""How far off a prediction is taken to be sideways: by so many m now, and by more each second. With the
-paper's policy it is off by 0.1 m after 0.3 s and 0.44 m after 2 s, but keys on the way correct that."""
+"""Sideways error assumed of a prediction: m now, and m more per second. With the paper's policy the error is
+0.1 m after 0.3 s and 0.44 m after 2 s, but later keys correct some of it."""
 _HIT, _TOUCHING, _PRESS, _AWRY, _FALL = 8.0, 4.0, 0.25, 0.6, 6.0
+"""Costs in m of progress: a hit, contact all the time, a press, 1 rad of heading at the end, a fall."""
 _FOREST = 8.0
+"""Half the width of the forest, m."""
 _AHEAD, _ASIDE = 12.0, 5.0
+"""Farthest trees that count, ahead and to either side, m."""
 
 
 class KeyPlanner:
-    """Chooses what to latch.
+    """Chooses the key to latch.
 
     Args:
-        responses: of the choices; number 0 is the default.
-        trees: x, y and radius, m, shape (N, 3).
+        key_models: models of the keys; index 0 is the default key.
+        trees: x, y and radius of the trees, m, shape (N, 3).
     """
 
-    def __init__(self, responses: Sequence[KeyMotionModel], trees: Floats) -> None:
-        self._responses, self._trees = tuple(responses), trees
-        self._schedules = _schedules(len(self._responses))
+    def __init__(self, key_models: Sequence[KeyMotionModel], trees: Floats) -> None:
+        self._key_models, self._trees = tuple(key_models), trees
+        self._schedules = _schedules(len(self._key_models))
         self._presses = (np.diff(self._schedules, axis=1) != 0).sum(axis=1)
 
     def choose(self, place: RobotMotion, latched: int) -> int:
-        """The choice to latch now; the one that is latched already if nothing is better by a press's worth.
+        """Return the index of the key to latch; the latched one unless another is worth a press.
 
         Args:
-            place: of the robot, now.
-            latched: the choice that is.
+            place: the robot's motion now.
+            latched: index of the latched key.
         """
         scores = self._scores(place, latched)
         return int(self._schedules[int(np.argmax(scores)), 0])
 
     def _scores(self, place: RobotMotion, latched: int) -> Floats:
-        """Expected metres of progress, less what hits, presses and a wrong heading at the end are worth."""
-        places, _ = predict_motion(self._responses, place, self._schedules, _STEP)
-        touching, untouched = self._chances(places)
-        falls = np.array([response.falls for response in self._responses])
+        """Return the expected progress in m minus the costs of hits, presses and a wrong final heading."""
+        places, _ = predict_motion(self._key_models, place, self._schedules, _STEP)
+        touching, untouched = self._touch_probabilities(places)
+        falls = np.array([model.falls for model in self._key_models])
         starts = self._schedules[:, 0]
         pressed = starts != latched
         gained = np.diff(places[:, :, 0], axis=1, prepend=place.x)
@@ -69,10 +72,10 @@ class KeyPlanner:
         )
         return scores
 
-    def _chances(self, places: Floats) -> tuple[Floats, Floats]:
-        """Chance to touch a tree at each time, and not to have touched any up to it, shapes (C, T).
+    def _touch_probabilities(self, places: Floats) -> tuple[Floats, Floats]:
+        """Return the probabilities of touching a tree at each time, and of no touch up to it, shapes (C, T).
 
-        A prediction's error is taken to be logistic, which is nearly normal and cheaper.
+        The prediction error is assumed to be logistic, which is nearly normal and cheaper.
         """
         x, y = places[0, 0, :2]
         dx, dy = self._trees[:, 0] - x, self._trees[:, 1] - y
@@ -92,7 +95,7 @@ class KeyPlanner:
 
 
 def _schedules(choices: int) -> NDArray[np.int64]:
-    """One choice all along; or one for a while, another for a while, then the default or a third."""
+    """Return schedules of one key throughout, and of up to three keys in turn."""
     rows = [[choice] * _STEPS for choice in range(choices)]
     for first, second, third in product(range(choices), repeat=3):
         if first == second or third not in {0, 1, 2} or third == second:

@@ -1,8 +1,8 @@
-"""Getting off a tree: notices that the robot walks against one, and turns it until the tree is aside.
+"""Recovery from contact with a tree: turns a stuck robot until the tree is beside it.
 
-A robot that cannot feel trees walks on against the one before it, and a prediction that knows no contact
-promises that it comes past. What gets it off is turning, on the spot if need be; not each way works from
-each place, so that after a while without success the other way is tried.
+A robot that cannot sense trees keeps walking against one, and a prediction without contacts expects it to
+pass. Turning frees it, on the spot if need be. Some directions do not work in some places, so that after a
+while the other direction is tried.
 """
 
 from __future__ import annotations
@@ -14,35 +14,40 @@ import numpy as np
 from pdtui.core.angles import wrap_angle
 from pdtui.core.attributes import Floats
 
-WATCHED = 0.5
-"""So long it has to have come nowhere, s."""
-_NOWHERE = 0.12
+STUCK_TIME = 0.5
+"""Time without progress after which the robot counts as stuck, s."""
+_NO_PROGRESS = 0.12
+"""Farthest that a stuck robot moves in that time, m."""
 _NEAR = 0.45
+"""Farthest distance from the tree's surface at which it may hold the robot, m."""
 _AHEAD = 1.2
+"""Largest angle between the heading and a tree that is ahead, rad."""
 _CLEAR_TURNED = 1.3
+"""Angle between the heading and the tree from which the robot is free, rad."""
 _PATIENCE = 1.6
+"""Time after which the other direction is tried, s."""
 
 
 class TreeContactRecovery:
-    """Says which way to turn while the robot is held by a tree.
+    """Decides which way to turn while the robot is stuck at a tree.
 
     Args:
-        trees: x, y and radius, m, shape (N, 3).
-        dt: s per control step.
+        trees: x, y and radius of the trees, m, shape (N, 3).
+        dt: duration of a control step, s.
     """
 
     def __init__(self, trees: Floats, dt: float) -> None:
         self._trees, self._dt = trees, dt
-        self._watched = round(WATCHED / dt)
+        self._watched = round(STUCK_TIME / dt)
         self._side, self._since = 0, 0.0
 
-    def turn(self, seen: Floats, heading: float, halted: bool) -> int:
-        """Which way to turn now: 1 left, −1 right, 0 where nothing holds the robot.
+    def choose_turn(self, seen: Floats, heading: float, halted: bool) -> int:
+        """Return which way to turn now: 1 left, −1 right, 0 if the robot is not stuck.
 
         Args:
             seen: x, y and heading of the places seen so far, shape (S, 3).
-            heading: where it heads by now, rad.
-            halted: whether what was latched lately made it stand.
+            heading: predicted heading now, rad.
+            halted: whether a key latched lately made it stand still.
         """
         x, y, saw = seen[-1].tolist()
         time = len(seen) * self._dt
@@ -60,14 +65,14 @@ class TreeContactRecovery:
             return self._side
         moved = np.hypot(*(seen[-1, :2] - seen[max(0, len(seen) - 1 - self._watched), :2]))
         before = abs(wrap_angle(to_tree - saw)) < _AHEAD
-        if halted or len(seen) <= self._watched or moved > _NOWHERE or not before:
+        if halted or len(seen) <= self._watched or moved > _NO_PROGRESS or not before:
             return 0
-        self._side, self._since = self._better(to_tree, heading), time
+        self._side, self._since = self._better_direction(to_tree, heading), time
         return self._side
 
     @staticmethod
-    def _better(to_tree: float, heading: float) -> int:
-        """The way by which it is past the tree sooner, and afterwards heads less far from +x."""
+    def _better_direction(to_tree: float, heading: float) -> int:
+        """Return the direction that clears the tree sooner and leaves the heading nearer to +x."""
         left, right = wrap_angle(to_tree + _CLEAR_TURNED), wrap_angle(to_tree - _CLEAR_TURNED)
         costs = [abs(wrap_angle(aim - heading)) + abs(aim) for aim in (left, right)]
         return 1 if costs[0] <= costs[1] else -1

@@ -18,25 +18,25 @@ from pdtui.paper.forest.key_motion_model import (
 )
 
 DT = 0.016
-RESPONSES = {
+KEY_MODELS = {
     "default": KeyMotionModel(0.1, 1.4, 0.1, 2.5, 0.9, -0.1, 0.2, 0.0),
     "left": KeyMotionModel(1.5, 0.8, 0.3, 1.0, 0.8, -0.3, 0.4, 0.0),
     "right": KeyMotionModel(-0.9, 1.2, 0.2, 1.5, 1.1, 0.2, 0.3, 0.0),
 }
-NAMES = list(RESPONSES)
+NAMES = list(KEY_MODELS)
 
 
 def _drive(rng: np.random.Generator) -> ObservedDrive:
     held = rng.integers(20, 80, 15)
     choices = np.repeat(np.arange(15) % 3, held)
-    there, _ = predict_motion(list(RESPONSES.values()), RobotMotion(0, 0, 0, 1.0), choices[None], DT)
+    there, _ = predict_motion(list(KEY_MODELS.values()), RobotMotion(0, 0, 0, 1.0), choices[None], DT)
     return ObservedDrive(np.vstack([[0.0, 0.0, 0.0], there[0]]), choices, False)
 
 
 def test_responses_are_found_again_and_predict_another_drive() -> None:
     rng = np.random.default_rng(0)
     found = fit_key_motion_models([_drive(rng) for _ in range(4)], NAMES, DT)
-    for name, response in RESPONSES.items():
+    for name, response in KEY_MODELS.items():
         assert found[name].pull == pytest.approx(response.pull, abs=0.15)
         assert found[name].lag == pytest.approx(response.lag, abs=0.1)
         assert found[name].drive / found[name].drag == pytest.approx(response.drive / response.drag, rel=0.05)
@@ -60,5 +60,7 @@ def test_falls_count_for_each_press_of_what_was_latched() -> None:
 
 def test_a_choice_that_was_hardly_seen_is_named() -> None:
     rng = np.random.default_rng(2)
-    with pytest.raises(RobotError, match="'never': the robot was seen with it in 0 stretches"):
+    with pytest.raises(
+        RobotError, match="'never': expected at least 8 stretches of 1.2 s with this key, found 0"
+    ):
         fit_key_motion_models([_drive(rng)], [*NAMES, "never"], DT)

@@ -10,34 +10,40 @@ import pytest
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, RobotMotion, predict_motion
-from pdtui.paper.forest.scripted_operator import DEFAULT, PRESSES, REACTION, ScriptedOperator, operator_keys
+from pdtui.paper.forest.scripted_operator import (
+    DEFAULT,
+    PRESSES_PER_SECOND,
+    REACTION_TIME,
+    ScriptedOperator,
+    operator_keys,
+)
 from pdtui.robots.legged.terrain import scatter_trees
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 DT = 0.016
-RESPONSES = {
+KEY_MODELS = {
     DEFAULT: KeyMotionModel(0.0, 1.4, 0.1, 2.5, 0.8, 0.0, 0.2, 0.0),
     "left": KeyMotionModel(0.7, 1.0, 0.1, 2.0, 0.8, 0.0, 0.2, 0.0),
     "right": KeyMotionModel(-0.7, 1.0, 0.1, 2.0, 0.8, 0.0, 0.2, 0.0),
     "stop": KeyMotionModel(0.0, 1.0, 0.1, 0.1, 0.8, 0.0, 0.2, 0.0),
 }
-NAMES = list(RESPONSES)
+NAMES = list(KEY_MODELS)
 
 
 def _drive(
     trees: Floats, steps: int, *, driven: bool = True, moved_from: int | None = None
 ) -> tuple[Floats, dict[int, str]]:
     """Places before each step, shape (S, 3), and presses by step; from one step on, it sees itself aside."""
-    operator = ScriptedOperator(RESPONSES, trees, DT)
+    operator = ScriptedOperator(KEY_MODELS, trees, DT)
     place, latched = RobotMotion(0.0, 0.0, 0.0, 0.0), 0
     places, presses = [], {}
     for step in range(steps):
         places.append((place.x, place.y, place.heading))
         aside = 1.0 if moved_from is not None and step >= moved_from else 0.0
-        if driven and (name := operator.look(place.x, place.y + aside, place.heading)):
+        if driven and (name := operator.choose_key(place.x, place.y + aside, place.heading)):
             presses[step] = name
             latched = NAMES.index(name)
-        _, place = predict_motion(list(RESPONSES.values()), place, np.array([[latched]]), DT)
+        _, place = predict_motion(list(KEY_MODELS.values()), place, np.array([[latched]]), DT)
     return np.array(places), presses
 
 
@@ -69,7 +75,7 @@ def test_in_a_forest_it_never_presses_more_than_three_keys_in_a_second(seed: int
     assert _clearance(driven, trees) > 0.1
     steps = np.array(list(presses))
     assert len(steps) > 3
-    spans = steps[PRESSES:] - steps[:-PRESSES]
+    spans = steps[PRESSES_PER_SECOND:] - steps[:-PRESSES_PER_SECOND]
     assert (spans * DT >= 1.0).all()
     assert _drive(trees, 500)[1] == presses
 
@@ -81,7 +87,7 @@ def test_what_it_sees_moves_it_no_sooner_than_its_reaction_time() -> None:
     for moved_from in range(60, 180, 30):
         _, others = _drive(trees, 220, moved_from=moved_from)
         first = min((step for step, _ in presses.items() ^ others.items()), default=220)
-        assert (first - moved_from) * DT >= REACTION
+        assert (first - moved_from) * DT >= REACTION_TIME
         changed.append(first)
     assert min(changed) < 220  # it does react
 
