@@ -20,8 +20,8 @@ COMMANDS = {
     "pursue": ("pdtui.cli.pursue_command:pursue", "Search for units that accomplish a task."),
     "tune": ("pdtui.cli.tune_command:tune", "Tune the PID gains of a map."),
     "figure": ("pdtui.cli.figure_command:figure", "Draw figures as PNG files."),
-    "convert": ("pdtui.cli.policy_commands:convert", "Convert a policy to safetensors."),
-    "train": ("pdtui.cli.policy_commands:train", "Train a policy."),
+    "convert": ("pdtui.cli.convert_command:convert", "Convert a policy to safetensors."),
+    "train": ("pdtui.cli.train_command:train", "Train a policy."),
     "bench": ("pdtui.cli.bench_command:bench", "Measure speed and memory."),
 }
 """Where each command is, and its summary in `pdtui --help`."""

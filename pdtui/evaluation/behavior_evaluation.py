@@ -96,7 +96,7 @@ class BehaviorRun:
 
     Attributes:
         mean: mean of each attribute over the measured steps, shape (J,).
-        fell: whether the episode ended before its time.
+        fell: whether the robot fell.
     """
 
     mean: Floats

@@ -1,0 +1,35 @@
+"""`pdtui convert`: policies of other programs as safetensors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pdtui.cli.shared_options import import_option_flags
+from pdtui.policies.weights.import_options import ImportOptions, WorldSpaces
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="The file to write.")
+@click.option(
+    "--robot", help="The robot that the policy drives. It gives the bounds of actions if FILE lacks them."
+)
+@import_option_flags
+def convert(file: Path, output: Path, robot: str | None, import_options: ImportOptions) -> None:
+    """Convert a policy FILE of another program into a safetensors file that needs no further options."""
+    from pdtui.policies.weights.policy_loading import convert_policy
+    from pdtui.robots import open_robot, trust_module
+
+    trust_module(robot or "")
+    spaces = None
+    if robot is not None:
+        with open_robot(robot) as world:
+            spaces = WorldSpaces.of_world(world)
+    spec = convert_policy(file, output, import_options, spaces)
+    layers = " ".join(str(width) for width in spec.layers)
+    click.echo(
+        f"wrote {output}: {spec.observations} observations, hidden {layers} {spec.activation}, "
+        f"{spec.actions} actions, head {spec.head}; {spec.command}"
+    )
