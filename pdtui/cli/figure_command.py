@@ -13,7 +13,7 @@ from pdtui.policies.weights.import_options import ImportOptions
 
 @click.group()
 def figure() -> None:
-    """Draw figures as PNG files; needs the extra 'figures'."""
+    """Draw figures as PNG files."""
 
 
 @figure.command("episode")

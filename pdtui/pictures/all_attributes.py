@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,12 +23,12 @@ if TYPE_CHECKING:
 _MATCHED, _PROBED, _FAINT = to_hex(VERMILLION), to_hex(GREEN), to_hex(GREY)
 
 
-def draw_side_effects(folder: Path, dissection: Dissection) -> Path:
-    """Units × attributes as a heat map for each sign of the output; returns the file."""
-    path, effects = folder / "side-effects.png", side_effect_matrix(dissection)
+def draw_side_effects(target: Path | BytesIO, dissection: Dissection) -> None:
+    """Draw units × attributes as a heat map for each sign of the output."""
+    effects = side_effect_matrix(dissection)
     title = f"{policy_title(dissection)}: side effects of single units"
     rows = max(1, len(effects.by_value))
-    with figure_page(path, 0.6 + rows * (0.6 + 0.155 * len(effects.attributes)), title) as figure:
+    with figure_page(target, 0.6 + rows * (0.6 + 0.155 * len(effects.attributes)), title) as figure:
         panels = list(figure.subplots(rows, 1, squeeze=False).flat)
         for panel, (value, matrix) in zip(panels, effects.by_value.items(), strict=False):
             panel.imshow(diverging(matrix.T, effects.limit), aspect="auto", interpolation="nearest")
@@ -37,7 +38,6 @@ def draw_side_effects(folder: Path, dissection: Dissection) -> Path:
             panel.tick_params(axis="x", labelsize=min(7.0, 420.0 / max(1, len(effects.units))))
             panel.set_xlabel("unit")
         _colorbar(figure, panels, effects.limit)
-    return path
 
 
 def _colorbar(figure: Figure, panels: Sequence[Axes], limit: float) -> None:
@@ -55,14 +55,14 @@ def _colorbar(figure: Figure, panels: Sequence[Axes], limit: float) -> None:
     bar.set_label("change, in standard deviations of the attribute")
 
 
-def draw_matching_hits(folder: Path, dissection: Dissection) -> Path:
-    """Matching held against probing, an attribute a row; returns the file."""
+def draw_matching_hits(target: Path | BytesIO, dissection: Dissection) -> None:
+    """Draw how well matching finds the units that probing finds, one row per attribute."""
     attributes = summarise_dissection(dissection)["attributes"]
     names = [attribute["name"] for attribute in attributes]
     hits = [attribute["hits"] for attribute in attributes]
-    places, path = np.arange(len(names)), folder / "hit-rates.png"
+    places = np.arange(len(names))
     with figure_page(
-        path, 1.1 + 0.19 * len(names), f"{policy_title(dissection)}: how well matching finds units that act"
+        target, 1.1 + 0.19 * len(names), f"{policy_title(dissection)}: how well matching finds units that act"
     ) as figure:
         left, right = figure.subplots(1, 2, sharey=True)
         width = 0.8 / (1 + len(TOP_MATCHES))
@@ -97,7 +97,6 @@ def draw_matching_hits(folder: Path, dissection: Dissection) -> Path:
             panel.grid(axis="y", linewidth=0.3, alpha=0.5)
             panel.set_axisbelow(True)
             panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
-    return path
 
 
 def _or_nan(value: float | None) -> float:

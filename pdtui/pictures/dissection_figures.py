@@ -5,22 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.pictures.all_attributes import draw_matching_hits, draw_side_effects
-from pdtui.pictures.chart_data import (
-    EffectCurve,
-    MatchedPair,
-    SpectrogramChart,
-    effect_curves,
-    matched_pair,
-    unit_ranking,
-)
+from pdtui.pictures.attribute_figure import draw_effect_key, draw_effects, draw_ranking, draw_spectrograms
 from pdtui.pictures.matplotlib_page import figure_page, policy_title
-from pdtui.pictures.plot_colors import BLUE, GREEN, GREY, VERMILLION, to_hex
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +18,6 @@ if TYPE_CHECKING:
 
 _A_PAGE = 8
 """Attributes on one page."""
-_MATCHED, _PROBED, _OTHER, _FAINT = (to_hex(color) for color in (VERMILLION, GREEN, BLUE, GREY))
 NAMES = ("spectrograms", "discrepancies", "effects", "side-effects", "hit-rates")
 """Stems of the files; those with a panel for each attribute are numbered where one page is not enough."""
 
@@ -46,7 +35,10 @@ def draw_dissection_figures(folder: Path, dissection: Dissection) -> list[Path]:
     written = _draw_pages(folder, dissection, "spectrograms", columns, _spectrograms)
     written += _draw_pages(folder, dissection, "discrepancies", columns, _discrepancies)
     written += _draw_pages(folder, dissection, "effects", columns, _effects)
-    return [*written, draw_side_effects(folder, dissection), draw_matching_hits(folder, dissection)]
+    for name, draw in (("side-effects", draw_side_effects), ("hit-rates", draw_matching_hits)):
+        written.append(folder / f"{name}.png")
+        draw(written[-1], dissection)
+    return written
 
 
 def existing_figures(folder: Path) -> list[Path]:
@@ -97,32 +89,8 @@ def _spectrograms(sheet: _Sheet, dissection: Dissection) -> None:
     with figure_page(sheet.path, _height(count, 2, 1.55), title) as figure:
         panels = _grid(figure, 2 * count, 4)
         for number, column in enumerate(sheet.columns):
-            left, right = panels[2 * number : 2 * number + 2]
-            pair = matched_pair(dissection, column)
-            if pair is None:
-                _leave_out(left, dissection, column)
-                right.set_axis_off()
-            else:
-                _spectrogram_pair(figure, left, right, pair)
-        for rest in panels[2 * count :]:
-            rest.set_axis_off()
-
-
-def _spectrogram_pair(figure: Figure, left: Axes, right: Axes, pair: MatchedPair) -> None:
-    attribute = pair.attribute
-    names = (f"{attribute.name} ({attribute.unit})", f"unit {pair.label}")
-    shown: tuple[SpectrogramChart, ...] = (pair.of_attribute, pair.of_unit)
-    mesh: Any = None
-    for panel, name, one in zip((left, right), names, shown, strict=True):
-        values = np.maximum(one.decibels.T, pair.low)
-        mesh = panel.pcolormesh(
-            one.times, one.frequencies, values, cmap="viridis", vmin=pair.low, vmax=pair.high, rasterized=True
-        )
-        panel.set_title(name)
-        panel.set_xlabel("time (s)")
-    left.set_ylabel("frequency (Hz)")
-    right.tick_params(labelleft=False)
-    figure.colorbar(mesh, ax=right, pad=0.03, aspect=14).set_label("dB", labelpad=1)
+            draw_spectrograms(figure, panels[2 * number], panels[2 * number + 1], dissection, column)
+        _clear(panels[2 * count :])
 
 
 def _discrepancies(sheet: _Sheet, dissection: Dissection) -> None:
@@ -130,21 +98,9 @@ def _discrepancies(sheet: _Sheet, dissection: Dissection) -> None:
     with figure_page(sheet.path, _height(count, 4, 1.9), title) as figure:
         panels = _grid(figure, count, 4)
         for panel, column in zip(panels, sheet.columns, strict=False):
-            ranking = unit_ranking(dissection, column)
-            if not ranking.labels:
-                _leave_out(panel, dissection, column)
-                continue
-            places = np.arange(len(ranking.labels))
-            colors = [_MATCHED, *[_OTHER] * (len(places) - 1)]
-            panel.barh(places, ranking.discrepancies, color=colors, height=0.75)
-            panel.set_yticks(places, ranking.labels)
-            panel.invert_yaxis()
-            panel.ticklabel_format(axis="x", scilimits=(-2, 3), useMathText=True)
-            panel.set_title(dissection.attributes[column].name)
-            panel.set_xlabel(f"discrepancy\n(first: {ranking.level_shares[0]:.0%} mean level)")
+            draw_ranking(panel, dissection, column)
         panels[0].set_ylabel("unit")
-        for rest in panels[count:]:
-            rest.set_axis_off()
+        _clear(panels[count:])
 
 
 def _effects(sheet: _Sheet, dissection: Dissection) -> None:
@@ -153,45 +109,11 @@ def _effects(sheet: _Sheet, dissection: Dissection) -> None:
     with figure_page(sheet.path, _height(count, 4, 1.8) + 0.25, title) as figure:
         panels = _grid(figure, count, 4)
         for panel, column in zip(panels, sheet.columns, strict=False):
-            attribute = dissection.attributes[column]
-            panel.axhline(0, color=_FAINT, linewidth=0.6)
-            for curve in effect_curves(dissection, column):
-                _effect_curve(panel, curve)
-            panel.set_title(attribute.name)
-            panel.set_ylabel(f"change ({attribute.unit})" if attribute.unit else "change")
-            panel.set_xlabel("output v")
-            panel.legend(loc="best", handlelength=1.2, borderpad=0.1)
-        for rest in panels[count:]:
-            rest.set_axis_off()
-        _key(figure, {"best probed": _PROBED, "first match": _MATCHED})
+            draw_effects(panel, dissection, column)
+        _clear(panels[count:])
+        draw_effect_key(figure)
 
 
-def _effect_curve(panel: Axes, curve: EffectCurve) -> None:
-    color = _MATCHED if curve.matched else _PROBED
-    spread = np.vstack([curve.means - curve.lows, curve.highs - curve.means])
-    panel.errorbar(
-        curve.values, curve.means, yerr=np.nan_to_num(np.maximum(spread, 0.0)), color=color, marker="o",
-        markersize=2.5, capsize=2, elinewidth=0.8, label=curve.label,
-    )  # fmt: skip
-    fell = curve.falls > 0
-    if fell.any():
-        panel.plot(curve.values[fell], curve.means[fell], "x", color="black", markersize=4)
-
-
-def _key(figure: Figure, colors: dict[str, str]) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [
-        Line2D([], [], color=color, marker="o", markersize=3, label=name) for name, color in colors.items()
-    ]
-    handles.append(
-        Line2D([], [], color="black", marker="x", linestyle="", markersize=4, label="fell from some starts")
-    )
-    figure.legend(handles=handles, loc="outside lower left", ncols=len(handles))
-
-
-def _leave_out(panel: Axes, dissection: Dissection, column: int) -> None:
-    name = dissection.attributes[column].name
-    panel.set_axis_off()
-    panel.set_title(name)
-    panel.text(0, 0.8, dissection.matching.flaws.get(name, "nothing matches"), wrap=True, va="top")
+def _clear(panels: Sequence[Axes]) -> None:
+    for panel in panels:
+        panel.set_axis_off()

@@ -18,7 +18,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import PictureError
 from pdtui.core.json_text import to_json
 from pdtui.pictures.markdown_report import table_to_markdown
-from pdtui.pictures.matplotlib_page import check_matplotlib, figure_page
+from pdtui.pictures.matplotlib_page import figure_page
 from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, to_hex
 from pdtui.pictures.report_file import open_report_file
 
@@ -106,13 +106,11 @@ def check_heading_pictures(paths: Sequence[Path], overwrite: bool) -> None:
     """Find out before minutes of work whether the pictures can be written.
 
     Raises:
-        PictureError: another kind of file, one that exists already, or matplotlib is missing.
+        PictureError: another kind of file, or one that exists already.
     """
     for path in paths:
         if path.suffix not in (".png", ".rrd"):
             raise PictureError(f"{path}: expected a name that ends in .png or .rrd")
-        if path.suffix == ".png":
-            check_matplotlib()
         if path.exists() and not overwrite:
             raise PictureError(f"{path}: exists already; --overwrite replaces it")
 
@@ -121,7 +119,7 @@ def draw_heading_pictures(paths: Sequence[Path], shown: HeadingFigure) -> None:
     """Write every picture, by the ending of its name.
 
     Raises:
-        PictureError: a file cannot be written, or matplotlib is missing.
+        PictureError: a file cannot be written.
     """
     for path in paths:
         if path.suffix == ".png":

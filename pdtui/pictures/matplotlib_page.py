@@ -1,9 +1,10 @@
-"""A page to draw on: matplotlib, where it is installed, with no window and no global state."""
+"""Pages for matplotlib to draw on, without a window and without changing its global settings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,44 +38,18 @@ _STYLE: dict[str, Any] = {
 }
 
 
-def check_matplotlib() -> None:
-    """Find out before the work whether figures can be drawn.
-
-    Raises:
-        PictureError: matplotlib is not installed.
-    """
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        raise PictureError(
-            "figures need matplotlib, which is not installed: pip install 'pdtui[figures]'"
-        ) from error
-
-
-def check_figure(path: Path, overwrite: bool) -> None:
-    """Find out before the work whether one figure can be drawn and may be written.
-
-    Raises:
-        PictureError: matplotlib is not installed, or the file exists already.
-    """
-    check_matplotlib()
-    if path.exists() and not overwrite:
-        raise PictureError(f"{path}: exists already; --overwrite replaces it, -o writes elsewhere")
-
-
 @contextmanager
-def figure_page(path: Path, height: float, title: str) -> Iterator[Figure]:
-    """A figure that is written as a PNG when the block ends without an error.
+def figure_page(target: Path | BytesIO, height: float, title: str) -> Iterator[Figure]:
+    """Yield a figure that is written as a PNG when the block ends without an error.
 
     Args:
-        path: the file; its folder is made, an existing file is replaced once the picture is whole.
-        height: inches; the width is `WIDTH`.
-        title: above everything.
+        target: The file, whose folder is made and which is replaced once the picture is whole; or a buffer.
+        height: Inches; the width is `WIDTH`.
+        title: Text above everything.
 
     Raises:
-        PictureError: matplotlib is not installed, or the file cannot be written.
+        PictureError: The file cannot be written.
     """
-    check_matplotlib()
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -85,8 +60,20 @@ def figure_page(path: Path, height: float, title: str) -> Iterator[Figure]:
         FigureCanvasAgg(figure)
         figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
         yield figure
-        with replace_file(path, PictureError) as partial:
-            figure.savefig(partial, format="png", metadata={"Title": title, "Software": "pdtui"})
+        with (
+            nullcontext(target) if isinstance(target, BytesIO) else replace_file(target, PictureError) as file
+        ):
+            figure.savefig(file, format="png", metadata={"Title": title, "Software": "pdtui"})
+
+
+def check_figure(path: Path, overwrite: bool) -> None:
+    """Find out before the work whether one figure may be written.
+
+    Raises:
+        PictureError: The file exists already.
+    """
+    if path.exists() and not overwrite:
+        raise PictureError(f"{path}: exists already; --overwrite replaces it, -o writes elsewhere")
 
 
 def policy_title(dissection: Dissection) -> str:

@@ -28,16 +28,14 @@ class PictureOutputs:
         """Find out before minutes of work whether its pictures can be written.
 
         Raises:
-            PictureError: a file exists already or cannot be written, or matplotlib is missing.
+            PictureError: a file exists already or cannot be written.
         """
         if self.report.suffix != ".rrd":
             raise PictureError(f"{self.report}: expected a name that ends in .rrd; the viewer opens no other")
         found = [self.report] if self.report.exists() else []
         if self.figures is not None:
             from pdtui.pictures.dissection_figures import existing_figures
-            from pdtui.pictures.matplotlib_page import check_matplotlib
 
-            check_matplotlib()
             found += existing_figures(self.figures)
         if found and not self.overwrite:
             raise PictureError(f"{found[0]}: exists already; --overwrite replaces it")

@@ -70,22 +70,6 @@ def test_a_report_of_another_kind_is_refused(tmp_path: Path) -> None:
         PictureOutputs(tmp_path / "ant.html", None, overwrite=False).check()
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [["dissect", "ant", "-o", "x.toml", "--figures", "figs"], ["figure", "episode", "ant", "-o", "x.png"]],
-)
-def test_without_matplotlib_one_line_says_what_to_install(arguments: list[str], tmp_path: Path) -> None:
-    code = "import sys; sys.modules['matplotlib'] = None; from pdtui.cli import main; main(sys.argv[1:])"
-    ran = subprocess.run(
-        [sys.executable, "-c", code, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert ran.returncode == 1
-    assert ran.stderr.strip() == (
-        "pdtui: figures need matplotlib, which is not installed: pip install 'pdtui[figures]'"
-    )
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_the_core_does_not_load_matplotlib() -> None:
     code = "import sys, pdtui.cli, pdtui.pictures.picture_outputs; print('matplotlib' in sys.modules)"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "False"

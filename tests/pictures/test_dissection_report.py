@@ -2,11 +2,15 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from PIL import Image
 from rerun.chunk import RrdReader
 
 from pdtui.core.errors import PictureError, SessionError
@@ -14,6 +18,7 @@ from pdtui.core.intervals import bootstrap_interval
 from pdtui.core.units import format_unit, parse_unit
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
+from pdtui.pictures.attribute_figure import draw_ranking, draw_spectrograms
 from pdtui.pictures.dissection_report import write_dissection_report
 from pdtui.sessions.session_reader import read_session
 from tests.pictures.report_contents import read_entities, read_origins
@@ -43,7 +48,7 @@ def test_only_the_report_is_left_and_it_is_no_session(report: Path) -> None:
 
 def test_every_view_of_the_layout_shows_an_entity_that_exists(report: Path, entities: Entities) -> None:
     origins = read_origins(report)
-    assert {"/summary", "/attributes/yaw\\ rate/effects", "/side_effects/v\\ \\=\\ -3"} <= origins
+    assert {"/summary", "/attributes/yaw\\ rate/figure", "/side_effects"} <= origins
     for origin in origins:
         assert any(entity == origin or entity.startswith(f"{origin}/") for entity in entities), origin
 
@@ -51,20 +56,31 @@ def test_every_view_of_the_layout_shows_an_entity_that_exists(report: Path, enti
 def test_bars_are_the_discrepancies(dissection: Dissection, entities: Entities) -> None:
     for name in ("vx", "yaw rate", "height"):
         column = dissection.column(name)
-        bars = entities[f"/attributes/{name.replace(' ', chr(92) + ' ')}/discrepancies/bars"]
+        ranking = entities[f"/attributes/{name.replace(' ', chr(92) + ' ')}/discrepancies"]
         nearest = np.argsort(dissection.matching.discrepancy[column], kind="stable")[:12]
-        assert bars["unit"] == [format_unit(int(unit), dissection.layers) for unit in nearest]
-        np.testing.assert_array_equal(bars["discrepancy"], dissection.matching.discrepancy[column, nearest])
-        # Drawn lengths, from the ends of the strips, are in proportion.
-        strips = np.array(bars["LineStrips2D:strips"]).reshape(len(nearest), -1, 2, 2)
-        lengths = strips[:, 0, 1, 0] - strips[:, 0, 0, 0]
-        assert (strips[:, :, 0, 0] == 0).all()
-        thickness = np.ptp(strips[..., 1], axis=(1, 2)) + 2 * bars["LineStrips2D:radii"][0]
-        assert lengths.min() >= 0
-        np.testing.assert_allclose(thickness, 0.76 * 240 / len(nearest), rtol=1e-5)
-        np.testing.assert_allclose(
-            lengths / lengths[-1], np.array(bars["discrepancy"]) / bars["discrepancy"][-1], rtol=1e-5
+        assert ranking["unit"] == [format_unit(int(unit), dissection.layers) for unit in nearest]
+        np.testing.assert_array_equal(
+            ranking["discrepancy"], dissection.matching.discrepancy[column, nearest]
         )
+        panel = Figure().subplots()
+        draw_ranking(panel, dissection, column)
+        assert [bar.get_width() for bar in panel.patches if isinstance(bar, Rectangle)] == ranking[
+            "discrepancy"
+        ]
+        assert [label.get_text() for label in panel.get_yticklabels()] == ranking["unit"]
+
+
+def test_each_attribute_has_its_page(entities: Entities) -> None:
+    pages = {entity: part for entity, part in entities.items() if entity.endswith("/figure")}
+    assert len(pages) == 16 + 2
+    pictures = set()
+    for part in pages.values():
+        (content,) = part["EncodedImage:blob"]
+        with Image.open(BytesIO(bytes(content))) as picture:
+            assert picture.format == "PNG"
+            assert not is_blank(np.asarray(picture.convert("RGB")))
+        pictures.add(bytes(content))
+    assert len(pictures) == len(pages)
 
 
 @pytest.mark.viewer
@@ -98,27 +114,26 @@ def test_curves_are_the_refined_effects_with_their_intervals(
 
 def test_the_side_effect_matrix_is_the_measured_one(dissection: Dissection, entities: Entities) -> None:
     summary = summarise_dissection(dissection)["side_effects"]
-    tensor = entities["/side_effects/v\\ \\=\\ 3/values"]["Tensor:data"][0]
+    numbers = entities["/side_effect_numbers/v\\ \\=\\ 3"]
+    tensor, units = numbers["Tensor:data"][0], numbers["units"]
     shape, cells = tensor["shape"], np.array(tensor["buffer"])
-    labels = entities["/side_effects/v\\ \\=\\ 3/axes/labels"]["Points2D:labels"]
-    units = [label for label in labels if label in summary["units"]]
     assert len(units) == shape[0]
     rows = [summary["units"].index(unit) for unit in units]
     wanted = np.array(summary["by_value"]["3"], np.float64)[rows]
     np.testing.assert_array_equal(cells.reshape(shape), wanted)
 
 
-def test_spectrograms_share_their_colours_and_show_the_loudest_cell(entities: Entities) -> None:
-    ranges = []
-    for part in ("attribute", "unit"):
-        picture = entities[f"/attributes/height/spectrogram/{part}/picture"]
-        low, high = picture["DepthImage:depth_range"][0]
-        assert high - low == pytest.approx(60.0)
-        cells = np.frombuffer(bytes(picture["DepthImage:buffer"][0]), np.float32)
-        assert low - 1e-3 <= cells.min() <= cells.max() <= high + 1e-3
-        ranges.append((low, high, cells.max()))
-    assert ranges[0][:2] == ranges[1][:2]
-    assert max(ranges[0][2], ranges[1][2]) == pytest.approx(ranges[0][1], abs=1e-3)
+def test_spectrograms_share_their_colours_and_show_the_loudest_cell(dissection: Dissection) -> None:
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    draw_spectrograms(figure, left, right, dissection, dissection.column("height"))
+    meshes = [panel.collections[0] for panel in (left, right)]
+    (low, high), others = (mesh.get_clim() for mesh in meshes)
+    assert (low, high) == others
+    assert high - low == pytest.approx(60.0)
+    loudest = [float(np.asarray(mesh.get_array()).max()) for mesh in meshes]
+    assert max(loudest) == pytest.approx(high, abs=1e-3)
+    assert min(float(np.asarray(mesh.get_array()).min()) for mesh in meshes) >= low - 1e-3
 
 
 def test_the_episode_is_the_monitored_one(dissection: Dissection, entities: Entities) -> None:
@@ -156,7 +171,7 @@ def test_an_attribute_that_was_left_out_leaves_its_pictures_out(
     entities = read_entities(path)
     drawn = [entity for entity in entities if entity.startswith("/attributes/yaw\\ rate/")]
     assert drawn
-    assert not any("spectrogram" in entity or "discrepancies" in entity for entity in drawn)
+    assert not any("discrepancies" in entity for entity in drawn)
     for origin in read_origins(path):
         assert any(entity == origin or entity.startswith(f"{origin}/") for entity in entities), origin
     assert "yaw rate: not finite" in entities["/summary"]["TextDocument:text"][0]

@@ -1,0 +1,139 @@
+"""One page for each attribute: spectrograms, nearest units and effects.
+
+The panels are also those of the pages that show one kind of panel for several attributes.
+"""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pdtui.dissection.dissection_result import Dissection
+from pdtui.pictures.chart_data import (
+    EffectCurve,
+    SpectrogramChart,
+    effect_curves,
+    matched_pair,
+    unit_ranking,
+)
+from pdtui.pictures.matplotlib_page import figure_page, policy_title
+from pdtui.pictures.plot_colors import BLUE, GREEN, GREY, VERMILLION, to_hex
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MATCHED, _PROBED, _OTHER, _FAINT = (to_hex(color) for color in (VERMILLION, GREEN, BLUE, GREY))
+
+
+def draw_attribute_page(dissection: Dissection, column: int) -> bytes:
+    """Draw everything about one attribute on a page.
+
+    Returns:
+        A PNG file.
+    """
+    attribute, target = dissection.attributes[column], io.BytesIO()
+    label = f"{attribute.name} ({attribute.unit})" if attribute.unit else attribute.name
+    with figure_page(target, 4.4, f"{policy_title(dissection)}: {label}") as figure:
+        (upper_left, upper_right), (lower_left, lower_right) = figure.subplots(2, 2)
+        draw_spectrograms(figure, upper_left, upper_right, dissection, column)
+        draw_ranking(lower_left, dissection, column)
+        lower_left.set_ylabel("unit")
+        draw_effects(lower_right, dissection, column)
+        lower_right.set_title(f"effect of single units on {attribute.name}, 95 % intervals")
+        draw_effect_key(figure)
+    return target.getvalue()
+
+
+def draw_spectrograms(figure: Figure, left: Axes, right: Axes, dissection: Dissection, column: int) -> None:
+    """Draw the spectrograms of an attribute and of its best match, in the same colours."""
+    pair = matched_pair(dissection, column)
+    if pair is None:
+        _leave_out(left, dissection, column)
+        right.set_axis_off()
+        return
+    mesh = None
+    attribute = pair.attribute
+    charts: tuple[tuple[Axes, str, SpectrogramChart], ...] = (
+        (left, f"{attribute.name} ({attribute.unit})", pair.of_attribute),
+        (right, f"unit {pair.label}", pair.of_unit),
+    )
+    for panel, name, chart in charts:
+        mesh = panel.pcolormesh(
+            chart.times,
+            chart.frequencies,
+            np.maximum(chart.decibels.T, pair.low),
+            cmap="viridis",
+            vmin=pair.low,
+            vmax=pair.high,
+            rasterized=True,
+        )
+        panel.set_title(name)
+        panel.set_xlabel("time (s)")
+    left.set_ylabel("frequency (Hz)")
+    right.tick_params(labelleft=False)
+    assert mesh is not None
+    figure.colorbar(mesh, ax=right, pad=0.03, aspect=14).set_label("dB", labelpad=1)
+
+
+def draw_ranking(panel: Axes, dissection: Dissection, column: int) -> None:
+    """Draw the discrepancies of the nearest units as bars, the nearest on top."""
+    ranking = unit_ranking(dissection, column)
+    if not ranking.labels:
+        _leave_out(panel, dissection, column)
+        return
+    places = np.arange(len(ranking.labels))
+    panel.barh(places, ranking.discrepancies, color=[_MATCHED, *[_OTHER] * (len(places) - 1)], height=0.75)
+    panel.set_yticks(places, ranking.labels)
+    panel.invert_yaxis()
+    panel.ticklabel_format(axis="x", scilimits=(-2, 3), useMathText=True)
+    panel.set_title(dissection.attributes[column].name)
+    panel.set_xlabel(f"discrepancy\n(first: {ranking.level_shares[0]:.0%} mean level)")
+
+
+def draw_effects(panel: Axes, dissection: Dissection, column: int) -> None:
+    """Draw how the attribute changes with the output of the best probed unit and of the first match."""
+    attribute = dissection.attributes[column]
+    panel.axhline(0, color=_FAINT, linewidth=0.6)
+    for curve in effect_curves(dissection, column):
+        _draw_effect_curve(panel, curve)
+    panel.set_title(attribute.name)
+    panel.set_ylabel(f"change ({attribute.unit})" if attribute.unit else "change")
+    panel.set_xlabel("output v")
+    if panel.has_data() and panel.get_legend_handles_labels()[1]:
+        panel.legend(loc="best", handlelength=1.2, borderpad=0.1)
+
+
+def _draw_effect_curve(panel: Axes, curve: EffectCurve) -> None:
+    color = _MATCHED if curve.matched else _PROBED
+    spread = np.vstack([curve.means - curve.lows, curve.highs - curve.means])
+    panel.errorbar(
+        curve.values, curve.means, yerr=np.nan_to_num(np.maximum(spread, 0.0)), color=color, marker="o",
+        markersize=2.5, capsize=2, elinewidth=0.8, label=curve.label,
+    )  # fmt: skip
+    fell = curve.falls > 0
+    if fell.any():
+        panel.plot(curve.values[fell], curve.means[fell], "x", color="black", markersize=4)
+
+
+def draw_effect_key(figure: Figure) -> None:
+    """Say below a page what the colours of effect curves mean."""
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=color, marker="o", markersize=3, label=name)
+        for name, color in (("best probed", _PROBED), ("first match", _MATCHED))
+    ]
+    handles.append(
+        Line2D([], [], color="black", marker="x", linestyle="", markersize=4, label="fell from some starts")
+    )
+    figure.legend(handles=handles, loc="outside lower left", ncols=len(handles))
+
+
+def _leave_out(panel: Axes, dissection: Dissection, column: int) -> None:
+    name = dissection.attributes[column].name
+    panel.set_axis_off()
+    panel.set_title(name)
+    panel.text(0, 0.8, dissection.matching.flaws.get(name, "nothing matches"), wrap=True, va="top")
