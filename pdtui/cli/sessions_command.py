@@ -143,12 +143,7 @@ def _verify_file(file: Path, policy: str, judging: dict[str, Any], as_json: bool
 
 @sessions.command()
 @_file_argument
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    help="New file; default: FILE with the suffix .repaired.rrd.",
-)
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="New file; default: *.repaired.rrd.")
 @click.option("--in-place", is_flag=True, help="Replace FILE.")
 def repair(file: Path, output: Path | None, in_place: bool) -> None:
     """Cut off the damaged end of FILE, so that it opens and replays up to there."""
@@ -163,25 +158,15 @@ def repair(file: Path, output: Path | None, in_place: bool) -> None:
     if target.exists() and not in_place:
         raise SessionError(f"{target}: exists already; a repaired session is a new file")
     repaired = repair_session(file, target)
-    said = (
-        f"{repaired.steps} steps ({repaired.seconds:g} s), {repaired.keys} keys, outcome '{repaired.outcome}'"
-    )
-    click.echo(make_printable(f"wrote {target}: {said}"))
+    length = f"{repaired.steps} steps ({repaired.seconds:g} s), {repaired.keys} keys"
+    click.echo(make_printable(f"wrote {target}: {length}, outcome '{repaired.outcome}'"))
 
 
 @sessions.command()
 @_file_argument
 @click.option("--stream", help="Stream to export; without --stream and --keys, list the streams.")
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    metavar="FILE.parquet|.csv",
-    help="File for the stream.",
-)
-@click.option(
-    "--keys", type=click.Path(path_type=Path), metavar="FILE", help="Write the keystrokes to this text file."
-)
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="The .parquet or .csv file to write.")
+@click.option("--keys", type=click.Path(path_type=Path), help="Write the keystrokes to this text file.")
 @overwrite_option
 def export(file: Path, stream: str | None, output: Path | None, keys: Path | None, overwrite: bool) -> None:
     """Export a stream of FILE as a table, or its keystrokes as text.
