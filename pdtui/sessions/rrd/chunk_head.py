@@ -18,8 +18,8 @@ from pdtui.sessions.rrd.message_decoder import (
 from pdtui.sessions.rrd.message_framing import MessageFrame
 from pdtui.sessions.rrd.protobuf_fields import read_fields
 
-_HEAD_BYTES, _UNPACKED_BYTES = 4096, 8192
-"""How much of a long message is read and decompressed. Types and sizes of a session's columns take 4 kB."""
+_HEAD_BYTES = 4096
+"""How much of a long message is read. What precedes the rows takes 1 to 2.5 kB in a session."""
 _READ_WHOLE = 4 * _HEAD_BYTES
 """Messages up to this size are read whole: Arrow decompresses them faster than Python does their start."""
 
@@ -66,23 +66,28 @@ def read_chunk_head(file: BinaryIO, frame: MessageFrame, own: StoreInfo | None) 
         if schema.type != "schema":
             return None
         entity = (pa.ipc.read_schema(schema).metadata or {})[ENTITY_PATH].decode()
-        second = _IPC_PREFIX.size + _IPC_PREFIX.unpack_from(data)[1]
-        size = _IPC_PREFIX.unpack_from(data, second)[1]
-        metadata = memoryview(data)[second + _IPC_PREFIX.size :][:size]
-        return ChunkHead(store, entity, count_rows(metadata)) if len(metadata) == size else None
+        begin, end = (_metadata_end(data, messages) for messages in (1, 2))
+        if end > len(data):
+            return None
+        return ChunkHead(store, entity, count_rows(memoryview(data)[begin + _IPC_PREFIX.size : end]))
     except (ValueError, KeyError, IndexError, StopIteration, OSError, struct.error, pa.ArrowException):
         return None
 
 
 def decompress_start(packed: memoryview, _size: int) -> pa.Buffer:
-    """Decompress the start of an LZ4 block as far as it is there; Arrow accepts only whole blocks.
+    """Decompress the start of an LZ4 block up to the rows, which Arrow does only for whole blocks.
 
     Raises:
         ValueError, IndexError: it is damaged.
     """
     out = bytearray()
     place = 0
-    while place < len(packed) and len(out) < _UNPACKED_BYTES:
+    needed = 0
+    while place < len(packed):
+        if len(out) >= needed:
+            needed = _metadata_end(out, messages=2)
+            if len(out) >= needed:
+                break
         token = packed[place]
         literals, place = _length(packed, place + 1, token >> 4)
         out += packed[place : place + literals]
@@ -98,6 +103,16 @@ def decompress_start(packed: memoryview, _size: int) -> pa.Buffer:
         # A match may run into what it writes: its beginning is then repeated.
         out += match if len(match) == count else (match * -(-count // len(match)))[:count]
     return pa.py_buffer(bytes(out))
+
+
+def _metadata_end(data: bytearray | pa.Buffer, messages: int) -> int:
+    """Return where the metadata of a number of IPC messages end, as far as the data tell."""
+    end = 0
+    for _ in range(messages):
+        if len(data) < end + _IPC_PREFIX.size:
+            return end + _IPC_PREFIX.size
+        end += _IPC_PREFIX.size + int(_IPC_PREFIX.unpack_from(data, end)[1])
+    return end
 
 
 def _length(packed: memoryview, place: int, length: int) -> tuple[int, int]:
