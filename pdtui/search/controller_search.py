@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import ControllerPlan
 from pdtui.probing.unit_effects import UnitEffects
 from pdtui.search.plan_search import Deadline, ScoringStage, select_plans
-from pdtui.search.stimulation_sampler import round_to_three_digits
+from pdtui.search.stimulation_sampler import round_outputs, round_to_three_digits
 from pdtui.stimulation.stimulation_map import PidGains
 
 _FALL_PENALTY = 2.0
@@ -92,23 +91,19 @@ class ControllerGoal:
         return float(size) or 1.0
 
 
-class _Candidate(NamedTuple):
-    weights: Stimulation
-    base: tuple[float, ...]
-    pid: PidGains
-
-
+@dataclass(frozen=True)
 class ControllerSearch:
     """Try controllers on the units whose effect is most linear in v, and between opposite plans.
 
-    Args:
+    Attributes:
         prober: runs the roll-outs.
         goal: what to hold, and where.
         settings: how much to do.
     """
 
-    def __init__(self, prober: EffectProbe, goal: ControllerGoal, settings: ControllerSearchSettings) -> None:
-        self._prober, self._goal, self._settings = prober, goal, settings
+    prober: EffectProbe
+    goal: ControllerGoal
+    settings: ControllerSearchSettings
 
     def run(
         self,
@@ -130,7 +125,7 @@ class ControllerSearch:
                 the other gives the figures.
             deadline: asked before the first roll-out.
         """
-        settings = self._settings
+        settings = self.settings
         candidates = self._alone(_rank_by_slope(sweep, column)[: settings.units])
         candidates += self._between(opposites[: settings.pairs])
         if not candidates or deadline():
@@ -141,39 +136,39 @@ class ControllerSearch:
             ScoringStage(partial(self._score, starts=held_out[:half], steps=settings.final_steps), 1),
         )
         ((_, best),) = select_plans(candidates, stages)
-        without = _Candidate(NO_STIMULATION, (), best.pid)
+        without = replace(best, units=NO_STIMULATION, base=())
         errors, falls = self._measure([best, without], held_out[half:], settings.final_steps)
-        goal = self._goal
+        targets, relative = self.goal.targets, self.goal.relative
         return ControllerSearchResult(
-            best.weights,
+            best.units,
             best.pid,
             float(errors[0]),
             float(errors[1]),
             float(falls[0]),
-            goal.targets,
-            goal.relative,
+            targets,
+            relative,
             best.base,
         )
 
-    def _alone(self, units: Sequence[tuple[int, float]]) -> list[_Candidate]:
+    def _alone(self, units: Sequence[tuple[int, float]]) -> list[ControllerPlan]:
         """Propose single units, whose output goes either way from 0."""
         return [
-            _Candidate(Stimulation((unit,), (weight,)), (), self._pid(limit, gain * limit, ki))
+            self._candidate(Stimulation((unit,), (weight,)), (), limit, gain * limit, ki)
             for unit, weight in units
             for limit in (2.0, 4.0, 8.0)
             for gain in (1.0, 3.0)
             for ki in self._integral
         ]
 
-    def _between(self, opposites: Sequence[tuple[Stimulation, Stimulation]]) -> list[_Candidate]:
+    def _between(self, opposites: Sequence[tuple[Stimulation, Stimulation]]) -> list[ControllerPlan]:
         """Propose blends from one plan, at −1, to its opposite, at 1, and somewhat beyond."""
         found = []
         for high, low in opposites:
             up, down = np.array(high.values), np.array(low.values)
-            weights = Stimulation(high.units, _rounded((up - down) / 2))
-            base = _rounded((up + down) / 2)
+            weights = Stimulation(high.units, round_outputs((up - down) / 2))
+            base = round_outputs((up + down) / 2)
             found += [
-                _Candidate(weights, base, self._pid(limit, gain, ki))
+                self._candidate(weights, base, limit, gain, ki)
                 for limit in (1.0, 1.5, 3.0)
                 for gain in (1.0, 2.0, 4.0)
                 for ki in self._integral
@@ -183,30 +178,31 @@ class ControllerSearch:
     @property
     def _integral(self) -> tuple[float, ...]:
         # An angle is the integral of what the units change; anything else needs an integral part to settle.
-        return (0.0,) if self._goal.relative else (0.5, 2.0)
+        return (0.0,) if self.goal.relative else (0.5, 2.0)
 
-    def _pid(self, limit: float, gain: float, ki: float) -> PidGains:
+    def _candidate(
+        self, units: Stimulation, base: tuple[float, ...], limit: float, gain: float, ki: float
+    ) -> ControllerPlan:
         """Scale the gains so that a gain of 1 gives an output of 1 for a typical error."""
-        kp = round_to_three_digits(gain / self._goal.spread)
-        step = float(f"{self._goal.spread / 4:.1g}")
-        return PidGains(self._goal.attribute, kp, round_to_three_digits(kp * ki), 0.0, limit, step)
+        spread = self.goal.spread
+        kp, step = round_to_three_digits(gain / spread), float(f"{spread / 4:.1g}")
+        pid = PidGains(self.goal.attribute, kp, round_to_three_digits(kp * ki), 0.0, limit, step)
+        return ControllerPlan(units, pid, 0.0, self.goal.relative, base)
 
-    def _score(self, candidates: Sequence[_Candidate], starts: Sequence[StartState], steps: int) -> Floats:
+    def _score(
+        self, candidates: Sequence[ControllerPlan], starts: Sequence[StartState], steps: int
+    ) -> Floats:
         errors, falls = self._measure(candidates, starts, steps)
-        scores: Floats = -errors - _FALL_PENALTY * self._goal.spread * falls
+        scores: Floats = -errors - _FALL_PENALTY * self.goal.spread * falls
         return scores
 
     def _measure(
-        self, candidates: Sequence[_Candidate], starts: Sequence[StartState], steps: int
+        self, candidates: Sequence[ControllerPlan], starts: Sequence[StartState], steps: int
     ) -> tuple[Floats, Floats]:
         """Return mean error and share of falls of each candidate over targets and starts."""
-        goal = self._goal
-        plans = [
-            ControllerPlan(one.weights, one.pid, target, goal.relative, one.base)
-            for one in candidates
-            for target in goal.targets
-        ]
-        result = self._prober.measure_plans(plans, starts, steps=steps, measure_from=steps // 3)
+        goal = self.goal
+        plans = [replace(one, target=target) for one in candidates for target in goal.targets]
+        result = self.prober.measure_plans(plans, starts, steps=steps, measure_from=steps // 3)
         # A roll-out that fell before the measured steps counts as an error of the largest target.
         errors = np.nan_to_num(result.errors, nan=float(np.max(np.abs(goal.targets))))
         shape = (len(candidates), -1)
@@ -221,7 +217,3 @@ def _rank_by_slope(sweep: UnitEffects, column: int) -> list[tuple[int, float]]:
     slope = curves @ values
     order = np.argsort(-np.abs(slope), kind="stable")
     return [(sweep.units[row], float(np.sign(slope[row]))) for row in order if slope[row] != 0]
-
-
-def _rounded(values: Floats) -> tuple[float, ...]:
-    return tuple(round_to_three_digits(value) for value in values.tolist())

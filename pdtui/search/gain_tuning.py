@@ -27,7 +27,7 @@ from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveResult, Tra
 from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarise_tracking
 from pdtui.stimulation.stimulation_map import Behavior, PidGains, StimulationMap
 
-STEPS_OF_ANGLE = (0.0, 0.4, 1.2, 0.3, -0.9, -0.5, 0.0, 0.9, 0.0)
+STEPS_OF_ANGLE: tuple[float, ...] = (0.0, 0.4, 1.2, 0.3, -0.9, -0.5, 0.0, 0.9, 0.0)
 """Targets of an angle, rad: steps of 0.3 to 1.2 in both directions."""
 FALL = 2.0
 """Cost of each control step after a fall, in multiples of the targets' range."""
@@ -160,10 +160,8 @@ class _GainSearch:
         self._search, self._judge = seeds[: len(seeds) // 2], seeds[len(seeds) // 2 :]
         self._settings, self._deadline, self._progress, self._seed = settings, deadline, progress, seeds[0]
         attribute = runner.attribute(self._old.attribute)
-        self._unit = attribute.unit
-        if attribute.wraps:
-            self._targets: tuple[float, ...] = STEPS_OF_ANGLE
-        else:
+        self._unit, self._targets = attribute.unit, STEPS_OF_ANGLE
+        if not attribute.wraps:
             self._targets = choose_tracking_targets(runner, behavior, self._search[:3])
         self._range = float(np.ptp(self._targets))
         self._step = float(np.abs(np.diff(self._targets)).mean())
@@ -187,10 +185,8 @@ class _GainSearch:
     def _best(self) -> PidGains:
         """Return the best of the controllers that were measured on the most seeds."""
         most = max(map(len, self._costs.values()))
-        return min((pid for pid, costs in self._costs.items() if len(costs) == most), key=self._mean)
-
-    def _mean(self, pid: PidGains) -> float:
-        return float(np.mean(self._costs[pid]))
+        measured = {pid: np.mean(costs) for pid, costs in self._costs.items() if len(costs) == most}
+        return min(measured, key=measured.__getitem__)
 
     def _select(self) -> PidGains:
         """Return the best of the hypercube and the map's own; each stage keeps the better half."""
@@ -238,17 +234,17 @@ class _GainSearch:
             if self._costs and self._deadline():
                 raise _OutOfTimeError
             new = self._drive(pid, self._search[len(known) : count])
-            self._costs[pid] = known + [self._cost(results) for results in new]
+            self._costs[pid] = known + [self._cost(result) for result in new]
             if self._progress is not None:
-                note = f"{self._behavior.name}: best {self._mean(self._best()):.3g} {self._unit}"
+                note = f"{self._behavior.name}: best {np.mean(self._costs[self._best()]):.3g} {self._unit}"
                 self._progress(len(self._costs), self._settings.points + self._settings.refinements + 1, note)
         return float(np.mean(self._costs[pid][:count]))
 
     def _drive(self, pid: PidGains, seeds: Sequence[int]) -> list[TrackingDriveResult]:
-        name, targets = self._behavior.name, tuple(self._targets)
-        return self._runner.run([TrackingDrive(pid.attribute, name, seed, targets, pid) for seed in seeds])
+        drive = partial(TrackingDrive, pid.attribute, self._behavior.name, targets=self._targets, pid=pid)
+        return self._runner.run([drive(seed=seed) for seed in seeds])
 
-    def _cost(self, results: TrackingDriveResult) -> float:
+    def _cost(self, result: TrackingDriveResult) -> float:
         """Return the mean |error|, where steps after a fall count as `FALL` times the targets' range."""
-        errors = np.abs(results.errors)
+        errors = np.abs(result.errors)
         return float(np.where(np.isfinite(errors), errors, FALL * self._range).mean())

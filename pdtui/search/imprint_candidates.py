@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pdtui.core.angles import wrap_angle
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.units import Stimulation
-from pdtui.search.stimulation_sampler import round_to_three_digits
+from pdtui.search.stimulation_sampler import round_outputs
 from pdtui.spectra.monitor import MonitoredEpisode
 
 _FLOOR = 0.05
@@ -77,8 +77,7 @@ def build_imprint_candidates(
                     chosen = np.sort(order[:count])
                     for factor in settings.factors:
                         outputs = np.clip(mean + factor * (row - mean), -largest, largest)[chosen]
-                        rounded = [round_to_three_digits(v) for v in outputs.tolist()]
-                        plans[Stimulation(tuple(chosen.tolist()), tuple(rounded))] = None
+                        plans[Stimulation(tuple(chosen.tolist()), round_outputs(outputs))] = None
     return tuple(plans)
 
 

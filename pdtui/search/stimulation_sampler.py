@@ -117,6 +117,11 @@ class StimulationSampler:
         )
 
 
+def round_outputs(values: Floats) -> tuple[float, ...]:
+    """Return outputs with three significant digits, as a map's text gives them."""
+    return tuple(round_to_three_digits(value) for value in values.tolist())
+
+
 def round_to_three_digits(value: float) -> float:
     """Return a value with three significant digits, as a map's text gives it."""
     return float(f"{value:.3g}")

@@ -84,14 +84,14 @@ class TaskSearchResult:
 
 
 class TaskSearch:
-    """Search for the stimulation, and how long it lasts, that does a task.
+    """Search for a stimulation, and its duration, that does a task.
 
-    Walks of the stages have different seeds: ``seed`` on for the search, 1000 and 2000 further on for the
-    selection and the figures.
+    The walks of the search have the seeds from ``seed`` on, those of the selection from ``seed + 1000`` on,
+    those of the figures from ``seed + 2000`` on.
 
     Args:
         pool: runs the roll-outs.
-        task: what to do.
+        task: the task.
         seed: first seed of the walks, and seed of every random choice.
         settings: how much to do.
         known: plans to begin with besides the best single units.
@@ -162,7 +162,7 @@ class TaskSearch:
             for unit in tried.tolist()
             for value in settings.values
         ]
-        scores = np.array(self._score(plans, settings.screen_seeds, progress))
+        scores = self._score(plans, settings.screen_seeds, progress)
         weights = np.zeros(units)
         best = scores.reshape(len(tried), -1).max(axis=1)
         weights[tried] = np.maximum(best - np.median(scores), 0.0)
@@ -175,13 +175,12 @@ class TaskSearch:
 
     def _score(
         self, plans: Sequence[TimedStimulation], seeds: int, progress: StepProgress | None = None
-    ) -> list[float]:
+    ) -> Floats:
         table = self._judge(plans, self._seeds(0, seeds), progress)
-        cost = self._settings.unit_cost
-        return [
-            float(np.mean([verdict.score for verdict in row])) - cost * len(plan.stimulation.units)
-            for row, plan in zip(table, plans, strict=True)
-        ]
+        means = np.array([np.mean([verdict.score for verdict in row]) for row in table])
+        units = np.array([len(plan.stimulation.units) for plan in plans])
+        scores: Floats = means - self._settings.unit_cost * units
+        return scores
 
     def _judge(
         self, plans: Sequence[TimedStimulation], seeds: Sequence[int], progress: StepProgress | None = None
@@ -202,6 +201,6 @@ class TaskSearch:
 def judge_task_job(
     robot: Robot, policy: Policy, job: tuple[str, tuple[TimedStimulation, ...], int]
 ) -> list[TaskVerdict]:
-    """What a worker does; tasks hold functions, so they travel by name."""
+    """Judge plans in a worker process; tasks hold functions, so they travel by name."""
     name, plans, seed = job
     return judge_stimulations(robot, policy, robot.find_task(name), plans, seed)
