@@ -7,7 +7,6 @@ from pathlib import Path
 import click
 
 from pdtui.cli.shared_options import (
-    core_count,
     import_option_flags,
     json_option,
     overwrite_option,
@@ -103,7 +102,7 @@ def dissect(
     overwrite: bool,
     budget: float | None,
     start_from: str | None,
-    workers: int | None,
+    workers: int,
     as_json: bool,
 ) -> None:
     """Find the units of ROBOT's policy that move something, and write a map and a report.
@@ -141,7 +140,7 @@ def dissect(
             seed=seed,
             start_from=start_from,
             budget_minutes=budget,
-            workers=core_count(workers),
+            workers=workers,
             progress=show_progress,
         )
         result = dissect_into_map(config, output, overwrite=overwrite, draw=outputs.draw)

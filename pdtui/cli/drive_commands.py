@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pdtui.cli.shared_options import (
+    criteria_options,
     drive_config,
     force_option,
-    judging_options,
     map_option,
     policy_options,
     progress_bar_or_none,
@@ -115,8 +115,8 @@ def drive(
 @click.argument("session", type=click.Path(path_type=Path))
 @click.option("--watch", is_flag=True, help="Show it on the screen.")
 @click.option("--policy", default="", help="The session's weights, where they are elsewhere now.")
-@judging_options
-def replay(session: Path, watch: bool, policy: str, judging: dict[str, Any]) -> None:
+@criteria_options
+def replay(session: Path, watch: bool, policy: str, criteria: dict[str, Any]) -> None:
     """Run SESSION again and compare every step; exit with 1 if it does not repeat."""
     from pdtui.drive.replay import replay_config, replay_session
 
@@ -129,7 +129,7 @@ def replay(session: Path, watch: bool, policy: str, judging: dict[str, Any]) -> 
         _show(replay_config(recorded, str(session), policy), fps=12, watching=True)
         return
     with progress_bar_or_none("replaying") as advance:
-        result = replay_session(session, policy=policy, progress=advance, **judging)
+        result = replay_session(session, policy=policy, progress=advance, **criteria)
     click.echo(make_printable(result.verdict), err=not result.passed)
     if not result.identical:
         lines = [*(str(deviation) for deviation in result.deviations[:5]), *result.environment]

@@ -11,7 +11,6 @@ import click
 
 from pdtui.cli.shared_options import (
     SeedList,
-    core_count,
     drive_config,
     force_option,
     json_option,
@@ -112,7 +111,7 @@ def evaluate(
     experiment: str | None,
     pictures: tuple[Path, ...],
     overwrite: bool,
-    workers: int | None,
+    workers: int,
     as_json: bool,
     **own_options: Any,
 ) -> None:
@@ -143,7 +142,7 @@ def evaluate(
             as_json,
             configs=(config, *rest),
             seeds=seeds,
-            workers=core_count(workers),
+            workers=workers,
             pictures=pictures,
             overwrite=overwrite,
             options=own_options,
@@ -153,7 +152,7 @@ def evaluate(
         from pdtui.evaluation.tracking_tables import tracking_table
 
         with progress_bar_or_none("holding targets", quiet=as_json) as advance:
-            tracking = evaluate_tracking(config, target, seeds, workers=core_count(workers), progress=advance)
+            tracking = evaluate_tracking(config, target, seeds, workers=workers, progress=advance)
         show_result(asdict(tracking), as_json, lambda: tracking_table(tracking))
     elif policy_only:
         from pdtui.evaluation.evaluation_tables import policy_table
@@ -163,7 +162,7 @@ def evaluate(
             alone = evaluate_policy(config, seeds, progress=advance)
         show_result(asdict(alone), as_json, lambda: policy_table(alone))
     else:
-        _evaluate_behaviors(config, seeds, core_count(workers), update, as_json)
+        _evaluate_behaviors(config, seeds, workers, update, as_json)
 
 
 def _evaluate_behaviors(config: DriveConfig, seeds: range, workers: int, update: bool, as_json: bool) -> None:

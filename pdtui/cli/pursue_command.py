@@ -7,7 +7,6 @@ from pathlib import Path
 import click
 
 from pdtui.cli.shared_options import (
-    core_count,
     import_option_flags,
     json_option,
     own_policy_option,
@@ -52,7 +51,7 @@ def pursue(
     minutes: float,
     quick: bool,
     output: Path | None,
-    workers: int | None,
+    workers: int,
     as_json: bool,
 ) -> None:
     """Search for a stimulation with which ROBOT does TASK, and write it into a map.
@@ -71,7 +70,7 @@ def pursue(
             output or Path("maps") / f"{file_stem(robot)}-dissected.toml",
             import_options=import_options,
             seed=seed,
-            workers=core_count(workers),
+            workers=workers,
             minutes=minutes,
             settings=QUICK_TASK_SEARCH if quick else TaskSearchSettings(),
             progress=advance,

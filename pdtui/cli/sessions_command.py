@@ -11,8 +11,8 @@ from typing import Any
 import click
 
 from pdtui.cli.shared_options import (
+    criteria_options,
     json_option,
-    judging_options,
     overwrite_option,
     progress_bar_or_none,
     show_result,
@@ -101,15 +101,15 @@ def show(file: Path, as_json: bool) -> None:
 @sessions.command()
 @click.argument("files", type=click.Path(path_type=Path), nargs=-1, required=True)
 @click.option("--policy", default="", metavar="FILE", help="Weights of the sessions, if they have moved.")
-@judging_options
+@criteria_options
 @json_option
-def verify(files: tuple[Path, ...], policy: str, judging: dict[str, Any], as_json: bool) -> None:
+def verify(files: tuple[Path, ...], policy: str, criteria: dict[str, Any], as_json: bool) -> None:
     """Check that FILES are whole and that their drives repeat.
 
     Exit codes: 0 if all do; 1 if a file is broken, not whole or cannot be replayed; 3 if a drive does not
     repeat.
     """
-    found = [_verify_file(file, policy, judging, as_json) for file in files]
+    found = [_verify_file(file, policy, criteria, as_json) for file in files]
     if as_json:
         click.echo(to_json({"sessions": found}))
     if any(row["repeats"] is False for row in found):
@@ -118,7 +118,7 @@ def verify(files: tuple[Path, ...], policy: str, judging: dict[str, Any], as_jso
         sys.exit(BROKEN)
 
 
-def _verify_file(file: Path, policy: str, judging: dict[str, Any], as_json: bool) -> dict[str, Any]:
+def _verify_file(file: Path, policy: str, criteria: dict[str, Any], as_json: bool) -> dict[str, Any]:
     from pdtui.drive.replay import replay_session
     from pdtui.sessions.session_repair import examine_session
 
@@ -126,7 +126,7 @@ def _verify_file(file: Path, policy: str, judging: dict[str, Any], as_json: bool
     try:
         row["whole"] = examine_session(file).whole
         with progress_bar_or_none("replaying", quiet=as_json) as advance:
-            result = replay_session(file, policy=policy, progress=advance, **judging)
+            result = replay_session(file, policy=policy, progress=advance, **criteria)
         row |= {"repeats": result.passed, "identical": result.identical, **asdict(result)}
         lines = [result.verdict if row["whole"] else f"not whole: `pdtui sessions repair`; {result.verdict}"]
         if not result.identical:

@@ -54,7 +54,10 @@ search_seed_option = click.option(
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 overwrite_option = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 workers_option = click.option(
-    "--workers", type=click.IntRange(1, 256), default=None, help="Worker processes; default: one per core."
+    "--workers",
+    type=click.IntRange(1, 256),
+    default=lambda: os.cpu_count() or 1,
+    help="Worker processes; default: one per core.",
 )
 
 
@@ -98,15 +101,15 @@ def policy_options(command: Callable[..., Any]) -> Callable[..., Any]:
     )
 
 
-def judging_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--tolerance`` and ``--strict``; the command gets them as `judging`."""
+def criteria_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--tolerance`` and ``--strict``; the command gets them as `criteria`."""
 
     @wraps(command)
     def judged(*args: Any, tolerance: float | None, strict: bool, **others: Any) -> Any:
-        judging: dict[str, Any] = {"strict": strict}
+        criteria: dict[str, Any] = {"strict": strict}
         if tolerance is not None:
-            judging["tolerance"] = tolerance
-        return command(*args, judging=judging, **others)
+            criteria["tolerance"] = tolerance
+        return command(*args, criteria=criteria, **others)
 
     for option in (
         click.option("--strict", is_flag=True, help="Accept only identical bits, on any machine."),
@@ -188,10 +191,6 @@ def _map_of(robot: str, name: str, policy: str) -> StimulationMap:
         click.echo(make_printable(f"{error}; driving without behaviors"), err=True)
         return bare_map(robot, policy)
     return load_map(path)
-
-
-def core_count(workers: int | None) -> int:
-    return workers or os.cpu_count() or 1
 
 
 def show_result(data: dict[str, Any] | list[dict[str, Any]], as_json: bool, table: Callable[[], Any]) -> None:

@@ -6,7 +6,6 @@ import click
 
 from pdtui.cli.shared_options import (
     SeedList,
-    core_count,
     drive_config,
     force_option,
     json_option,
@@ -67,7 +66,7 @@ def tune(
     refinements: int,
     minutes: float | None,
     dry_run: bool,
-    workers: int | None,
+    workers: int,
     as_json: bool,
 ) -> None:
     """Tune the PID gains of BEHAVIORs by their step responses, and write them into MAP.
@@ -93,7 +92,7 @@ def tune(
             behaviors,
             seeds,
             settings=TuningSettings(points, refinements, minutes),
-            workers=core_count(workers),
+            workers=workers,
             progress=advance,
         )
     better = {one.behavior: one.new for one in results if one.better}
