@@ -1,4 +1,4 @@
-"""Figures of all attributes at once: side effects, and how well matching does."""
+"""Figures of all attributes at once: side effects, and how well matching finds what steers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The numbers behind every picture, whoever draws it."""
+"""The numbers behind the pictures of a dissection."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.spectrogram import short_time_transform
 
 DECIBELS = 60.0
-"""Range of a spectrogram's colours below its loudest cell."""
+"""Range of a spectrogram's colours below its strongest cell, dB."""
 RANKED = 12
-"""Units of a ranking that are drawn."""
+"""Number of units that a ranking shows."""
 STRONG = 3.0
-"""Deviations from which a side effect has the strongest colour: beyond, only the torques of a robot that else
-hardly moves would show."""
+"""Side effect, in standard deviations, that gets the strongest colour; with a higher limit, the torques of a
+robot that otherwise hardly moves would make all else pale."""
 
 
 @dataclass(frozen=True)
 class SpectrogramChart:
-    """One series in time and frequency.
+    """Spectrogram of one series.
 
     Attributes:
-        times: middle of each window, s, shape (D,).
-        frequencies: Hz, shape (F,).
-        decibels: ``20 log10 |STFT|``, whether the preset compares magnitude or power; −inf where there is
-            nothing; shape (D, F).
+        times: Middle of each window in s, shape (D,).
+        frequencies: Frequencies in Hz, shape (F,).
+        decibels: ``20 log10 |STFT|``, whether the preset compares magnitudes or powers, shape (D, F); −inf
+            where the transform is zero.
     """
 
     times: Floats
@@ -46,11 +46,11 @@ class MatchedPair:
     """An attribute and the unit that matches it best, over the same episode.
 
     Attributes:
-        attribute: at the scale at which matching compares it.
-        unit: its flat index.
-        label: its address.
-        of_attribute, of_unit: their spectrograms.
-        low, high: range of the colours that both share, dB.
+        attribute: The attribute, at the scale at which matching compares it.
+        unit: Flat index of the unit.
+        label: Address of the unit.
+        of_attribute, of_unit: Their spectrograms.
+        low, high: Range of the colours that both share, dB.
     """
 
     attribute: Attribute
@@ -64,12 +64,12 @@ class MatchedPair:
 
 @dataclass(frozen=True)
 class UnitRanking:
-    """Units by discrepancy with one attribute, the nearest first.
+    """The N units of least discrepancy with one attribute, the nearest first.
 
     Attributes:
-        labels: addresses.
-        discrepancies: shape (N,).
-        level_shares: part of the squared distance that is mean level, shape (N,).
+        labels: Addresses of the units.
+        discrepancies: Their discrepancies, shape (N,).
+        level_shares: Share of each squared distance that is mean level, shape (N,).
     """
 
     labels: tuple[str, ...]
@@ -79,16 +79,17 @@ class UnitRanking:
 
 @dataclass(frozen=True)
 class EffectCurve:
-    """Change of one attribute over the output v of one unit, against the untouched roll-out.
+    """Change of one attribute with the output v of one unit, relative to unstimulated roll-outs.
 
     Attributes:
-        label: address of the unit.
-        role: why it is shown.
-        values: v, ascending, shape (D,).
-        means: over the starts that did not end before the measured steps; NaN where all did, shape (D,).
-        lows, highs: 95 % bootstrap interval of the mean, NaN for fewer than two such starts, shape (D,).
-        falls: share of the starts from which the robot fell, shape (D,).
-        matched: whether the unit is the attribute's best match.
+        label: Address of the unit.
+        role: Why the unit is shown.
+        values: Outputs v in ascending order, shape (D,).
+        means: Mean change over the starts whose roll-outs reached the measured steps, shape (D,); NaN where
+            none did.
+        lows, highs: 95 % bootstrap interval of the mean, shape (D,); NaN for fewer than two such starts.
+        falls: Share of the starts from which the robot fell, shape (D,).
+        matched: Whether the unit is the attribute's best match.
     """
 
     label: str
@@ -103,12 +104,12 @@ class EffectCurve:
 
 @dataclass(frozen=True)
 class SideEffectMatrix:
-    """What the units do to every attribute, in parts of the attribute's usual spread.
+    """What N units do to each of J attributes, in standard deviations of the attribute.
 
     Attributes:
-        units: addresses; grouped by the attribute that each moves most, the strongest first.
-        attributes: names.
-        by_value: for each output v a matrix, shape (N, J); NaN for an attribute that never varies.
+        units: Addresses, grouped by the attribute that each unit moves most, the strongest first.
+        attributes: Names of the attributes.
+        by_value: One matrix per output v, shape (N, J); NaN for an attribute that never varies.
     """
 
     units: tuple[str, ...]
@@ -117,15 +118,15 @@ class SideEffectMatrix:
 
     @property
     def limit(self) -> float:
-        """Where the colours end: at the largest magnitude, or at `STRONG` deviations if that is more."""
+        """Value at which the colours end: the largest magnitude, but at most `STRONG`."""
         sizes = [np.abs(np.nan_to_num(matrix)).max(initial=0.0) for matrix in self.by_value.values()]
         return min(STRONG, max([*map(float, sizes), 1e-9]))
 
 
 def spectrogram_of(series: NDArray[np.floating], preset: MatchingPreset, dt: float) -> SpectrogramChart:
-    """Spectrogram of one series, shape (T,), of samples `dt` seconds apart.
+    """Return the spectrogram of one series, shape (T,), of samples `dt` seconds apart.
 
-    Frequencies that the preset does not compare are left out as if there was nothing.
+    Frequencies that the preset does not compare are set to zero.
     """
     magnitude = np.abs(short_time_transform(series[:, None], preset)[0])
     magnitude[:, : preset.first_bin] = 0.0
@@ -136,7 +137,7 @@ def spectrogram_of(series: NDArray[np.floating], preset: MatchingPreset, dt: flo
 
 
 def matched_pair(dissection: Dissection, column: int) -> MatchedPair | None:
-    """Spectrograms of an attribute and its best match; None for an attribute that nothing matches."""
+    """Return the spectrograms of an attribute and its best match; None where no unit matches."""
     ranked = dissection.matching.ranked_units(column)
     if not ranked.size:
         return None
@@ -151,7 +152,7 @@ def matched_pair(dissection: Dissection, column: int) -> MatchedPair | None:
 
 
 def unit_ranking(dissection: Dissection, column: int, count: int = RANKED) -> UnitRanking:
-    """The nearest units of an attribute; none for one that was left out."""
+    """Return the nearest units of an attribute; none for an attribute that matching left out."""
     matching = dissection.matching
     ranked = matching.ranked_units(column)[:count]
     return UnitRanking(
@@ -162,7 +163,7 @@ def unit_ranking(dissection: Dissection, column: int, count: int = RANKED) -> Un
 
 
 def effect_curves(dissection: Dissection, column: int) -> list[EffectCurve]:
-    """Effect curves of the unit that moves an attribute most and of its first match."""
+    """Return the effect curves of the unit that moves an attribute most and of its first match."""
     probed = rank_probed_units(column, dissection.screen, dissection.refined, dissection.seed)[:1]
     ranked = dissection.matching.ranked_units(column)
     roles: dict[int, list[str]] = {}
@@ -199,7 +200,7 @@ def _curve(dissection: Dissection, column: int, unit: int, role: str) -> EffectC
 
 
 def side_effect_matrix(dissection: Dissection) -> SideEffectMatrix:
-    """The matrix of the refined units, without those that are only the random control group."""
+    """Return the side effects of the refined units, without those of the random control group alone."""
     refined = dissection.refined
     chosen = set(refined.units) - set(dissection.controls)
     for column in range(len(dissection.attributes)):
@@ -219,6 +220,6 @@ def side_effect_matrix(dissection: Dissection) -> SideEffectMatrix:
 
 
 def sample_times(shown: SampleEpisode, dt: float) -> Floats:
-    """Time of each row of an excerpt since the reset, s: row t is the state after control step t."""
+    """Return the seconds since the reset at each row: row t is the state after control step t."""
     times: Floats = (np.arange(len(shown.attributes), dtype=np.float64) + 1) * dt
     return times

@@ -1,4 +1,4 @@
-"""The figures of a dissection, each a PNG of a page's width."""
+"""The figures of a dissection as PNG files, each as wide as a page."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _A_PAGE = 8
-"""Attributes on one page."""
+"""Attributes per page."""
 NAMES = ("spectrograms", "discrepancies", "effects", "side-effects", "hit-rates")
-"""Stems of the files; those with a panel for each attribute are numbered where one page is not enough."""
+"""Stems of the files; figures with one panel per attribute are numbered where one page is not enough."""
 
 
 def draw_dissection_figures(folder: Path, dissection: Dissection) -> list[Path]:
-    """Draw everything into a folder; files of the same names are replaced.
+    """Draw all figures into a folder; files of the same names are replaced.
 
     Returns:
-        the files.
+        The files.
 
     Raises:
-        PictureError: matplotlib is not installed, or a file cannot be written.
+        PictureError: A file cannot be written.
     """
     columns = range(len(dissection.attributes))
     written = _draw_pages(folder, dissection, "spectrograms", columns, _spectrograms)
@@ -42,7 +42,7 @@ def draw_dissection_figures(folder: Path, dissection: Dissection) -> list[Path]:
 
 
 def existing_figures(folder: Path) -> list[Path]:
-    """Files in a folder that `draw_dissection_figures` may replace."""
+    """Return the files in a folder that `draw_dissection_figures` may replace."""
     return sorted(
         path for name in NAMES for path in (*folder.glob(f"{name}.png"), *folder.glob(f"{name}-[0-9]*.png"))
     )
@@ -50,7 +50,7 @@ def existing_figures(folder: Path) -> list[Path]:
 
 @dataclass(frozen=True)
 class _Sheet:
-    """Where one page of panels goes."""
+    """One page of panels: its file and the attributes on it."""
 
     path: Path
     columns: tuple[int, ...]
@@ -74,7 +74,7 @@ def _draw_pages(
 
 
 def _grid(figure: Figure, count: int, across: int) -> list[Axes]:
-    """Panels row by row; those that are left over stay empty."""
+    """Return the panels of a page, row by row; there may be more than `count`."""
     rows = -(-count // across)
     return list(figure.subplots(rows, across, squeeze=False).flat)
 

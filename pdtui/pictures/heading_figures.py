@@ -1,4 +1,4 @@
-"""Headings over time: what holds them, and how far off it is; as a PNG and as a recording for the viewer."""
+"""How well headings are held over time, as a PNG and as a recording for the viewer."""
 
 from __future__ import annotations
 
@@ -25,17 +25,18 @@ from pdtui.pictures.report_file import open_report_file
 APP, TIME = "pdtui-tracking", "time"
 PROPERTY = "tracking"
 _BAND = (5.0, 95.0)
+"""Percentiles of the seeds between which the band is drawn."""
 _HEADINGS, _ERRORS, _FIGURES = "/headings", "/errors", "/figures"
 
 
 @dataclass(frozen=True)
 class TrackedHeading:
-    """What holds the heading.
+    """The headings that one behavior reached.
 
     Attributes:
-        name: of the behavior, and of its policy where several are compared.
-        note: its figures, for the legend.
-        values: headings by seed and control step, shape (seeds, T), rad; NaN after a fall.
+        name: Name of the behavior, with its policy where several policies are compared.
+        note: Its figures, for the legend.
+        values: Headings in rad, shape (seeds, T); NaN after a fall.
     """
 
     name: str
@@ -45,15 +46,15 @@ class TrackedHeading:
 
 @dataclass(frozen=True)
 class HeadingFigure:
-    """What the pictures show.
+    """Everything that the pictures show.
 
     Attributes:
-        title: above everything.
-        target: at each control step, rad, shape (T,).
-        dt: s per control step.
-        held: what is compared.
-        figures: the table that is printed.
-        summary: what ``--json`` prints.
+        title: Text above everything.
+        target: Target heading at each control step in rad, shape (T,).
+        dt: Seconds per control step.
+        held: The behaviors to compare.
+        figures: The table that the command prints.
+        summary: What ``--json`` prints.
     """
 
     title: str
@@ -65,7 +66,7 @@ class HeadingFigure:
 
     @property
     def seeds(self) -> int:
-        """How many drives each one has."""
+        """Number of drives of each behavior."""
         return len(self.held[0].values)
 
 
@@ -74,11 +75,11 @@ class HeadingCurve:
     """One behavior over time.
 
     Attributes:
-        held: it.
-        color: of it everywhere.
-        mean, low, high: of the heading over the seeds that are still up, and the middle 90 % of them, rad;
-            shape (T,), NaN where none is.
-        error: mean |error|, the same.
+        held: Its headings.
+        color: Its colour in every picture.
+        mean, low, high: Mean heading of the seeds that have not fallen, and the range of the middle 90 % of
+            them, in rad; shape (T,), NaN where all have fallen.
+        error: Mean |error| of the same seeds in rad, shape (T,).
     """
 
     held: TrackedHeading
@@ -90,12 +91,12 @@ class HeadingCurve:
 
 
 def heading_curves(shown: HeadingFigure) -> list[HeadingCurve]:
-    """What both pictures draw."""
+    """Return the curves that both pictures draw."""
     curves = []
     for number, held in enumerate(shown.held):
         errors = np.abs(wrap_angles(shown.target - held.values))
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # of steps that no seed reached
+            warnings.simplefilter("ignore", RuntimeWarning)  # steps that no seed reached
             low, high = np.nanpercentile(held.values, _BAND, axis=0)
             mean, error = np.nanmean(held.values, axis=0), np.nanmean(errors, axis=0)
         curves.append(HeadingCurve(held, CYCLE[number % len(CYCLE)], mean, low, high, error))
@@ -106,7 +107,7 @@ def check_heading_pictures(paths: Sequence[Path], overwrite: bool) -> None:
     """Find out before minutes of work whether the pictures can be written.
 
     Raises:
-        PictureError: another kind of file, or one that exists already.
+        PictureError: The ending is unknown, or a file exists already.
     """
     for path in paths:
         if path.suffix not in (".png", ".rrd"):
@@ -116,10 +117,10 @@ def check_heading_pictures(paths: Sequence[Path], overwrite: bool) -> None:
 
 
 def draw_heading_pictures(paths: Sequence[Path], shown: HeadingFigure) -> None:
-    """Write every picture, by the ending of its name.
+    """Write every picture in the format that the ending of its name says.
 
     Raises:
-        PictureError: a file cannot be written.
+        PictureError: A file cannot be written.
     """
     for path in paths:
         if path.suffix == ".png":
@@ -129,10 +130,10 @@ def draw_heading_pictures(paths: Sequence[Path], shown: HeadingFigure) -> None:
 
 
 def draw_heading_figure(path: Path, shown: HeadingFigure) -> None:
-    """Two panels: headings on their target with the middle 90 % of seeds, and mean |error|.
+    """Draw headings over their target, with the middle 90 % of seeds, and below them the mean |error|.
 
     Raises:
-        PictureError: matplotlib is not installed, or the file cannot be written.
+        PictureError: The file cannot be written.
     """
     times: Floats = np.arange(len(shown.target), dtype=np.float64) * shown.dt
     with figure_page(path, 4.2, shown.title) as figure:
@@ -154,10 +155,10 @@ def draw_heading_figure(path: Path, shown: HeadingFigure) -> None:
 
 
 def write_heading_recording(path: Path, shown: HeadingFigure) -> None:
-    """The same as a recording: headings, errors, and the figures as a table; ``--json`` as a property.
+    """Write the same as a recording: headings, errors, the table, and ``--json`` as a property.
 
     Raises:
-        PictureError: the file cannot be written.
+        PictureError: The file cannot be written.
     """
     moments = rr.TimeColumn(TIME, duration=np.arange(len(shown.target)) * shown.dt)
     with open_report_file(path, APP, _layout(shown)) as recording:

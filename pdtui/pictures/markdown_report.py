@@ -14,7 +14,7 @@ from pdtui.sessions.environment_versions import collect_versions
 
 
 def dissection_markdown(dissection: Dissection) -> str:
-    """Everything that the terminal prints about a dissection, and what it was made from."""
+    """Return everything that the terminal prints about a dissection, and its origin, as Markdown."""
     summary = summarise_dissection(dissection)
     parts = [f"# Dissection of {summary['policy']} on {summary['robot']}", _origin(dissection, summary)]
     parts += [table_to_markdown(table) for table in dissection_tables(summary)]
@@ -36,7 +36,7 @@ def _origin(dissection: Dissection, summary: dict[str, Any]) -> str:
         (
             "spectrum",
             f"preset `{preset}`: {preset.window.title()} window of {preset.length} steps, hop "
-            f"{preset.hop}; {dt:g} s a step",
+            f"{preset.hop}; {dt:g} s per step",
         ),
         ("probed", f"{summary['rollouts']} roll-outs, {summary['control_steps']} control steps"),
         ("versions", ", ".join(f"{name} {versions[name]}" for name in ("pdtui", "mujoco", "torch", "numpy"))),
@@ -45,7 +45,7 @@ def _origin(dissection: Dissection, summary: dict[str, Any]) -> str:
 
 
 def table_to_markdown(table: Table) -> str:
-    """A table that the terminal prints, with its title, as Markdown."""
+    """Return a table that the terminal prints, with its title, as Markdown."""
     headers = [str(column.header) for column in table.columns]
     columns = [[str(cell) for cell in column.cells] for column in table.columns]
     return f"## {table.title}\n\n" + _markdown(headers, list(zip(*columns, strict=True)))

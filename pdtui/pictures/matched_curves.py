@@ -1,4 +1,4 @@
-"""Figure 2 of the paper from any policy: a unit and the attribute that it matches, over an episode."""
+"""Figure 2 of the paper for any policy: attributes and the units that match them over one episode."""
 
 from __future__ import annotations
 
@@ -28,21 +28,23 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_PANEL = 0.98
-_FEW = 6
+_PANEL_HEIGHT = 0.98
+"""Inches per pair."""
+_DEFAULT_PAIRS = 6
+"""Pairs drawn unless attributes are named: as many as fit on half a page."""
 
 
 @dataclass(frozen=True)
 class MatchedCurve:
-    """A unit and an attribute over one episode.
+    """An attribute and a unit over one episode of T control steps.
 
     Attributes:
-        attribute: in its physical unit.
-        unit: address.
-        values: of the attribute, shape (T,).
-        activation: of the unit, shape (T,).
-        discrepancy: mean over the episodes; NaN for an attribute that cannot be matched.
-        correlation: ρ by the mean that the preset goes by; NaN where there is none.
+        attribute: The attribute, in its physical unit.
+        unit: The unit's address.
+        values: The attribute's values, shape (T,).
+        activation: The unit's activation, shape (T,).
+        discrepancy: Mean over all episodes; NaN for an attribute that cannot be matched.
+        correlation: ρ, averaged as the preset says; NaN where it is undefined.
     """
 
     attribute: Attribute
@@ -55,13 +57,13 @@ class MatchedCurve:
 
 @dataclass(frozen=True)
 class MatchedEpisode:
-    """What the figure shows.
+    """One episode with the pairs that the figure shows.
 
     Attributes:
-        robot, policy: names.
-        seed: of the episode shown, the first that counts.
-        times: since the reset, s, shape (T,).
-        pairs: unit and attribute.
+        robot, policy: Their names.
+        seed: Seed of the episode: the first one that was matched.
+        times: Seconds since the reset, shape (T,).
+        pairs: Attributes with their units.
     """
 
     robot: str
@@ -87,18 +89,18 @@ def match_episode(
     """Roll a policy out and pair attributes with units.
 
     Args:
-        robot: its name.
-        policy: weights file or name of a shipped policy.
-        attributes: names; by default the first six that the robot moves, torques left out.
-        units: an address for each attribute; by default the unit of least discrepancy.
-        import_options: what the weights file leaves open.
-        preset: of the spectra.
-        episodes, steps, seed: of the roll-outs, as a dissection has them; matching is over all of them.
-        progress: called with (episodes done, episodes).
+        robot: Name of the robot.
+        policy: Weights file or name of a shipped policy.
+        attributes: Names of attributes; by default the first six that vary, without torques.
+        units: One address per attribute; by default the unit of least discrepancy.
+        import_options: What the weights file leaves open.
+        preset: Name of the matching preset.
+        episodes, steps, seed: The roll-outs, as in a dissection; all of them are matched.
+        progress: Called with (episodes done, episodes).
 
     Raises:
-        PictureError: not as many units as attributes, or nothing to show.
-        PdtuiError: an unknown robot, policy, attribute or unit, or episodes shorter than a window.
+        PictureError: Units and attributes differ in number, or there is nothing to show.
+        PdtuiError: A robot, policy, attribute or unit is unknown, or episodes are shorter than a window.
     """
     if units and len(units) != len(attributes):
         raise PictureError(
@@ -114,13 +116,11 @@ def match_episode(
         rho = correlate_phases(recorded, world.attributes, spectrum).rho(spectrum)
         shown = next(episode for episode in recorded if episode.seed == matching.used[0])
         if not attributes:
-            columns = movable_columns(world.attributes, recorded)[:_FEW]
+            columns = movable_columns(world.attributes, recorded)[:_DEFAULT_PAIRS]
         best = [matching.ranked_units(column) for column in columns]
         if not columns or (not units and any(not ranked.size for ranked in best)):
             flaws = "; ".join(f"{name}: {flaw}" for name, flaw in matching.flaws.items())
-            raise PictureError(
-                f"{robot}: no attribute that a unit could be matched with: {flaws or 'none varies'}"
-            )
+            raise PictureError(f"{robot}: no attribute can be matched with a unit: {flaws or 'none varies'}")
         flats = flats or [int(ranked[0]) for ranked in best]
         pairs = [
             MatchedCurve(
@@ -140,15 +140,15 @@ def match_episode(
 def draw_matched_curves(
     path: Path, curves: MatchedEpisode, *, start: float = 0.0, seconds: float | None = 10.0
 ) -> None:
-    """Draw the pairs, one panel and one colour each: the attribute as a line, the unit dashed.
+    """Draw one panel per pair: the attribute as a solid line, the unit as a dashed one, in the same colour.
 
     Args:
-        path: a PNG; an existing file is replaced once the picture is whole.
-        curves: what to show.
-        start, seconds: the part of the episode to show, s; None shows it to the end.
+        path: PNG file; an existing one is replaced once the picture is whole.
+        curves: The episode and its pairs.
+        start, seconds: The part of the episode to show, in seconds; None shows it to the end.
 
     Raises:
-        PictureError: matplotlib is missing, the episode ends before `start`, or the file cannot be written.
+        PictureError: The episode ends before `start`, or the file cannot be written.
     """
     end = curves.times[-1] if seconds is None else start + seconds
     part = (curves.times > start) & (curves.times <= end + 1e-9)
@@ -157,7 +157,7 @@ def draw_matched_curves(
             f"the episode lasts {curves.times[-1]:g} s; nothing is left to show from {start:g} s on"
         )
     title = f"{curves.robot}, driven by {curves.policy}: units and attributes, episode of seed {curves.seed}"
-    with figure_page(path, 0.75 + _PANEL * len(curves.pairs), title) as figure:
+    with figure_page(path, 0.75 + _PANEL_HEIGHT * len(curves.pairs), title) as figure:
         panels = figure.subplots(len(curves.pairs), 1, sharex=True, squeeze=False)[:, 0]
         for panel, pair, color in zip(panels, curves.pairs, cycle(CYCLE), strict=False):
             _draw_pair(panel, pair, curves.times, part, to_hex(color))

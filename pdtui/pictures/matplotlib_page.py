@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH = 7.2
-"""Of a page, inches: two columns of a paper."""
+"""Width of a page in inches: two columns of a paper."""
 _DPI = 200
+"""Pixels per inch, enough for print."""
 _STYLE: dict[str, Any] = {
     "font.size": 7.5,
     "axes.titlesize": 8,
@@ -77,5 +78,5 @@ def check_figure(path: Path, overwrite: bool) -> None:
 
 
 def policy_title(dissection: Dissection) -> str:
-    """Robot and policy, as titles name them."""
+    """Return robot and policy as titles name them."""
     return f"{dissection.robot}, driven by {Path(dissection.policy).stem}"

@@ -1,4 +1,4 @@
-"""Which pictures of a dissection are asked for, and whether they can be written."""
+"""The files into which the pictures of a dissection go."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class PictureOutputs:
     """Where the pictures of one dissection go.
 
     Attributes:
-        report: the recording.
-        figures: folder of the PNGs; None draws none.
-        overwrite: whether files that exist are replaced.
+        report: File of the report, a recording.
+        figures: Folder of the PNG files; None draws none.
+        overwrite: Whether existing files are replaced.
     """
 
     report: Path
@@ -25,10 +25,10 @@ class PictureOutputs:
     overwrite: bool
 
     def check(self) -> None:
-        """Find out before minutes of work whether its pictures can be written.
+        """Find out before minutes of work whether the pictures can be written.
 
         Raises:
-            PictureError: a file exists already or cannot be written.
+            PictureError: A file exists already or cannot be written.
         """
         if self.report.suffix != ".rrd":
             raise PictureError(f"{self.report}: expected a name that ends in .rrd; the viewer opens no other")
@@ -43,13 +43,13 @@ class PictureOutputs:
             check_writable(path, PictureError)
 
     def draw(self, dissection: Dissection) -> list[Path]:
-        """Write them.
+        """Write the pictures.
 
         Returns:
-            the files.
+            The files.
 
         Raises:
-            PictureError: a file cannot be written.
+            PictureError: A file cannot be written.
         """
         from pdtui.pictures.dissection_report import write_dissection_report
 

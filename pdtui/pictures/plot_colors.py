@@ -21,19 +21,19 @@ CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 
 
 def to_hex(color: RgbColor) -> str:
-    """``#rrggbb``."""
+    """Return the colour as ``#rrggbb``."""
     return "#" + bytes(color).hex()
 
 
 def diverging(values: Floats, limit: float) -> NDArray[np.uint8]:
-    """Vermillion below zero, white at zero, blue above; full at ±limit, grey where there is no number.
+    """Colour values: vermillion below zero, white at zero, blue above, grey where there is no number.
 
     Args:
-        values: any shape.
-        limit: magnitude from which the colours stay the same.
+        values: Array of any shape (...).
+        limit: Magnitude from which the colours no longer change.
 
     Returns:
-        red, green and blue: shape (..., 3).
+        Red, green and blue, shape (..., 3).
     """
     part = np.clip(np.nan_to_num(values) / limit, -1.0, 1.0)[..., None]
     ends = np.where(part < 0, np.array(VERMILLION), np.array(BLUE))

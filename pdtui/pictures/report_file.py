@@ -1,4 +1,4 @@
-"""A recording of pictures that opens laid out in the Rerun viewer."""
+"""Recordings of pictures that open laid out in the Rerun viewer."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from pdtui.core.errors import PictureError
 
 @contextmanager
 def open_report_file(path: Path, app: str, layout: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
-    """A recording that is in its file when the block ends without an error.
+    """Yield a recording that is in its file when the block ends without an error.
 
     Args:
-        path: the file; its folder is made, an existing file is replaced once the recording is whole.
-        app: what made it; viewers keep what a user rearranges by this name.
-        layout: how it opens.
+        path: The file; its folder is made, and an existing file is replaced once the recording is whole.
+        app: Name of the application, by which viewers remember a user's own layout.
+        layout: How the recording opens.
 
     Raises:
-        PictureError: the file cannot be written.
+        PictureError: The file cannot be written.
     """
     try:
         recording = rr.RecordingStream(app)
