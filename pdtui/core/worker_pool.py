@@ -1,4 +1,4 @@
-"""Worker processes: one that answers calls, and a pool of them that shares out jobs."""
+"""Worker processes: a single one that answers calls, and a pool that runs jobs on several."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ Result = TypeVar("Result")
 
 
 class WorkerProcess(Closable):
-    """A process of its own that holds a state and calls functions on it, one at a time.
+    """A spawned process that holds a state and answers function calls, one at a time.
 
-    The process is spawned, ends when this one ends, however that happens, and leaves Ctrl-C to it.
+    It ends when this process ends, in whatever way, and leaves Ctrl-C to this process.
 
     Args:
-        name: what the process is for, as error messages call it.
-        build: called with `arguments` in the new process; what it returns is the state.
+        name: what the process works on, for error messages.
+        build: function of a module that returns the state; called in the new process.
+        arguments: arguments of `build`.
     """
 
     def __init__(self, name: str, build: Callable[..., object], *arguments: Any) -> None:
@@ -40,8 +41,8 @@ class WorkerProcess(Closable):
         self.process = context.Process(
             target=_serve_calls, args=(theirs, build, arguments), name=f"pdtui {name}", daemon=True
         )
-        # Ctrl-C reaches the whole process group. A worker inherits that the signal is blocked, from its first
-        # instruction on: only this process answers it, and no worker prints a traceback.
+        # Ctrl-C reaches the whole process group. The worker inherits a mask that blocks it from its first
+        # instruction on, so that only this process answers and no worker prints a traceback.
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self.process.start()
@@ -50,7 +51,7 @@ class WorkerProcess(Closable):
             theirs.close()
 
     def send(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Have the process call a function of a module with its state and these arguments.
+        """Call a function of a module with the state and these arguments in the process.
 
         Raises:
             WorkerError: the process has died.
@@ -61,7 +62,7 @@ class WorkerProcess(Closable):
             raise self._death() from error
 
     def receive(self) -> Any:
-        """Wait for the result of the call that was sent; what it raised is raised here.
+        """Wait for the result of the call and return it, or raise the exception that the call raised.
 
         Raises:
             WorkerError: the process has died.
@@ -89,14 +90,15 @@ class WorkerProcess(Closable):
 class WorkerPool(Closable, Generic[State]):
     """Runs jobs in worker processes, or in this process if there is only one worker.
 
-    Processes are started by the first jobs and kept for later ones. An error ends all of them: that of a job
-    is raised here, and a worker that dies is reported at once.
+    The first jobs start the processes, which are kept for later jobs. An exception in a job is raised in this
+    process, and the death of a worker is reported at once; both end all workers.
 
     Args:
-        name: what the workers do, as error messages call it.
+        name: what the workers work on, for error messages.
         workers: number of processes.
-        state: what jobs are run on in this process.
-        build: called with `arguments` in each worker process; returns what jobs are run on there.
+        state: state for jobs that run in this process.
+        build: function of a module that returns the state of a worker; called in each worker.
+        arguments: arguments of `build`.
     """
 
     def __init__(
@@ -120,8 +122,8 @@ class WorkerPool(Closable, Generic[State]):
         """Run all jobs and return their results in the order of the jobs.
 
         Args:
-            function: of a module; called with the worker's state and a job.
-            jobs: what to run.
+            function: function of a module, called with the worker's state and a job.
+            jobs: one argument of `function` each.
             progress: called with the number of jobs finished and of all jobs.
 
         Raises:
@@ -137,7 +139,7 @@ class WorkerPool(Closable, Generic[State]):
     def as_completed(
         self, function: Callable[[State, Job], Result], jobs: Sequence[Job]
     ) -> Iterator[tuple[int, Result]]:
-        """Run all jobs and yield each one's number and result as soon as it is finished.
+        """Run all jobs and yield the index and the result of each as soon as it is finished.
 
         Raises:
             WorkerError: a worker process died.
@@ -169,13 +171,13 @@ class WorkerPool(Closable, Generic[State]):
         except BaseException as error:
             self.close()
             if isinstance(error, WorkerError):
-                raise WorkerError(f"{error}; with one worker, all runs in this process") from error
+                raise WorkerError(f"{error}; with one worker, everything runs in this process") from error
             raise
 
 
 def describe_exit(process: BaseProcess) -> str:
-    """Say how a process ended that closed its end of a pipe: "was killed by SIGKILL"."""
-    # A process closes its pipes a little before it can be waited for.
+    """Return how a process ended that has closed its pipe, such as "was killed by SIGKILL"."""
+    # The pipe closes slightly before the exit code is known.
     process.join(timeout=1.0)
     code = process.exitcode
     if code is not None and code < 0:
@@ -184,7 +186,7 @@ def describe_exit(process: BaseProcess) -> str:
 
 
 def _serve_calls(connection: Connection, build: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
-    """Answer calls until the other end is closed; an error in building the state answers the first call."""
+    """Answer calls until the pipe is closed. The first call builds the state, and reports errors in that."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     state = cache(partial(build, *arguments))
     with suppress(EOFError, OSError):
@@ -195,7 +197,7 @@ def _serve_calls(connection: Connection, build: Callable[..., Any], arguments: t
                 answer = True, function(state(), *values)
             except Exception as error:
                 if not isinstance(error, PdtuiError):
-                    # The traceback itself stays behind.
+                    # Tracebacks are not pickled.
                     error.add_note(f"In a worker process:\n{traceback.format_exc()}")
                 answer = False, error
             _send(connection, answer)
@@ -211,7 +213,7 @@ def _send(connection: Connection, answer: tuple[bool, Any]) -> None:
 
 
 def _end_with_parent() -> None:
-    """A parent that is killed, or whose terminal closes, tells nobody: without this a busy worker stays."""
+    """End this process with its parent, which cannot tell a busy worker that it is being killed."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         multiprocessing.connection.wait([parent.sentinel])
