@@ -174,7 +174,7 @@ def _evaluate_behaviors(config: DriveConfig, seeds: range, workers: int, update:
         result = evaluate_map(config, seeds, workers=workers, progress=advance)
     if update:
         path = Path(config.stimulation_map.source)
-        rewrite_map(path, lambda text: replace_effects(text, result.measured(), str(path)))
+        rewrite_map(path, lambda text: replace_effects(text, result.measured_effects(), str(path)))
     show_result(result.as_dict(), as_json, lambda: behavior_tables(result))
 
 

@@ -82,7 +82,7 @@ class MapEvaluation:
             "tasks": [asdict(result) for result in self.tasks],
         }
 
-    def measured(self) -> dict[str, MeasuredEffect]:
+    def measured_effects(self) -> dict[str, MeasuredEffect]:
         """Return the effects by behavior, as maps hold them."""
         return {
             one.behavior: MeasuredEffect(one.effect, one.low, one.high, one.falls, len(self.seeds))
