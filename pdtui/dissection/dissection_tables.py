@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rich.console import Group, RenderableType
@@ -56,98 +57,93 @@ def _matching_table(summary: dict[str, Any]) -> Table:
 
 
 def _probing_table(summary: dict[str, Any]) -> Table:
-    table = new_table(
+    hits = "hits: first / " + " / ".join(f"best {count}" for count in TOP_MATCHES) + " / random"
+    return _table(
         "Probing: measured effects of units",
-        "attribute",
-        "best unit",
-        "effect [95 %]",
-        "both ways",
-        "first match",
-        "its effect [95 %]",
-        "hits: first / " + " / ".join(f"best {count}" for count in TOP_MATCHES) + " / random",
-        "held-out rank correlation: matching / probing",
-    )
-    for attribute in summary["attributes"]:
-        best = attribute["probed"][0] if attribute["probed"] else None
-        first, hits = attribute["first_match"], attribute["hits"]
-        table.add_row(
-            f"{attribute['name']} ({attribute['unit']})",
-            _probed_name(best),
-            _effect(best),
-            "" if best is None else ("yes" if best["both_ways"] else "no"),
-            _probed_name(first),
-            _effect(first),
-            " / ".join(
+        summary["attributes"],
+        {
+            "attribute": lambda one: f"{one['name']} ({one['unit']})",
+            "best unit": lambda one: _probed_unit(_best(one)),
+            "effect [95 %]": lambda one: _effect(_best(one)),
+            "both ways": lambda one: "" if _best(one) is None else _yes(_best(one)["both_ways"]),
+            "first match": lambda one: _probed_unit(one["first_match"]),
+            "its effect [95 %]": lambda one: _effect(one["first_match"]),
+            hits: lambda one: " / ".join(
                 [
-                    "yes" if hits["first"] else "no",
-                    *(_show(hits[f"best_{count}"], ".0%") for count in TOP_MATCHES),
-                    _show(hits["random"], ".0%"),
+                    _yes(one["hits"]["first"]),
+                    *(_show(one["hits"][f"best_{count}"], ".0%") for count in TOP_MATCHES),
+                    _show(one["hits"]["random"], ".0%"),
                 ]
             ),
-            f"{_show(hits['held_out_matching'], '+.2f')} / {_show(hits['held_out_probing'], '+.2f')}",
-        )
-    return table
+            "held-out rank correlation: matching / probing": lambda one: " / ".join(
+                _show(one["hits"][f"held_out_{what}"], "+.2f") for what in ("matching", "probing")
+            ),
+        },
+    )
 
 
 def _mover_table(summary: dict[str, Any]) -> Table:
-    table = new_table(
-        "Up and down, on held-out starts",
-        "attribute",
-        "units",
-        "effect [95 %]",
-        "falls",
-        "effect / SD",
-        "largest side effect / SD",
-    )
-    for one in summary["steered"]:
+    def side_effect(one: dict[str, Any]) -> str:
         alone = "" if one["side_alone"] is None else f" (with one unit: {_show(one['side_alone'], '.2f')})"
-        table.add_row(
-            f"{one['attribute']} {one['direction']}",
-            describe_units(one["units"]),
-            _effect(one),
-            f"{one['falls']} of {one['of']}",
-            _show(one["main"], ".2f"),
-            _show(one["side"], ".2f") + alone,
-        )
-    return table
+        return _show(one["side"], ".2f") + alone
+
+    return _table(
+        "Up and down, on held-out starts",
+        summary["steered"],
+        {
+            "attribute": lambda one: f"{one['attribute']} {one['direction']}",
+            "units": lambda one: describe_units(one["units"]),
+            "effect [95 %]": _effect,
+            "falls": lambda one: f"{one['falls']} of {one['of']}",
+            "effect / SD": lambda one: _show(one["main"], ".2f"),
+            "largest side effect / SD": side_effect,
+        },
+    )
 
 
 def _behavior_table(summary: dict[str, Any]) -> Table:
-    table = new_table(
+    return _table(
         "Behaviors, on held-out starts",
-        "behavior",
-        "units",
-        "gain [95 %]",
-        "goal",
-        "success",
-        "falls",
-        "attribute: without → with",
+        summary["behaviors"],
+        {
+            "behavior": lambda one: one["name"] + ("" if one["reached"] else " (goal not reached)"),
+            "units": lambda one: describe_units(one["units"]),
+            "gain [95 %]": lambda one: (
+                f"{_show(one['gain'], '.2f')} [{_show(one['low'], '.2f')}, {_show(one['high'], '.2f')}]"
+            ),
+            "goal": lambda one: f"{one['enough']:g}",
+            "success": lambda one: f"{one['success']:.0%}",
+            "falls": lambda one: f"{one['falls']:.0%}",
+            "attribute: without → with": lambda one: (
+                f"{one['attribute']}: {_show(one['unperturbed'], '.2f')} → {_show(one['value'], '.2f')}"
+            ),
+        },
     )
-    for one in summary["behaviors"]:
-        table.add_row(
-            one["name"] + ("" if one["reached"] else " (goal not reached)"),
-            describe_units(one["units"]),
-            f"{_show(one['gain'], '.2f')} [{_show(one['low'], '.2f')}, {_show(one['high'], '.2f')}]",
-            f"{one['enough']:g}",
-            f"{one['success']:.0%}",
-            f"{one['falls']:.0%}",
-            f"{one['attribute']}: {_show(one['unperturbed'], '.2f')} → {_show(one['value'], '.2f')}",
-        )
-    return table
 
 
 def _controller_table(summary: dict[str, Any]) -> Table:
-    table = new_table(
-        "Controllers, on held-out starts", "attribute", "units", "kp / ki / limit", "error", "falls"
+    return _table(
+        "Controllers, on held-out starts",
+        summary["holds"],
+        {
+            "attribute": lambda one: (
+                one["attribute"] + ("" if one["holds"] else " (does not hold the target)")
+            ),
+            "units": lambda one: describe_units(one["units"]),
+            "kp / ki / limit": lambda one: f"{one['kp']:.3g} / {one['ki']:.3g} / {one['limit']:g}",
+            "error": lambda one: (
+                f"{_show(one['error'], '.2f')} (uncontrolled: {_show(one['uncontrolled'], '.2f')})"
+            ),
+            "falls": lambda one: f"{one['falls']:.0%}",
+        },
     )
-    for one in summary["holds"]:
-        table.add_row(
-            one["attribute"] + ("" if one["holds"] else " (does not hold the target)"),
-            describe_units(one["units"]),
-            f"{one['kp']:.3g} / {one['ki']:.3g} / {one['limit']:g}",
-            f"{_show(one['error'], '.2f')} (uncontrolled: {_show(one['uncontrolled'], '.2f')})",
-            f"{one['falls']:.0%}",
-        )
+
+
+def _table(title: str, rows: Sequence[dict[str, Any]], cells: Mapping[str, Callable[[Any], str]]) -> Table:
+    """Return a table with a column for each heading in `cells`, whose function makes a row's cell."""
+    table = new_table(title, *cells)
+    for row in rows:
+        table.add_row(*(cell(row) for cell in cells.values()))
     return table
 
 
@@ -179,10 +175,18 @@ def dissection_remarks(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _probed_name(one: dict[str, Any] | None) -> str:
+def _best(attribute: dict[str, Any]) -> Any:
+    return next(iter(attribute["probed"]), None)
+
+
+def _probed_unit(one: dict[str, Any] | None) -> str:
     if one is None:
         return "none"
     return f"{one['unit']} = {one['value']:g}" + ("" if one["confirmed"] else " (not confirmed)")
+
+
+def _yes(value: bool) -> str:
+    return "yes" if value else "no"
 
 
 def _effect(one: dict[str, Any] | None) -> str:
