@@ -105,7 +105,7 @@ def test_bench_prints_all_parts(map_path: Path) -> None:
         (["drive", "ant", "--map", "nowhere.toml"], "pdtui: nowhere.toml: no such map"),
         (
             ["drive", "ant", "--map", "MAP"],
-            "pdtui: no terminal: the screen needs one; --headless drives without",
+            "pdtui: the screen needs a terminal; use --headless to drive without one",
         ),
         (["drive", "ant", "--map", "MAP", "--keys", "KEYS"], "pdtui: --keys needs --headless"),
         (

@@ -1,4 +1,4 @@
-"""Commands that drive: on the screen, without one, and again from a session."""
+"""The commands `pdtui drive` and `pdtui replay`."""
 
 from __future__ import annotations
 
@@ -40,16 +40,18 @@ if TYPE_CHECKING:
 )
 @start_option
 @click.option(
-    "--record", type=click.Path(path_type=Path), help="Session file; default: a new one in ./sessions."
+    "--record",
+    type=click.Path(path_type=Path),
+    help="Session file to write; by default a new one in ./sessions.",
 )
-@click.option("--no-record", is_flag=True, help="Do not record.")
+@click.option("--no-record", is_flag=True, help="Do not record the drive.")
 @click.option(
     "--record-activations",
     "activations",
     type=click.Choice(ACTIVATIONS_KEPT),
     default="all",
     show_default=True,
-    help="Activations in the session: as they are, as float16, or none but the picture of all. "
+    help="How to record activations: in full, as float16, or only as the overview image. "
     "A replay computes them again.",
 )
 @click.option(
@@ -57,13 +59,21 @@ if TYPE_CHECKING:
     is_flag=False,
     flag_value=str(PORT),
     metavar="[PORT|HOST[:PORT]]",
-    help=f"Show the drive in a Rerun viewer that listens there, too; alone: on {LOCAL}:{PORT}.",
+    help=f"Also show the drive in a Rerun viewer that listens at this address (default {LOCAL}:{PORT}).",
 )
-@click.option("--fps", type=click.IntRange(1, 60), default=12, show_default=True, help="Frames a second.")
-@click.option("--headless", is_flag=True, help="No screen: drive from --keys, as fast as it goes.")
-@click.option("--keys", type=click.Path(path_type=Path), help="Keystrokes to drive from: lines 'STEP KEY'.")
+@click.option("--fps", type=click.IntRange(1, 60), default=12, show_default=True, help="Frames per second.")
+@click.option("--headless", is_flag=True, help="Drive without a screen from --keys, as fast as possible.")
 @click.option(
-    "--steps", type=click.IntRange(1), default=1000, show_default=True, help="Control steps, with --headless."
+    "--keys",
+    type=click.Path(path_type=Path),
+    help="Keystroke file to drive from, with one 'STEP KEY' per line.",
+)
+@click.option(
+    "--steps",
+    type=click.IntRange(1),
+    default=1000,
+    show_default=True,
+    help="Number of control steps with --headless.",
 )
 def drive(
     robot: str,
@@ -83,7 +93,7 @@ def drive(
     keys: Path | None,
     steps: int,
 ) -> None:
-    """Drive ROBOT with its map's keys; ROBOT may be a map's file, too."""
+    """Drive ROBOT with the keys of its map. ROBOT may also be a map file."""
     config = drive_config(
         robot,
         map_name,
@@ -99,7 +109,7 @@ def drive(
     if record is not None and record.exists():
         raise SessionError(f"{record}: exists already; a drive is recorded into a new file")
     if keys is not None and not headless:
-        raise KeystrokeError("--keys needs --headless; on the screen, you press them")
+        raise KeystrokeError("--keys needs --headless; on the screen, keys are pressed by hand")
     if viewer is not None:
         if no_record or (headless and record is None):
             raise SessionError("--viewer shows what is recorded: add --record FILE, or leave --no-record out")
@@ -113,11 +123,11 @@ def drive(
 
 @click.command()
 @click.argument("session", type=click.Path(path_type=Path))
-@click.option("--watch", is_flag=True, help="Show it on the screen.")
-@click.option("--policy", default="", help="The session's weights, where they are elsewhere now.")
+@click.option("--watch", is_flag=True, help="Show the replay on the screen.")
+@click.option("--policy", default="", help="The session's weights file, if it has moved.")
 @criteria_options
 def replay(session: Path, watch: bool, policy: str, criteria: dict[str, Any]) -> None:
-    """Run SESSION again and compare every step; exit with 1 if it does not repeat."""
+    """Run SESSION again and compare every step. Exits with 1 if it does not repeat."""
     from pdtui.drive.replay import replay_config, replay_session
 
     if watch:
@@ -180,7 +190,7 @@ def _drive_on_screen(config: DriveConfig, recording: Path | None, fps: int) -> N
 
 
 def _show(config: DriveConfig, *, fps: int, watching: bool = False) -> None:
-    """Run the screen over a simulation in its own process, which starts first."""
+    """Start the simulation's process, then show it on the screen."""
     _check_terminal()
     from pdtui.drive.client import DriveClient
 
@@ -211,4 +221,4 @@ def pick_and_drive() -> None:
 
 def _check_terminal() -> None:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise ScreenError("no terminal: the screen needs one; --headless drives without")
+        raise ScreenError("the screen needs a terminal; use --headless to drive without one")

@@ -1,4 +1,4 @@
-"""The screen's end of a drive that runs in another process."""
+"""The screen's connection to a drive, which runs in another process."""
 
 from __future__ import annotations
 
@@ -17,44 +17,44 @@ if TYPE_CHECKING:
     from pdtui.drive.drive_config import DriveConfig
 
 _PATIENCE = 60.0
-"""For the end of the recording, on a busy machine: a process that is killed leaves it without one; s."""
+"""Longest wait for the recording to be completed, s; after it, the process is killed."""
 
 
 class DriveConnection(Protocol):
     """The screen's end of the pipe to a drive."""
 
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:
-        """The newest message that has arrived, or None. A `DriveFacts` comes first, and alone.
+        """Return the next message, or None if none has arrived. The first is a `DriveFacts`.
 
-        Several waiting snapshots are merged into the newest, histories and paths joined.
+        Each call that returns a message asks for the next snapshot, so that at most one is on its way.
 
         Raises:
-            PdtuiError: what ended the simulation's process.
+            PdtuiError: the simulation's process has ended; the message says why.
         """
 
     def press_key(self, key: str) -> None:
         """Send a key that changes the run; it applies before the next control step."""
 
     def change_pace(self, request: PaceRequest) -> None:
-        """Change the pacing: no part of the run, so not recorded."""
+        """Change the pace, which is no part of the run and is not recorded."""
 
     def close(self) -> str:
-        """End the drive, wait for the recording to be whole, and return one line on how it ended."""
+        """End the drive, wait until its recording is complete, and return one line on how it ended."""
 
 
 def _simulate(connection: Connection, config: DriveConfig) -> None:
-    # What the recording library prints when the disk is full, or a viewer gone, would go over the screen.
+    # The recording library would print over the screen when the disk is full or a viewer has gone.
     os.environ.setdefault("RUST_LOG", "off")
-    from pdtui.drive.server import serve_drive  # torch and the simulator load here, not under the screen
+    from pdtui.drive.server import serve_drive  # loads torch and the simulator, which the screen does without
 
     serve_drive(connection, config)
 
 
 class DriveClient(DriveConnection):
-    """Starts the simulation's process; start it before the screen takes the terminal.
+    """Starts the simulation's process; create it before the screen takes over the terminal.
 
     Args:
-        config: the drive.
+        config: the drive to start.
     """
 
     def __init__(self, config: DriveConfig) -> None:
@@ -65,13 +65,13 @@ class DriveClient(DriveConnection):
         theirs.close()
         self._last_words = ""
         self.failed = False
-        """Whether the drive ended with an error, once it is closed."""
+        """Whether the drive ended with an error; set by `close`."""
         self._asked = False
         self._recording = config.recording
 
     @property
     def pid(self) -> int:
-        """Of the simulation's process."""
+        """Process id of the simulation."""
         return self._process.pid or 0
 
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:

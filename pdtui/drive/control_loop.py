@@ -1,4 +1,4 @@
-"""The control loop: a function of robot, policy, map, seed and events. It knows no clock."""
+"""The control loop, a function of robot, policy, map, seed and events that knows no clock."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 
 
 class ControlLoop:
-    """Advances one control step at a time.
+    """Runs a drive one control step at a time.
 
     Args:
-        robot: the world; the loop resets it.
+        robot: the robot; the loop resets it.
         policy: the network that acts.
         stimulation_map: the behaviors that events may latch.
-        seed: of the robot's first reset and of the action noise.
+        seed: seed of the robot's first reset and of the action noise.
         stochastic: draw actions from the policy's distribution instead of taking its mean.
-        start: state in which episodes start, empty for the robot's usual one.
+        start: name of the state in which episodes start; empty for the robot's default.
 
     Raises:
         PolicyError: a unit of the map does not exist.
@@ -62,7 +62,7 @@ class ControlLoop:
 
     @property
     def info(self) -> DriveInfo:
-        """What determines this run, besides its events."""
+        """Everything that determines this run, besides its events."""
         return DriveInfo(
             robot=self.robot.name,
             seed=self.seed,
@@ -89,7 +89,7 @@ class ControlLoop:
         gives a record that says so; the loop cannot go on after it.
 
         Raises:
-            EventError: an event that does not fit the map or the present state.
+            KeystrokeError: an event does not fit the map or the present state.
         """
         if self._ended:
             self._start_episode()
@@ -141,7 +141,7 @@ class ControlLoop:
         return record
 
     def _apply(self, event: Event, *, rehearsing: bool = False) -> None:
-        """Do what the event says; in a rehearsal, only to the latch."""
+        """Apply an event; in a rehearsal, only to the latch and the rewind history's position."""
         match event.kind:
             case "behavior":
                 self.latch.latch_behavior(event.name, self.attributes)
@@ -164,9 +164,9 @@ class ControlLoop:
 
     @contextmanager
     def rehearsal(self) -> Iterator[Callable[[Event], None]]:
-        """Yield a function that does to the latch what an event of this step will; undone at the end.
+        """Yield a function that applies an event of this step to the latch; everything is undone at the end.
 
-        So one can see what a key means after those that were pressed before the same step.
+        This shows what a key means after other keys that were pressed before the same step.
         """
         latch, position = self.latch.copy_state(), self.history.position
 

@@ -1,4 +1,4 @@
-"""What a drive is to be, as plain data: it travels to the simulation's process."""
+"""The configuration of a drive, as plain data that is sent to the simulation's process."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 
 @dataclass(frozen=True)
 class DriveConfig:
-    """What a drive is to be.
+    """The configuration of a drive.
 
     Attributes:
         robot: name of the robot.
-        stimulation_map: its behaviors.
-        seed: of the drive.
+        stimulation_map: the behaviors.
+        seed: seed of the drive.
         policy: weights file or shipped name; empty takes the map's.
-        stochastic: draw actions instead of taking the mean.
-        start: state in which episodes start, empty for the robot's usual one.
-        force: drive although the policy is not the map's.
-        recording: file to record into, empty for none.
-        activations: how they are recorded.
-        viewer: where a Rerun viewer listens that is to show a recorded drive; None for none.
-        scripted_events: events by step that are played instead of keys, where a session is watched.
-        expected_digests: what the watched session left, to compare with.
+        stochastic: draw actions from the policy's distribution instead of taking its mean.
+        start: name of the state in which episodes start; empty for the robot's default.
+        force: drive even if the policy is not the map's.
+        recording: file to record into; empty for none.
+        activations: how activations are recorded.
+        viewer: address of a Rerun viewer that shows the recorded drive; None for none.
+        scripted_events: events of a watched session, applied instead of keys; None to drive by keys.
+        expected_digests: digests of the watched session's steps.
     """
 
     robot: str

@@ -1,4 +1,4 @@
-"""What the screen sees of a drive: plain data, sent up from the simulation's process."""
+"""What the simulation's process sends to the screen, as plain data."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DriveFacts:
-    """Sent once, when robot and policy are loaded.
+    """The facts of a drive that never change, sent once robot and policy are loaded.
 
     Attributes:
-        title: of the robot.
+        title: display name of the robot.
         policy: name of the policy.
-        seed: of the drive.
+        seed: seed of the drive.
         dt: simulated time of a control step, s.
-        attributes, links: of the robot.
+        attributes, links: those of the robot.
         layers: widths of the policy's hidden layers.
-        recording: file that the drive is recorded into, empty if it is not.
+        recording: file that the drive is recorded into; empty if it is not.
     """
 
     title: str
@@ -42,7 +42,7 @@ class DriveFacts:
 
 @dataclass(frozen=True)
 class StimulatedUnit:
-    """A stimulated unit: its flat index, what it would have put out and what overwrote it."""
+    """A stimulated unit: its flat index, its natural output and the value that overwrites it."""
 
     unit: int
     natural: float
@@ -51,30 +51,30 @@ class StimulatedUnit:
 
 @dataclass(frozen=True)
 class DriveSnapshot:
-    """The latest of the drive. Rows of `history` and `path` are those since the snapshot before.
+    """The present state of a drive, and its history and path since the last snapshot.
 
     Attributes:
-        step: control steps done.
+        step: number of control steps done.
         time: simulated time, s.
         episode: number of the episode.
-        active: latched behaviors, the latest last.
+        active: latched behaviors, in the order in which they were latched.
         units: the stimulated units.
-        activations: of every hidden unit, shape (U,).
+        activations: activation of every hidden unit, shape (U,).
         attributes: present values, shape (J,).
         poses: body poses, shape (B, 7).
         history: attributes of the steps since the last snapshot, shape (n, J).
         path: x, y in m, and the row in the map of the latest active behavior (−1 for none), shape (n, 3);
             empty for a robot without poses.
-        restarted: whether an episode began, or a rewind happened, since the last snapshot: the old path ends.
-        paused: whether the pacer waits.
-        speed: speed factor that was asked for.
-        achieved_speed: speed factor that was reached lately.
+        restarted: whether an episode or a rewind has begun a new path since the last snapshot.
+        paused: whether the drive is paused.
+        speed: requested speed, in multiples of real time.
+        achieved_speed: speed of the latest steps, in multiples of real time.
         involvement: control steps in which a key was pressed.
-        recorded_bytes: size of the recording.
-        notice: what the user should read now (a fall, a rewind, a key that does nothing), empty if nothing.
-        finished: why the drive is over, empty while it goes on.
-        statistics: how the present episode stands.
-        obstacles: as `Robot.obstacles`, where they are others than in the snapshot before; else None.
+        recorded_bytes: size of the recording, bytes.
+        notice: what the user should read now (a fall, a rewind, a key that does nothing); may be empty.
+        finished: why the drive is over; empty while it runs.
+        statistics: statistics of the present episode.
+        obstacles: `Robot.obstacles` if they have changed since the last snapshot; else None.
     """
 
     step: int

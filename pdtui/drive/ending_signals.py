@@ -1,4 +1,4 @@
-"""Signals that end a drive, taken between two control steps instead of in the middle of one."""
+"""Signals that end a drive between two control steps instead of in the middle of one."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @contextmanager
 def catch_ending_signals() -> Iterator[Callable[[], str]]:
-    """Yield a function that tells which signal came, in words; empty while none did.
+    """Yield a function that says which signal has come; it returns an empty string while none has.
 
-    Left to their default, SIGTERM and SIGHUP would leave a recording without its end. What was set before
-    is set again at the end. Only a program's main thread can do this.
+    By default, SIGTERM and SIGHUP would leave a recording without its end. The handlers are restored at the
+    end. Only a program's main thread can do this.
     """
     came: list[str] = []
 

@@ -1,8 +1,9 @@
-"""Putting a drive together, and running one without a screen."""
+"""Driving from keystrokes without a screen."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,13 +24,13 @@ from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 @dataclass(frozen=True)
 class DriveSummary:
-    """How a drive without a screen went.
+    """The summary of a drive without a screen.
 
     Attributes:
-        steps: control steps.
+        steps: number of control steps.
         seconds: simulated time, s.
         falls: episodes that ended with a fall.
-        involvement: control steps in which a key was pressed.
+        involvement: number of control steps in which a key was pressed.
         mean: mean of every attribute, by name.
     """
 
@@ -41,10 +42,10 @@ class DriveSummary:
 
 
 def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:
-    """The events of keys pressed before the loop's next step.
+    """Return the events of keys that are pressed before the loop's next step.
 
     Raises:
-        EventError: a key means nothing in the present state.
+        KeystrokeError: a key means nothing in the present state.
     """
     events = []
     for key, meaning in zip(keys, interpret_keys(keys, loop), strict=True):
@@ -55,12 +56,12 @@ def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:
 
 
 def drive_keys(loop: ControlLoop, presses: Mapping[int, Sequence[str]], steps: int) -> Iterator[StepRecord]:
-    """Drive from keystrokes, unpaced.
+    """Yield the records of a drive from keystrokes, as fast as possible.
 
-    Keys of one step are read in their order: what the second means depends on what the first did.
+    Keys of one step are interpreted in order, because what a key means depends on the keys before it.
 
     Raises:
-        EventError: a key means nothing in the state it meets.
+        KeystrokeError: a key means nothing in the state it meets.
         SimulationDiverged: after the record of the step that diverged.
     """
     for _ in range(steps):
@@ -87,39 +88,12 @@ def run_episode(
             return
 
 
-def drive_headless(
-    loop: ControlLoop,
-    presses: Mapping[int, Sequence[str]],
-    steps: int,
-    recorder: SessionRecorder | None,
-    ended: Callable[[], str] = str,
-) -> DriveSummary:
-    """Drive from keystrokes without a screen, recording if a recorder is given, and sum it up.
-
-    Args:
-        loop: the drive, before its first step.
-        presses: keys by the control step before which they are pressed.
-        steps: control steps.
-        recorder: takes every step; it is closed at the end, however that comes.
-        ended: asked after each step; why to end there, empty to go on.
-
-    Raises:
-        DriveEnded: `ended` said so.
-        PdtuiError: as `drive_keys`; the recording is whole all the same.
-    """
-    falls = involvement = done = 0
-    total = np.zeros(len(loop.robot.attributes))
+@contextmanager
+def step_recording(recorder: SessionRecorder | None) -> Iterator[Callable[[StepRecord], None]]:
+    """Yield a function that records a step, and close the recorder with how the ``with`` block ends."""
     outcome = "stopped"
     try:
-        for record in drive_keys(loop, presses, steps):
-            if recorder is not None:
-                recorder.write(record)
-            done += 1
-            falls += record.fell
-            involvement += any(event.key for event in record.events)
-            total += record.attributes
-            if reason := ended():
-                raise DriveEnded(f"{reason}: {done} steps{_recorded(recorder)}")
+        yield (lambda _: None) if recorder is None else recorder.write
         outcome = "finished"
     except Exception as error:
         outcome = str(error) if isinstance(error, PdtuiError) else format_error_in_one_line(error)
@@ -127,6 +101,39 @@ def drive_headless(
     finally:
         if recorder is not None:
             recorder.close(outcome)
+
+
+def drive_headless(
+    loop: ControlLoop,
+    presses: Mapping[int, Sequence[str]],
+    steps: int,
+    recorder: SessionRecorder | None,
+    ended: Callable[[], str] = str,
+) -> DriveSummary:
+    """Drive from keystrokes without a screen and return a summary.
+
+    Args:
+        loop: the drive, before its first step.
+        presses: keys by the control step before which they are pressed.
+        steps: number of control steps.
+        recorder: records every step, and is closed however the drive ends.
+        ended: called after each step; returns why to end the drive, or an empty string to go on.
+
+    Raises:
+        DriveEnded: `ended` returned a reason.
+        PdtuiError: as for `drive_keys`; the recording is complete nevertheless.
+    """
+    falls = involvement = done = 0
+    total = np.zeros(len(loop.robot.attributes))
+    with step_recording(recorder) as record_step:
+        for record in drive_keys(loop, presses, steps):
+            record_step(record)
+            done += 1
+            falls += record.fell
+            involvement += any(event.key for event in record.events)
+            total += record.attributes
+            if reason := ended():
+                raise DriveEnded(f"{reason}: {done} steps{_recorded(recorder)}")
     means = {
         attribute.name: float(value / max(done, 1))
         for attribute, value in zip(loop.robot.attributes, total, strict=True)

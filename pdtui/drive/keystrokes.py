@@ -1,4 +1,4 @@
-"""From pressed keys to events: on the screen and from keystroke files."""
+"""Turning pressed keys and keystroke files into events."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pdtui.drive.control_loop import ControlLoop
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 MAX_BYTES = 10_000_000
-"""Of a keystroke file; a key in every step of an hour has 2 million."""
+"""Largest keystroke file; a key in every step of an hour takes about 2 million bytes."""
 FACTOR_STEP = 1.25
 REWIND_SECONDS = 3.0
 _LINE = re.compile(r"(\d{1,9})\s+(\S+)")
@@ -27,7 +27,7 @@ def run_keys(stimulation_map: StimulationMap) -> tuple[str, ...]:
 
 
 def interpret_key(key: str, loop: ControlLoop) -> Event | str:
-    """Return the event that a key means in the loop's present state, or a sentence why it means nothing."""
+    """Return the event of a key in the loop's present state, or a sentence on why it has none."""
     if key == loop.map.default_key:
         return Event(loop.step, "default", key=key)
     behavior = loop.map.behavior_of_key(key)
@@ -49,7 +49,7 @@ def interpret_key(key: str, loop: ControlLoop) -> Event | str:
 
 
 def interpret_keys(keys: Iterable[str], loop: ControlLoop) -> list[Event | str]:
-    """Return what each key means that is pressed before the same step, given those pressed before it."""
+    """Interpret keys pressed before the same step, each in the state that those before it lead to."""
     meanings: list[Event | str] = []
     with loop.rehearsal() as rehearse:
         for key in keys:
@@ -61,7 +61,7 @@ def interpret_keys(keys: Iterable[str], loop: ControlLoop) -> list[Event | str]:
 
 def _factor_event(row: FixedKey, loop: ControlLoop) -> Event | str:
     if not loop.latch.active:
-        return "no behavior is latched whose strength could change"
+        return "no behavior is latched, so there is no strength to change"
     latest = loop.latch.active[-1]
     return Event(loop.step, "factor", latest.name, latest.factor * FACTOR_STEP**row.direction, row.key)
 
@@ -74,10 +74,10 @@ def _rewind_event(row: FixedKey, loop: ControlLoop) -> Event | str:
 
 
 def _target_event(row: FixedKey, loop: ControlLoop) -> Event | str:
-    """Where several targets are held, left and right prefer a heading, up and down anything else."""
+    """Of several targets, left and right move a heading, and up and down anything else."""
     held = [view for view in loop.latch.active if view.target is not None]
     if not held:
-        return "no target is held; a behavior of mode pid holds one"
+        return "no target is held; only behaviors of mode pid hold one"
 
     def turns(view: ActiveBehavior) -> bool:
         pid = loop.map.behaviors[view.name].pid
@@ -93,12 +93,12 @@ def _target_event(row: FixedKey, loop: ControlLoop) -> Event | str:
 
 
 def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, list[str]]:
-    """Key presses by control step, from a text file with a line ``STEP KEY`` for each.
+    """Return key presses by control step from a text file with one ``STEP KEY`` per line.
 
     ``#`` starts a comment.
 
     Raises:
-        EventError: the file cannot be read, or a line is not what was expected; the line is named.
+        KeystrokeError: the file cannot be read, or a line, which the message names, is wrong.
     """
     try:
         with path.open("rb") as file:  # it may be a pipe
@@ -133,10 +133,10 @@ def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, li
 
 
 def format_keystrokes(events: Iterable[Event]) -> str:
-    """The key presses among events as the text of a keystroke file.
+    """Return the key presses among events as the text of a keystroke file.
 
     Raises:
-        EventError: a key is no single word, so that the file would say something else.
+        KeystrokeError: a key's name is not a single word.
     """
     pressed = [event for event in events if event.key]
     for event in pressed:

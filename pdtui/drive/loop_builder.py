@@ -1,4 +1,4 @@
-"""Build a control loop from a drive's configuration."""
+"""Building a control loop from a drive's configuration."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def build_loop(
     """Load the robot and the policy, unless they are given, and set the loop to step 0.
 
     Raises:
-        PdtuiError: the robot, the policy or the map cannot be had, or they do not fit each other.
+        PdtuiError: robot, policy or map cannot be loaded or do not fit each other.
     """
     robot, wanted = robot or make_robot(config.robot), config.stimulation_map
     if isinstance(policy, nn.Module):

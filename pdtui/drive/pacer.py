@@ -1,4 +1,4 @@
-"""When the next control step is due: real time, slower, faster, paused, single steps."""
+"""The pace of a drive: real time, slower, faster, paused, or single steps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _LAG_FORGIVEN = 0.25
 
 
 class Pacer:
-    """Decides how long to wait; the caller brings the clock, so that nothing here reads one.
+    """Decides when the next control step is due; the caller passes the time, so no clock is read.
 
     Args:
         dt: simulated time of a control step, s.
@@ -25,10 +25,10 @@ class Pacer:
         self._marks: list[float] = []
 
     def change_pace(self, pace: PaceRequest, now: float) -> None:
-        """Change the pace. A single step pauses first.
+        """Change the pace; a single step pauses first.
 
         Raises:
-            ValueError: no such request.
+            ValueError: there is no such request.
         """
         match pace:
             case "pause":
@@ -46,24 +46,24 @@ class Pacer:
         self._marks = []
 
     def seconds_until_due(self, now: float) -> float | None:
-        """Seconds until the next step, 0 if it is due; None while paused."""
+        """Return the seconds until the next step, 0 if it is due, or None while paused."""
         if self._single:
             return 0.0
         return None if self.paused else max(0.0, self._due - now)
 
     def note_step(self, now: float) -> None:
-        """A control step was done."""
+        """Note that a control step was done."""
         if self._single:
             self._single -= 1
             return
         self._due += self._dt / self.speed
         if now - self._due > _LAG_FORGIVEN:
-            self._due = now  # too slow for this speed: go on from here rather than run after it
+            self._due = now  # too slow for this speed: continue from here rather than catch up
         self._marks = [*self._marks[-40:], now]
 
     @property
     def achieved_speed(self) -> float:
-        """Speed factor of the last steps."""
+        """The speed of the latest steps, in multiples of real time."""
         if self.paused or len(self._marks) < 2 or self._marks[-1] <= self._marks[0]:
             return 0.0 if self.paused else self.speed
         return (len(self._marks) - 1) * self._dt / (self._marks[-1] - self._marks[0])

@@ -1,4 +1,4 @@
-"""The simulation's own process: keys come down the pipe, snapshots go up, the newest wins."""
+"""The simulation's process, which reads keys from a pipe and sends snapshots through it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PACED_ROWS_PER_WRITE = 4
 
 
 class DriveServer:
-    """One drive, paced, at the far end of a pipe.
+    """Runs one drive at its pace, controlled through a pipe.
 
     A snapshot is built only when the screen has asked for one and the last one has been sent, so it is the
     newest, and a screen that has stopped never blocks the drive.
@@ -60,7 +60,7 @@ class DriveServer:
         self._scripted_events = group_events_by_step(config.scripted_events or ())
 
     def facts(self) -> None:
-        """Tell the screen what there is to see."""
+        """Send the facts that the screen needs once."""
         loop = self._loop
         self._sender.send(
             DriveFacts(
@@ -94,13 +94,13 @@ class DriveServer:
         self._closing = reason
 
     def outcome(self) -> str:
-        """How the drive ended, in one line."""
+        """Return one line on how the drive ended."""
         line = f"{self._finished or self._closing}: {self._loop.step} steps"
         place = self._config.recording
         return f"{line}, recorded in {place}" if place and place not in line else line
 
     def _serve(self) -> None:
-        """Wait for the next step or a request, whichever is first."""
+        """Wait for the next step or a request, whichever comes first."""
         wait = None if self._finished else self._pacer.seconds_until_due(time.monotonic())
         try:
             while self._connection.poll(_IDLE if wait is None else wait):
@@ -141,7 +141,7 @@ class DriveServer:
         try:
             recorder.write(record)
         except SessionError as error:
-            # What is not recorded cannot be repeated: the drive ends here, and the screen says why.
+            # A step that is not recorded cannot be repeated, so the drive ends here and the screen says why.
             self._finished, self.failed = str(error), True
             with suppress(SessionError):
                 recorder.close(str(error))
@@ -181,32 +181,32 @@ class DriveServer:
 
 
 def serve_drive(connection: Connection, config: DriveConfig) -> None:
-    """Entry of the process. What ends it early goes up the pipe as an exception or a line of text."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # ctrl+c is the screen's to handle
+    """Run the process of a drive; what ends it is sent as a line of text or an exception."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the screen handles ctrl+c
     sender = MessageSender(connection)
-    simulation: DriveServer | None = None
+    server: DriveServer | None = None
     early: list[str] = []
 
     def stop(number: int, _frame: FrameType | None) -> None:
         reason = f"ended by {signal.Signals(number).name}"
         early.append(reason)
-        if simulation is not None:
-            simulation.stop(reason)
+        if server is not None:
+            server.stop(reason)
 
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, stop)
     try:
-        simulation = DriveServer(connection, sender, config)
+        server = DriveServer(connection, sender, config)
         for reason in early:
-            simulation.stop(reason)
-        simulation.facts()
-        simulation.run()
-        outcome = simulation.outcome()
-        sender.send(PdtuiError(outcome) if simulation.failed else outcome)
+            server.stop(reason)
+        server.facts()
+        server.run()
+        outcome = server.outcome()
+        sender.send(PdtuiError(outcome) if server.failed else outcome)
     except PdtuiError as error:
         sender.send(error)
     except Exception as error:
-        # A traceback would be drawn over by the screen.
-        said = format_error_in_one_line(error) if simulation is None else simulation.outcome()
+        # The screen would hide a traceback.
+        said = format_error_in_one_line(error) if server is None else server.outcome()
         sender.send(PdtuiError(f"the simulation failed: {said}"))
     sender.flush()

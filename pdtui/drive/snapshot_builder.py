@@ -1,4 +1,4 @@
-"""Gathers records between two frames into the snapshot that the screen draws."""
+"""Builds the snapshots that the screen draws from the steps between them."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _ROWS_KEPT = 4000
 
 
 class SnapshotBuilder:
-    """Collects since the last snapshot; nothing is lost when frames are skipped.
+    """Collects steps since the last snapshot, so that skipped frames lose nothing.
 
     Args:
-        loop: the drive that is watched.
+        loop: the loop of the drive.
     """
 
     def __init__(self, loop: ControlLoop) -> None:
@@ -36,7 +36,7 @@ class SnapshotBuilder:
         self.notice = ""
 
     def add_step(self, record: StepRecord) -> None:
-        """Take in one control step."""
+        """Add a control step."""
         began = record.episode != self._episode or any(event.jumps for event in record.events)
         if began:
             self._restarted, self._path = True, []
@@ -59,7 +59,7 @@ class SnapshotBuilder:
     def build_snapshot(
         self, *, paused: bool, speed: float, achieved_speed: float, recorded_bytes: int, finished: str
     ) -> DriveSnapshot:
-        """What has come since the last call, and the latest of the rest."""
+        """Return the present state, with history and path since the last call."""
         loop, last = self._loop, self._last
         active: tuple[ActiveBehavior, ...] = loop.latch.active
         units: tuple[StimulatedUnit, ...] = ()

@@ -1,4 +1,4 @@
-"""A drive without a screen as arrays, one row a control step."""
+"""The trajectory of a drive, as arrays with one row per control step."""
 
 from __future__ import annotations
 
@@ -10,34 +10,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats, column_of
-from pdtui.core.errors import PdtuiError, format_error_in_one_line
 from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.headless_drive import drive_keys
+from pdtui.drive.headless_drive import drive_keys, step_recording
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """S control steps of one drive.
+    """The S control steps of one drive.
 
     ``drive["vx"]`` is the series of an attribute, ``drive.unit("0:12")`` that of a hidden unit, shape (S,).
 
     Attributes:
-        info: what determined the run, besides its events.
-        attributes: in their units, after each step, shape (S, J).
-        activations: every hidden unit as the next layer saw it, shape (S, U), float32.
+        info: everything that determined the run, besides its events.
+        attributes: attributes after each step, in their units, shape (S, J).
+        activations: activations of all hidden units as the next layer saw them, shape (S, U), float32.
         actions: shape (S, A), float32.
         rewards, costs: shape (S,).
         episodes: number of the episode, shape (S,).
-        digests: of the simulator's state after each step, shape (S,).
-        behaviors: names of those active in each step.
-        stimulations: units and the outputs that overwrote them, for each step.
-        events: everything that changed the run, in its order.
-        endings: why an episode ended by itself, by the step with which it did.
+        digests: digest of the simulator's state after each step, shape (S,).
+        behaviors: names of the behaviors active in each step.
+        stimulations: units and the values that overwrote them in each step.
+        events: everything that changed the run, in order.
+        endings: why an episode ended, by its last step.
     """
 
     info: DriveInfo
@@ -81,37 +80,28 @@ def collect_trajectory(
     steps: int,
     recorder: SessionRecorder | None = None,
 ) -> Trajectory:
-    """Drive from keystrokes, as fast as it goes.
+    """Drive from keystrokes as fast as possible and return the trajectory.
 
     Args:
         loop: the drive, before its first step.
         keys: one key, or several, by the control step before which they are pressed.
         steps: control steps.
-        recorder: takes every step; it is closed at the end, however that comes.
+        recorder: records every step, and is closed however the drive ends.
 
     Raises:
-        EventError: a key means nothing in the state it meets.
-        SimulationDiverged: the simulation cannot go on; the recording is whole all the same.
+        KeystrokeError: a key means nothing in the state at its step.
+        SimulationDiverged: the simulation cannot go on; the recording is complete nevertheless.
     """
     presses = {step: [pressed] if isinstance(pressed, str) else pressed for step, pressed in keys.items()}
     records: list[StepRecord] = []
-    outcome = "stopped"
-    try:
+    with step_recording(recorder) as record_step:
         for record in drive_keys(loop, presses, steps):
             records.append(record)
-            if recorder is not None:
-                recorder.write(record)
-        outcome = "finished"
-    except Exception as error:
-        outcome = str(error) if isinstance(error, PdtuiError) else format_error_in_one_line(error)
-        raise
-    finally:
-        if recorder is not None:
-            recorder.close(outcome)
-    return _arrays(loop, records)
+            record_step(record)
+    return _stack_records(loop, records)
 
 
-def _arrays(loop: ControlLoop, records: Sequence[StepRecord]) -> Trajectory:
+def _stack_records(loop: ControlLoop, records: Sequence[StepRecord]) -> Trajectory:
     def stack(values: list[Any], kind: Any, *width: int) -> NDArray[Any]:
         return np.array(values, kind).reshape(len(records), *width)
 

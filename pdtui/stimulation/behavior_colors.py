@@ -1,4 +1,4 @@
-"""The color of a behavior, the same on the screen and in the viewer."""
+"""Colors of behaviors, the same on the screen and in the viewer."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ BEHAVIOR_COLORS = (
     "#5ee0b0",
     "#ff8a80",
 )
-"""Told apart by lightness as well as by hue; a behavior has its row in the map, modulo their number."""
+"""By row in the map, modulo their number; they differ in lightness as well as in hue."""
 
 
 def behavior_rgb(row: int) -> tuple[int, int, int]:
-    """Color of the behavior in this row of the map: red, green, blue of 0 to 255."""
+    """Return red, green and blue, 0 to 255, of the behavior in a row of the map."""
     red, green, blue = bytes.fromhex(BEHAVIOR_COLORS[row % len(BEHAVIOR_COLORS)][1:])
     return red, green, blue

@@ -1,4 +1,4 @@
-"""Which behaviors are active now, and what they overwrite in this control step."""
+"""The latched behaviors, and the stimulation that they add up to in each control step."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ class _Latched:
         self.column = 0
 
     def copy(self) -> _Latched:
-        """What changes is copied; the behavior and its weights never do."""
+        """Copy what changes; behavior and weights never do."""
         other = copy.copy(self)
         other.controller = copy.deepcopy(self.controller)
         return other
 
 
 class Latch:
-    """The state machine between key presses and stimulations.
+    """The state machine that turns latched behaviors into stimulations.
 
     Args:
         stimulation_map: the behaviors.
-        layers: widths of the policy's layers.
-        attributes: of the robot.
-        dt: s per control step.
+        layers: widths of the policy's hidden layers.
+        attributes: the robot's attributes.
+        dt: duration of a control step, s.
 
     Raises:
         PolicyError: a unit of the map does not exist.
@@ -67,11 +67,11 @@ class Latch:
         }
         self._latched: list[_Latched] = []
         self.commands: dict[str, float] = {}
-        """What the behaviors ask the policy for in this control step; set by `stimulate`."""
+        """The policy's commands that behaviors set in this control step; updated by `stimulate`."""
 
     @property
     def active(self) -> tuple[ActiveBehavior, ...]:
-        """Latched behaviors, the latest last."""
+        """The latched behaviors, in the order in which they were latched."""
         views = []
         for latched in self._latched:
             pid = latched.controller
@@ -86,12 +86,12 @@ class Latch:
         return tuple(views)
 
     def latch_behavior(self, name: str, attributes: Floats) -> None:
-        """Latch a behavior; those that may not run beside it end. A latched one starts over.
+        """Latch a behavior and end those that may not run beside it. A latched behavior starts again.
 
-        In mode ``pid`` the target starts at the present value; pressing the key again turns it off.
+        In mode ``pid``, the target starts at the present value, and latching a latched behavior ends it.
 
         Raises:
-            EventError: the map has no such behavior.
+            KeystrokeError: the map has no such behavior.
         """
         behavior = self._behavior(name)
         was_on = any(latched.behavior.name == name for latched in self._latched)
@@ -113,14 +113,14 @@ class Latch:
         self._latched.append(latched)
 
     def clear(self) -> None:
-        """The default key: nothing is overwritten any more."""
+        """End all behaviors, so that no unit is overwritten."""
         self._latched = []
 
     def set_target(self, name: str, target: float) -> None:
-        """Move the target of a latched behavior of mode ``pid``.
+        """Set the target of a latched behavior of mode ``pid``.
 
         Raises:
-            EventError: it is not latched or has no target.
+            KeystrokeError: it is not latched or has no target.
         """
         controller = self._find(name).controller
         if controller is None:
@@ -128,17 +128,17 @@ class Latch:
         controller.set_target(target)
 
     def set_factor(self, name: str, factor: float) -> None:
-        """Scale the magnitudes of a latched behavior.
+        """Set the factor on the magnitudes of a latched behavior.
 
         Raises:
-            EventError: it is not latched.
+            KeystrokeError: it is not latched.
         """
         self._find(name).factor = factor
 
     def stimulate(self, attributes: Floats) -> Stimulation:
-        """What this control step overwrites; ends the behaviors whose period is over.
+        """Return what this control step overwrites.
 
-        Where two latched behaviors share a unit or a command, the one latched last decides.
+        If two latched behaviors share a unit or a command, the one latched last decides.
 
         Args:
             attributes: the robot's present values, shape (J,).
@@ -159,18 +159,18 @@ class Latch:
         return Stimulation.of(values)
 
     def end_step(self) -> None:
-        """A control step has passed: periods run down, and what is over ends."""
+        """Count down the periods by one control step, and end the behaviors whose period is over."""
         for latched in self._latched:
             if latched.remaining is not None:
                 latched.remaining -= 1
         self._latched = [latched for latched in self._latched if latched.remaining != 0]
 
     def copy_state(self) -> list[_Latched]:
-        """A copy of the state, for `restore_state`."""
+        """Return a copy of the state for `restore_state`."""
         return [latched.copy() for latched in self._latched]
 
     def restore_state(self, state: list[_Latched]) -> None:
-        """Return to a state that `copy_state` gave."""
+        """Restore a state that `copy_state` returned."""
         self._latched = [latched.copy() for latched in state]
 
     def _behavior(self, name: str) -> Behavior:

@@ -1,4 +1,4 @@
-"""How strong a stimulation is: the magnitude c of `v = c ρ`, fixed or from a PID controller."""
+"""The magnitude c of a stimulation `v = c ρ` from a PID controller."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from pdtui.stimulation.stimulation_map import PidGains
 
 
 class PidMagnitude:
-    """c from a PID controller on the error between a target and an attribute.
+    """Computes the magnitude c from the error between a target and an attribute.
 
-    An angle is followed continuously: the controller sees a heading that does not jump at ±π and a setpoint
-    on the same turn, so that its derivative term does not jump either.
+    Angles are unwrapped: the controller sees a heading that does not jump at ±π and a setpoint on the same
+    turn, so its derivative term does not jump either.
 
     Args:
-        gains: controller of the map.
+        gains: the gains and the limit of c.
         wraps: whether the attribute is an angle.
-        dt: s per control step.
+        dt: duration of a control step, s.
     """
 
     def __init__(self, gains: PidGains, wraps: bool, dt: float) -> None:
@@ -32,7 +32,7 @@ class PidMagnitude:
         self.magnitude = 0.0
 
     def start(self, value: float, target: float | None = None) -> None:
-        """Begin to hold a target; by default the present value."""
+        """Start holding a target, by default the present value."""
         self._pid.reset()
         self._continuous = value
         self.value = value
@@ -43,7 +43,7 @@ class PidMagnitude:
         self.target = wrap_angle(target) if self._wraps else target
 
     def update(self, value: float) -> float:
-        """One control step: the magnitude c for the present value of the attribute."""
+        """Return the magnitude c for the attribute's present value; call it once per control step."""
         self.value = value
         continuous = value if self._continuous is None else self._continuous
         if self._wraps:

@@ -1,4 +1,4 @@
-"""A canvas of braille dots: every terminal cell holds 2 × 4 dots and one ink."""
+"""A canvas of braille dots, with 2 × 4 dots and one ink per terminal cell."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class BrailleCanvas:
     """Dots, inks and a few characters on a grid of cells.
 
     x runs right and y runs down, both in dots, from the canvas's upper left corner; a dot covers a unit
-    square whose centre has coordinates ending in .5. What lies outside is cut off. A cell shows one ink:
-    the last that was put there.
+    square whose centre has coordinates ending in .5. What lies outside is cut off. A cell shows the ink that
+    was drawn there last.
 
     Args:
         columns, rows: size in terminal cells.
@@ -39,7 +39,7 @@ class BrailleCanvas:
         self._characters: list[tuple[int, int, str, int]] = []
 
     def draw_points(self, x: NDArray[Any], y: NDArray[Any], ink: int | NDArray[np.int16]) -> None:
-        """Set the dots that points (n,) fall on."""
+        """Set the dots under points (n,)."""
         column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
         inside = (column >= 0) & (column < self.width) & (row >= 0) & (row < self.height)
         column, row = column[inside], row[inside]
@@ -47,7 +47,7 @@ class BrailleCanvas:
         self.inks[row // DOTS_Y, column // DOTS_X] = ink if isinstance(ink, int) else ink[inside]
 
     def draw_segments(self, starts: Floats, ends: Floats, ink: int | NDArray[np.int16]) -> None:
-        """Draw lines between points, shapes (n, 2); one ink for all, or one for each, shape (n,)."""
+        """Draw lines between points (n, 2), with one ink for all or one ink per line, shape (n,)."""
         kept = _near(starts, ends, self.width, self.height)
         starts, ends = starts[kept], ends[kept]
         steps = np.ceil(np.abs(ends - starts).max(axis=-1, initial=0.0)).astype(np.int64) + 1
@@ -58,9 +58,9 @@ class BrailleCanvas:
         self.draw_points(drawn[:, 0], drawn[:, 1], ink if isinstance(ink, int) else ink[kept][which])
 
     def draw_capsule(self, start: Floats, end: Floats, radius: float, ink: int, *, halo: float = 0.0) -> None:
-        """Fill all dots within `radius` of a line; around it, clear a rim of `halo` dots.
+        """Fill all dots within `radius` of a line, and clear a rim of `halo` dots around it.
 
-        A line whose ends coincide is a disc. The rim keeps a near limb apart from a far one behind it.
+        A line whose ends coincide is a disc. The rim separates a near limb from a far one behind it.
         """
         reach = max(radius, 0.5) + halo
         low = np.floor(np.minimum(start, end) - reach).astype(int)
@@ -84,7 +84,7 @@ class BrailleCanvas:
         self.inks[(row + y0) // DOTS_Y, (column + x0) // DOTS_X] = ink
 
     def draw_text(self, column: int, row: int, text: str, ink: int) -> None:
-        """Put characters, one cell wide each, over whatever dots are there."""
+        """Write characters, each one cell wide, over the dots."""
         if 0 <= row < self.rows:
             start = max(0, -column)
             cut = text[start : max(start, self.columns - column)]
@@ -92,7 +92,7 @@ class BrailleCanvas:
                 self._characters.append((column + start, row, cut, ink))
 
     def cell_codes(self) -> NDArray[np.uint32]:
-        """The character of every cell as a code point, shape (rows, columns)."""
+        """Return the code point of every cell's character, shape (rows, columns)."""
         cells = self.dots.reshape(self.rows, DOTS_Y, self.columns, DOTS_X)
         codes: NDArray[np.uint32] = np.einsum("ryct,yt->rc", cells, _BITS, dtype=np.uint32)
         codes += np.uint32(_EMPTY)
@@ -100,7 +100,7 @@ class BrailleCanvas:
         return codes
 
     def render_strips(self, styles: Sequence[Style]) -> list[Strip]:
-        """The canvas as lines; an ink is an index into `styles`."""
+        """Return the canvas as lines; an ink is an index into `styles`."""
         codes, inks = self.cell_codes(), self.inks.copy()
         for column, row, text, ink in self._characters:
             codes[row, column : column + len(text)] = [ord(character) for character in text]
@@ -109,7 +109,7 @@ class BrailleCanvas:
 
 
 def _near(starts: Floats, ends: Floats, width: int, height: int) -> NDArray[np.bool_]:
-    """Which lines may touch the canvas and have finite, sane ends, so that none needs endless steps."""
+    """Return which lines may touch the canvas and are finite and short enough to draw."""
     size = np.array([width, height], np.float64)
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     touching = (high >= 0).all(-1) & (low <= size).all(-1)
@@ -118,7 +118,7 @@ def _near(starts: Floats, ends: Floats, width: int, height: int) -> NDArray[np.b
 
 
 def _runs(codes: NDArray[np.uint32], inks: NDArray[np.int16], styles: Sequence[Style]) -> list[Segment]:
-    """Segments of one ink; blanks take the ink on their left, which makes fewer of them."""
+    """Return segments of one ink each; blanks take the ink to their left, which saves segments."""
     places = np.arange(len(codes))
     inked = np.maximum.accumulate(np.where(codes != _SPACE, places, 0))
     shown = inks[inked]

@@ -1,4 +1,4 @@
-"""Text on the screen: fitted into cells, numbers and keys made short."""
+"""Text that fits into terminal cells: padding, wrapping, short numbers and key names."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _KEYS = {
 
 
 def fit_cells(text: str, width: int) -> str:
-    """Exactly `width` cells: padded on the right, or cut with an ellipsis."""
+    """Pad text on the right, or cut it with an ellipsis, to exactly `width` cells."""
     if width <= 0:
         return ""
     if cell_len(text) <= width:
@@ -35,7 +35,7 @@ def fit_cells(text: str, width: int) -> str:
 
 
 def wrap_text(text: str, width: int, lines: int) -> list[str]:
-    """Break a sentence at its spaces into at most `lines` lines; the last is cut with an ellipsis."""
+    """Wrap a sentence into at most `lines` lines; the last is cut with an ellipsis."""
     rows = [""]
     for word in text.split():
         longer = f"{rows[-1]} {word}" if rows[-1] else word
@@ -47,7 +47,7 @@ def wrap_text(text: str, width: int, lines: int) -> list[str]:
 
 
 def format_number(value: float) -> str:
-    """A number in at most 7 characters with a true minus sign."""
+    """Format a number in at most 7 characters, with a true minus sign."""
     size = abs(value)
     digits = 2 if size < 100 else 1 if size < 1000 else 0
     shown = f"{value:.{digits}f}" if size < 99999.5 else f"{value:.0e}".replace("e+0", "e")
@@ -57,25 +57,25 @@ def format_number(value: float) -> str:
 
 
 def format_signed(value: float) -> str:
-    """`format_number` with its sign always shown."""
+    """Format a number as `format_number` does, but always with a sign."""
     shown = format_number(value)
     return shown if shown.startswith("−") else f"+{shown}"
 
 
 def key_name(key: str) -> str:
-    """How a key is written on the screen."""
+    """Return the name under which the screen shows a key."""
     return make_printable(_KEYS.get(key, key))
 
 
 class ScreenRow:
-    """One line of the screen, put together from the left."""
+    """One line of the screen, assembled from the left."""
 
     def __init__(self, width: int) -> None:
         self.width, self.left = width, width
         self._segments: list[Segment] = []
 
     def add(self, text: str, style: Style, width: int | None = None, *, right: bool = False) -> ScreenRow:
-        """Append text, fitted to `width` cells if given; what does not fit on the line is cut."""
+        """Append text, fitted to `width` cells if given; what exceeds the line is cut."""
         if width is not None:
             text = " " * (width - cell_len(text)) + text if right else text
             text = fit_cells(text, width)
@@ -87,7 +87,7 @@ class ScreenRow:
         return self
 
     def strip(self) -> Strip:
-        """The line, blank to its end."""
+        """Return the line, padded with blanks."""
         if self.left:
             self._segments.append(Segment(" " * self.left))
             self.left = 0

@@ -1,4 +1,4 @@
-"""The application that shows a running drive and passes its keys on."""
+"""The application that shows a running drive and passes keys on to it."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ class DriveApp(App[str]):
 
     Args:
         connection: the drive.
-        stimulation_map: the behaviors that it was started with.
-        fps: how often the connection is polled, per second.
-        watching: the drive follows a recording: keys that would change the run are refused.
+        stimulation_map: the behaviors that the drive was started with.
+        fps: polls of the connection per second.
+        watching: whether the drive follows a recording, so that keys that would change it are refused.
     """
 
     CSS = DRIVE
@@ -97,21 +97,21 @@ class DriveApp(App[str]):
         yield TerminalSizeNotice(id="too-small")
 
     def on_mount(self) -> None:
-        """Begin to poll."""
+        """Start polling."""
         self.query_one(StatusLine).watching = self.watching
         self._show_keys()
         self.set_interval(1.0 / self.fps, self._poll)
-        # Left to their default, these would leave the terminal raw and the recording to its own devices.
+        # By default, these signals would leave the terminal raw and the recording unfinished.
         loop = asyncio.get_running_loop()
         for number in _ENDING_SIGNALS:
             loop.add_signal_handler(number, self._end, number)
 
     def watch_facts(self, facts: DriveFacts | None) -> None:
-        """A world without a body needs no room for one."""
+        """Leave out the robot's picture for a world without links."""
         self.screen_stack[0].set_class(facts is not None and not facts.links, "-bodiless")
 
     def on_unmount(self) -> None:
-        """Give the signals back."""
+        """Restore the signals' handlers."""
         loop = asyncio.get_running_loop()
         for number in _ENDING_SIGNALS:
             loop.remove_signal_handler(number)
@@ -124,7 +124,7 @@ class DriveApp(App[str]):
         self.screen_stack[0].set_class(is_too_small(event.size), "-too-small")
 
     def set_keymap(self, keymap: Mapping[str, str]) -> None:
-        """Give bindings other keys, by their ids; see `pdtui.tui.key_bindings`."""
+        """Bind other keys, by the bindings' ids in `pdtui.core.key_table`."""
         super().set_keymap(dict(keymap))
         if self.is_running:
             self._show_keys()
@@ -134,7 +134,7 @@ class DriveApp(App[str]):
 
     @property
     def keys_now(self) -> dict[str, tuple[str, str]]:
-        """Key and sentence of each binding by its id, as remapped; without those that the map's keys hide."""
+        """Key and description of each binding by id, as remapped, without those hidden by the map's keys."""
         found: dict[str, tuple[str, str]] = {}
         for key, active in self.screen_stack[0].active_bindings.items():
             binding = active.binding
@@ -165,12 +165,12 @@ class DriveApp(App[str]):
             self.snapshot = message
 
     def say(self, notice: str) -> None:
-        """Show a line for a few seconds."""
+        """Show a notice for a few seconds."""
         self.notice = notice
         self._notice_until = monotonic() + NOTICE_SECONDS
 
     def on_key(self, event: events.Key) -> None:
-        """Keys of the map come before all bindings; a key that nobody has is named."""
+        """Give the map's keys precedence over all bindings, and name a key that is not bound."""
         if event.key in self._map_keys:
             event.prevent_default()
             self.action_run_key(event.key)
@@ -189,24 +189,24 @@ class DriveApp(App[str]):
             self.connection.press_key(key)
 
     def action_pace(self, request: str) -> None:
-        """Ask the drive for another pace."""
+        """Change the drive's pace."""
         self.connection.change_pace(cast(PaceRequest, request))
 
     def action_toggle_view(self) -> None:
-        """Look from the side, or from above."""
+        """Switch between side view and top view."""
         robot = self.query_one(RobotView)
         robot.view = "above" if robot.view == "side" else "side"
 
     def action_help(self) -> None:
-        """List all keys."""
+        """Show the help."""
         if isinstance(self.screen, HelpScreen):
             return
-        # One for all times: Textual keeps what up to 1024 widgets that are gone had drawn.
+        # Created only once: Textual caches what up to 1024 removed widgets have drawn.
         if self._help is None:
             self._help = HelpScreen(self.map, list(self.keys_now.values()))
             self.install_screen(self._help, "help")
         self.push_screen("help")
 
     def action_leave(self) -> None:
-        """Quit; whoever made the connection then ends the drive."""
+        """Quit; the caller of `run` then ends the drive."""
         self.exit()

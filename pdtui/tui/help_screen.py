@@ -1,4 +1,4 @@
-"""The overlay that lists every key with a sentence."""
+"""The help overlay, which lists every key and what it does."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from pdtui.tui.cell_text import key_name
 from pdtui.tui.theme import ThemeStyles, theme_styles
 
 _LATCHING = (
-    "A key latches its behavior: it lasts until its period ends, or until the key of another behavior or the "
-    "clearing key is pressed. Terminals do not tell when a key is released."
+    "A key latches its behavior, which stays active until its period ends, or until you press the key of "
+    "another behavior or the key that clears all. Terminals do not report when a key is released."
 )
 KeyLines = Sequence[tuple[str, str]]
 
 
 class HelpScreen(ModalScreen[None]):
-    """All keys: those of the map, then the application's. The drive goes on beneath, and its keys still work.
+    """Lists the keys of the map, then the application's; the drive and its keys go on working beneath.
 
     Args:
         stimulation_map: the behaviors and their keys.
-        keys: the application's keys as they are now, with sentences.
+        keys: the application's keys as remapped, and what each does.
     """
 
     BINDINGS: ClassVar = [
@@ -50,7 +50,7 @@ class HelpScreen(ModalScreen[None]):
             yield Static(self._text(theme_styles(self.app.theme_variables)))
 
     def action_scroll(self, direction: int) -> None:
-        """Move the list by a few lines."""
+        """Scroll the list by a few lines."""
         self.query_one("#help").scroll_relative(y=3 * direction, animate=False)
 
     def _text(self, palette: ThemeStyles) -> Text:
@@ -69,7 +69,7 @@ class HelpScreen(ModalScreen[None]):
             )
         line(self._map.default_key, "clears all stimulation", palette.key, palette.text)
         text.append(f"\n{_LATCHING}\n", palette.muted)
-        text.append("\neverything else\n", palette.accent)
+        text.append("\nother keys\n", palette.accent)
         for key, says in self._keys:
             line(key, says, palette.key, palette.text)
         return text

@@ -1,4 +1,4 @@
-"""The application that lists robots with their maps, and lets the user choose what to drive."""
+"""The application that lists the maps and lets the user choose one to drive."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class MapPickerRow:
-    """One map that can be driven, or that cannot and why.
+    """One map in the list, or a map file that cannot be read.
 
     Attributes:
         robot: name of the robot.
-        title: of the robot, for people.
-        map_path: file of the map.
-        policy: that the map was made for.
-        behaviors: how many the map has.
-        problem: what is wrong with the map, empty if nothing is.
+        title: display name of the robot.
+        map_path: the map file.
+        policy: the policy that the map was made for.
+        behaviors: number of behaviors in the map.
+        problem: why the map cannot be driven; empty if it can.
     """
 
     robot: str
@@ -44,12 +44,12 @@ class MapPickerRow:
     problem: str = ""
 
     def __str__(self) -> str:
-        """The map's file, which is how a command line names a row."""
+        """Return the map file, which is how a command line names the row."""
         return self.map_path
 
 
 def map_picker_rows(maps: Sequence[ListedMap]) -> list[MapPickerRow]:
-    """Rows for maps as they were found; of a broken map only its file's name is known."""
+    """Return one row per map; of a broken map only the file name is known."""
     rows = []
     for listed in maps:
         found = listed.stimulation_map
@@ -63,10 +63,10 @@ def map_picker_rows(maps: Sequence[ListedMap]) -> list[MapPickerRow]:
 
 
 class MapPickerApp(App[MapPickerRow]):
-    """Arrow keys choose, typing filters, enter drives; the result is the chosen row, or None.
+    """Lets the user choose a map by arrow keys and a filter; `run` returns the chosen row or None.
 
     Args:
-        rows: the maps, in the order in which they are listed.
+        rows: the maps, in the order to list them.
     """
 
     CSS = PICKER
@@ -75,8 +75,8 @@ class MapPickerApp(App[MapPickerRow]):
     BINDINGS: ClassVar = [
         Binding("up", "move(-1)", "the map above", id="pick_up", priority=True),
         Binding("down", "move(1)", "the map below", id="pick_down", priority=True),
-        Binding("enter", "choose", "drives the marked map", id="pick", priority=True),
-        Binding("ctrl+c", "quit", "quits without a choice", id="pick_quit", priority=True),
+        Binding("enter", "choose", "drives the selected map", id="pick", priority=True),
+        Binding("ctrl+c", "quit", "quits without choosing", id="pick_quit", priority=True),
     ]
 
     def __init__(self, rows: Sequence[MapPickerRow]) -> None:
@@ -87,24 +87,24 @@ class MapPickerApp(App[MapPickerRow]):
 
     def compose(self) -> ComposeResult:
         with Vertical(id="picker") as box:
-            box.border_title = "what shall be driven?"
+            box.border_title = "choose a map to drive"
             box.border_subtitle = "↑ ↓ choose   ↵ drive   type to filter   ctrl+c quit"
             yield Input(placeholder="filter: robot, map or policy", id="filter")
             yield OptionList(id="rows", markup=False)
             yield Static(id="none", markup=False)
 
     def on_mount(self) -> None:
-        """List everything."""
+        """List all maps."""
         self._list(self.rows)
         self.query_one(Input).focus()
 
     def on_input_changed(self, event: Input.Changed) -> None:
-        """List the rows in which every word of the filter occurs."""
+        """List the rows that contain every word of the filter."""
         words = event.value.lower().split()
         self._list([row for row in self.rows if all(word in _searched(row) for word in words)])
 
     def action_move(self, direction: int) -> None:
-        """Mark the next row that can be chosen."""
+        """Select the next or previous row that can be driven."""
         options = self.query_one(OptionList)
         if direction > 0:
             options.action_cursor_down()
@@ -112,7 +112,7 @@ class MapPickerApp(App[MapPickerRow]):
             options.action_cursor_up()
 
     def action_choose(self) -> None:
-        """Leave with the marked row."""
+        """Return the selected row."""
         options = self.query_one(OptionList)
         if options.highlighted is not None:
             chosen = options.get_option_at_index(options.highlighted)
@@ -120,7 +120,7 @@ class MapPickerApp(App[MapPickerRow]):
                 self.exit(self.rows[int(chosen.id)])
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """A click chooses, too."""
+        """Return the clicked row."""
         if event.option_id is not None:
             self.exit(self.rows[int(event.option_id)])
 
@@ -143,7 +143,7 @@ def _searched(row: MapPickerRow) -> str:
 
 
 def _prompt(row: MapPickerRow, palette: ThemeStyles) -> Text:
-    """Two lines: what it is, then how many behaviors, or what is wrong."""
+    """Return two lines: robot and file, then the number of behaviors or the problem."""
     bad = bool(row.problem)
     text = Text(no_wrap=True, overflow="ellipsis")
     text.append(fit_cells(make_printable(row.title), 26), palette.muted if bad else palette.title)

@@ -1,4 +1,4 @@
-"""Obstacles on a canvas: discs from above, trunks from the side."""
+"""Drawing obstacles: discs from above, trunks from the side."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _LEAST = 1.0
 
 
 def draw_from_above(canvas: BrailleCanvas, camera: PerspectiveCamera, obstacles: Floats, ink: int) -> None:
-    """Discs of the obstacles' radii on the ground, each with a rim that the ground does not reach."""
+    """Draw a disc per obstacle, with a rim that keeps the ground grid away."""
     dots, magnification, before = camera.project(_on_ground(obstacles))
     for dot, scale, radius in zip(dots[before], magnification[before], obstacles[before, 2], strict=True):
         canvas.draw_capsule(dot, dot, max(_LEAST, float(radius * scale) * camera.zoom), ink, halo=1.0)
@@ -21,15 +21,15 @@ def draw_from_above(canvas: BrailleCanvas, camera: PerspectiveCamera, obstacles:
 def draw_from_side(
     canvas: BrailleCanvas, camera: PerspectiveCamera, obstacles: Floats, ink: int, *, behind: bool
 ) -> None:
-    """Trunks up to the picture's edge, far ones first; before the robot as two lines, which hide nothing.
+    """Draw a trunk per obstacle, far ones first; in front of the robot only its outline, which hides nothing.
 
-    How high an obstacle is, nobody says.
+    The height of obstacles is unknown, so trunks reach to the picture's edge.
 
     Args:
-        canvas, camera: that draw the robot.
+        canvas, camera: those of the robot.
         obstacles: x, y and radius, m, shape (N, 3).
-        ink: of the trunks.
-        behind: draw those behind the robot, or those before it.
+        ink: ink of the trunks.
+        behind: draw the obstacles behind the robot instead of those in front of it.
     """
     chosen = obstacles[(obstacles[:, 1] > camera.target[1]) == behind]
     chosen = chosen[np.argsort(-chosen[:, 1], kind="stable")]

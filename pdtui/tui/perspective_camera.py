@@ -1,4 +1,4 @@
-"""The camera that follows the robot: world points in m to dots of a canvas."""
+"""A camera that projects points of the world, in m, to dots of a canvas."""
 
 from __future__ import annotations
 
@@ -19,12 +19,11 @@ class PerspectiveCamera:
     """A perspective camera whose picture has world x to the right.
 
     Attributes:
-        target: the point in the middle of the picture, m.
-        elevation: how far above the horizon the camera stands, degrees: 90 looks straight
-            down, with world y up.
-        extent: half the size of what must be seen, m; the camera stands 6 times as far away.
-        zoom: dots per m at the target.
-        centre: where the target appears, in dots.
+        target: the point that appears at `centre`, m.
+        elevation: angle of the camera above the horizon, degrees; 90 looks straight down, with world y up.
+        extent: half the size of the area to show, m; the camera is 6 times as far away.
+        zoom: dots per m at the target's distance.
+        centre: place of the target in the picture, in dots.
     """
 
     target: tuple[float, float, float]
@@ -34,9 +33,9 @@ class PerspectiveCamera:
     centre: tuple[float, float]
 
     def project(self, points: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-        """Dots (..., 2) of points (..., 3), magnification (...) against the target, and which lie in front.
+        """Return dots (..., 2) and magnifications (...) of points (..., 3), and which are in front of it.
 
-        Those that do not lie in front of the camera are to be left out.
+        Magnification is relative to the target. Points that do not lie in front must not be drawn.
         """
         relative = points - np.array(self.target)
         s, c = sin(radians(self.elevation)), cos(radians(self.elevation))
@@ -56,7 +55,7 @@ class PerspectiveCamera:
         return dots, magnification, before
 
     def depth(self, points: Floats) -> Floats:
-        """Distance of points (..., 3) from the target along the line of sight, m; the nearest is least."""
+        """Return how far points (..., 3) lie behind the target along the line of sight, m."""
         relative = points - np.array(self.target)
         s, c = sin(radians(self.elevation)), cos(radians(self.elevation))
         away: Floats = relative[..., 1] * c - relative[..., 2] * s
@@ -64,7 +63,7 @@ class PerspectiveCamera:
 
 
 def round_length_down(length: float) -> float:
-    """The largest of 1, 2 or 5 times a power of ten that is not longer."""
+    """Return the largest 1, 2 or 5 times a power of ten that does not exceed `length`."""
     power = 10.0 ** np.floor(np.log10(length))
     for factor in (5.0, 2.0):
         if factor * power <= length * (1 + 1e-9):

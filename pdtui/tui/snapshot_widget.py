@@ -1,4 +1,4 @@
-"""What every part of the screen is: lines that are painted from the newest snapshot."""
+"""The base of the screen's widgets: lines painted from the newest snapshot."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ Sides = tuple[Strip, Strip, Color, Style]
 
 
 class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
-    """Paints whole lines and repaints only those that changed, without ever touching the layout.
+    """Paints whole lines, repaints only those that changed, and never changes the layout.
 
     Args:
         stimulation_map: the behaviors of the drive.
-        id: for the style sheet.
+        id: name in the style sheet.
     """
 
     ALLOW_SELECT: ClassVar[bool] = False
@@ -48,25 +48,25 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
 
     @abstractmethod
     def paint(self, width: int, height: int) -> list[Strip]:
-        """The lines of the panel as it is now; missing ones are blank."""
+        """Return the lines of the widget as it is now; missing lines are blank."""
 
     def remember(self, snapshot: DriveSnapshot) -> None:
-        """Keep what later frames need of this snapshot; called once for each."""
+        """Keep what later frames need of a snapshot; called once per snapshot."""
         del snapshot
 
     @property
     def palette(self) -> ThemeStyles:
-        """Styles of the present theme."""
+        """The styles of the present theme."""
         if self._palette is None:
             self._palette = theme_styles(self.app.theme_variables)
         return self._palette
 
     def watch_facts(self) -> None:
-        """Robot and policy are loaded."""
+        """Paint once robot and policy are loaded."""
         self.redraw()
 
     def watch_snapshot(self, snapshot: DriveSnapshot | None) -> None:
-        """A newer picture of the drive has come."""
+        """Paint the newest snapshot."""
         if snapshot is not None:
             self.remember(snapshot)
         self.redraw()
@@ -76,7 +76,7 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         self.redraw()
 
     def redraw(self) -> None:
-        """Paint, and ask for a repaint of the lines that differ from those on the screen."""
+        """Paint, and have Textual repaint the lines that changed."""
         width, height = self.content_size
         if not self.is_attached or width <= 0 or height <= 0:
             return
@@ -95,22 +95,22 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
             self.refresh(*(Region(0, row, width, 1) for row in changed))
 
     def notify_style_update(self) -> None:
-        """Forget what was made with the old styles."""
+        """Drop what was painted with the old styles."""
         super().notify_style_update()
         self._palette = self._sides = None
         self._framed = [None] * len(self._framed)
 
     def render_line(self, y: int) -> Strip:
-        """An empty line: Textual draws only the frame; see `render_lines`."""
+        """Render an empty line, around which Textual draws the frame; see `render_lines`."""
         del y
         # Styled, because Textual's filter for NO_COLOR fails on segments without a style.
         return Strip.blank(self.content_size.width, Style(bgcolor=self.background_colors[1].rich_color))
 
     def render_lines(self, crop: Region) -> list[Strip]:
-        """Lines of the panel with its frame.
+        """Render the lines of the widget with its frame.
 
-        Textual's own way resolves border, padding and background anew for every line that changed, which
-        costs as much as painting it. Here one empty line gives the sides for all.
+        Textual's own method resolves border, padding and background again for every changed line, which costs
+        as much as painting it. Here one empty line provides the sides of all.
         """
         width = self.outer_size.width
         top, bottom = self.gutter.top, self.gutter.top + len(self._framed)
@@ -125,7 +125,7 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         return lines
 
     def _frame_line(self, row: int) -> Strip:
-        """A painted line between the sides of the frame, on the panel's background."""
+        """Return a painted line between the sides of the frame, on the widget's background."""
         framed = self._framed[row]
         if framed is None:
             left, right, background, base = self._sides or self._make_sides()
@@ -138,7 +138,7 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
                 ]
             )
             for line_filter in self.get_line_filters():
-                # Our colours are true ones already; other filters, such as NO_COLOR's, have work to do.
+                # All colours are true colours already; other filters, such as NO_COLOR's, still apply.
                 if not isinstance(line_filter, ANSIToTruecolor):
                     content = content.apply_filter(line_filter, background)
             framed = self._framed[row] = Strip([*left, *content, *right], self.outer_size.width)
@@ -153,5 +153,5 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         return self._sides
 
     def row_of(self, name: str) -> int:
-        """Row of a behavior in the map, −1 for one that the map does not have."""
+        """Return the row of a behavior in the map, or −1 if the map does not have it."""
         return list(self.map.behaviors).index(name) if name in self.map.behaviors else -1

@@ -1,4 +1,4 @@
-"""The recent past of many numbers, and one-row pictures of it."""
+"""The recent history of attributes, and sparklines of it."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _LEAST_SHARE = 0.05
 
 
 class AttributeHistory:
-    """The last `length` rows of J numbers.
+    """The last `length` values of J attributes.
 
     Args:
-        length: rows that are kept.
+        length: number of rows to keep.
         columns: J.
     """
 
@@ -36,10 +36,10 @@ class AttributeHistory:
         self.high = np.fmax(self.high, np.fmax.reduce(rows))
 
     def means(self, cells: int, per_cell: int) -> Floats:
-        """Means of the last cells × per_cell rows, shape (cells, J); NaN where nothing is known.
+        """Return means of the last cells × per_cell rows, shape (cells, J); NaN where there are no values.
 
-        Cells begin at multiples of `per_cell` since the start, so that no value changes its
-        neighbours while it scrolls.
+        Cells begin at multiples of `per_cell` since the start, so that means do not change while they
+        scroll.
         """
         partial = self.total % per_cell or per_cell
         wanted = (cells - 1) * per_cell + partial
@@ -55,10 +55,10 @@ class AttributeHistory:
 
 
 def draw_sparklines(means: Floats, low: Floats, high: Floats) -> list[str]:
-    """One line of block characters for each column of means (cells, J).
+    """Return one line of block characters per column of means (cells, J).
 
-    Each is scaled to what it shows, but to no less than a twentieth of the range `low` to `high` that was
-    ever seen, so that noise stays small.
+    Each is scaled to the values shown, but to no less than a twentieth of the range `low` to `high` seen so
+    far, so that noise stays small.
     """
     known = np.isfinite(means)
     bottom = np.where(known, means, np.inf).min(axis=0)

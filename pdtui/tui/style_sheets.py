@@ -1,8 +1,8 @@
-"""The style sheets: where the parts of the screens are, by size of the terminal."""
+"""The style sheets, which lay out the screens by the size of the terminal."""
 
 from __future__ import annotations
 
-# From this many columns, or lines, on, the screen has the class.
+# The screen has a class from this many columns or lines on.
 WIDTHS = [(0, "-narrow"), (110, "-wide"), (150, "-full")]
 HEIGHTS = [(0, "-low"), (36, "-tall")]
 
@@ -43,7 +43,7 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 .-tall #attributes { height: 18; }
 .-tall #heat { height: 6; }
 
-/* Nothing to draw: the attributes take the room. */
+/* Without a robot to draw, the attributes take its room. */
 .-bodiless #left { display: none; }
 .-bodiless #right { width: 1fr; }
 .-bodiless #attributes { height: 1fr; }

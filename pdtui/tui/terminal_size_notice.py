@@ -1,4 +1,4 @@
-"""What a terminal that is too small shows instead of the drive."""
+"""The notice shown instead of the drive in a terminal that is too small."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ LEAST = Size(80, 24)
 
 
 def is_too_small(size: Size) -> bool:
-    """Whether the drive's screen does not fit."""
+    """Return whether the drive's screen does not fit."""
     return size.width < LEAST.width or size.height < LEAST.height
 
 
 class TerminalSizeNotice(Widget, can_focus=False):
-    """Says what size is needed and what there is; the drive goes on meanwhile."""
+    """Shows the needed and the present size; the drive continues meanwhile."""
 
     def render_line(self, y: int) -> Strip:
-        """One line of the message, in the middle of the terminal."""
+        """Render one line; the message is centred in the terminal."""
         palette, (width, height) = theme_styles(self.app.theme_variables), self.size
         lines = [
             ("terminal too small", palette.accent),
             (f"need {LEAST.width} × {LEAST.height}", palette.text),
             (f"have {self.app.size.width} × {self.app.size.height}", palette.warn),
-            ("the drive goes on", palette.muted),
+            ("the drive continues", palette.muted),
         ]
         row = y - max(0, (height - len(lines)) // 2)
         if not 0 <= row < len(lines):

@@ -1,4 +1,4 @@
-"""Colours: one theme of our own, and the inks that pictures and tables are drawn with."""
+"""The theme and the styles of pictures and tables derived from it."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ HEAT_LEVELS = 8
 
 @dataclass(frozen=True)
 class ThemeStyles:
-    """Styles of a theme.
+    """The styles of a theme.
 
     Attributes:
-        base: the background, beneath everything.
+        base: the background.
         text, muted, faint: three strengths of the foreground.
-        title: names of things.
+        title: titles and values.
         primary, accent, good, warn, bad: the theme's colours.
-        alert: what must be read at once.
-        obstacle: what stands in the robot's way.
-        key: a key cap that is not latched.
-        behaviors: by row in the map, modulo their number.
+        alert: urgent messages.
+        obstacle: obstacles.
+        key: cap of a key that is not latched.
+        behaviors: colours of behaviors by row in the map, modulo their number.
         caps: key caps of latched behaviors, in the same order.
         depth: shades of the robot from far to near.
         heat: colours from −1 over 0 to +1, 2 × HEAT_LEVELS + 1 of them.
@@ -67,12 +67,12 @@ class ThemeStyles:
     heat: tuple[Color, ...]
 
     def behavior(self, row: int) -> Style:
-        """Colour of the behavior in this row of the map; faint for no behavior."""
+        """Return the colour of the behavior in a row of the map; faint for no behavior."""
         return self.faint if row < 0 else self.behaviors[row % len(self.behaviors)]
 
 
 def theme_styles(variables: Mapping[str, str]) -> ThemeStyles:
-    """The palette of a theme, from Textual's theme variables."""
+    """Return the styles for Textual's theme variables."""
     names = ("background", "foreground", "primary", "accent", "success", "warning", "error", "panel")
     return _palette(*(variables[name] for name in names))
 

@@ -1,4 +1,4 @@
-"""Which latched behavior overwrites which unit."""
+"""Finding the behavior that overwrites a unit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def unit_owners(
     stimulation_map: StimulationMap, active: Sequence[ActiveBehavior], layers: Sequence[int]
 ) -> dict[int, str]:
-    """Name of the behavior that decides each overwritten unit: the one latched last."""
+    """Return, for each overwritten unit, the behavior that decides its value: the one latched last."""
     names: dict[int, str] = {}
     for view in active:
         behavior = stimulation_map.behaviors.get(view.name)
@@ -24,5 +24,5 @@ def unit_owners(
             try:
                 names[parse_unit(address, layers)] = view.name
             except PolicyError:
-                continue  # the drive refuses such a map; the screen need not fall over it
+                continue  # the drive refuses such a map with a message of its own
     return names

@@ -31,8 +31,8 @@ def test_keys_mean_what_the_map_and_the_state_say(loop: ControlLoop) -> None:
     assert _press(loop, "w") == Event(0, "behavior", "push", key="w")
     assert _press(loop, "plus") == Event(1, "factor", "push", 1.25, "plus")
     assert _press(loop, "space") == Event(2, "default", key="space")
-    assert _press(loop, "plus") == "no behavior is latched whose strength could change"
-    assert _press(loop, "left") == "no target is held; a behavior of mode pid holds one"
+    assert _press(loop, "plus") == "no behavior is latched, so there is no strength to change"
+    assert _press(loop, "left") == "no target is held; only behaviors of mode pid hold one"
     assert _press(loop, "z") == "no behavior has key 'z'"
     assert _press(loop, "h") == Event(6, "behavior", "hold heading", key="h")
     target = loop.latch.active[0].target
@@ -57,7 +57,7 @@ def test_keys_of_one_step_mean_something_after_each_other(loop: ControlLoop) -> 
         Event(0, "factor", "push", 1.25**2, "plus"),
     )
     assert cleared == Event(0, "default", key="space")
-    assert refused == "no behavior is latched whose strength could change"
+    assert refused == "no behavior is latched, so there is no strength to change"
     assert loop.latch.active == before
 
 

@@ -1,1 +1,1 @@
-"""The parts of the drive's screen, one a file."""
+"""The widgets of the drive's screen, one per file."""

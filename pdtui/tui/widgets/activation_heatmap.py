@@ -1,4 +1,4 @@
-"""All hidden units at once: a strip of colours a layer, with marks under the stimulated ones."""
+"""The heatmap of all hidden units, with marks under the stimulated ones."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ _LABEL = 4
 
 
 class ActivationHeatmap(SnapshotWidget):
-    """Half-blocks, two rows of pixels a line. Cold is negative, warm positive, dark is zero.
+    """Draws two rows of pixels per line in half blocks: cold is negative, warm is positive, dark is zero.
 
-    The lines are shared out between the layers. Within its rows a layer runs down, then right; where a layer
-    has more units than pixels, a pixel shows the strongest of its units.
+    The rows are divided among the layers. A layer's units run down its rows, then right; if it has more units
+    than pixels, a pixel shows the strongest of its units.
     """
 
     _scale = 1e-6
 
     def on_mount(self) -> None:
-        """Name the panel."""
+        """Set the title."""
         self.border_title = "hidden units"
 
     def watch_facts(self) -> None:
@@ -45,8 +45,8 @@ class ActivationHeatmap(SnapshotWidget):
 
     def remember(self, snapshot: DriveSnapshot) -> None:
         finite = np.abs(snapshot.activations[np.isfinite(snapshot.activations)])
-        # Not every function is bounded as tanh is. A few overwritten units must not darken all others, so the
-        # scale is what all but a fiftieth stay below; the largest seen counts, slowly forgotten.
+        # Not every activation function is bounded as tanh is, and a few overwritten units must not darken all
+        # others. So the scale is the 98 % quantile; its maximum so far decays slowly.
         if finite.size:
             self._scale = max(self._scale * 0.998, float(np.quantile(finite, 0.98)), 1e-6)
 
@@ -70,7 +70,7 @@ class ActivationHeatmap(SnapshotWidget):
         ]
 
     def _levels(self, values: NDArray[np.float32], rows: int, columns: int) -> NDArray[np.int64]:
-        """Colour numbers of a layer's pixels, −1 for none, shape (rows, columns)."""
+        """Return the colour numbers of a layer's pixels, −1 for none, shape (rows, columns)."""
         strongest = UnitGrid(len(values), rows, columns).spread(np.nan_to_num(values))
         share = np.clip(strongest / self._scale, -1.0, 1.0)
         level = np.round(share * HEAT_LEVELS).astype(np.int64) + HEAT_LEVELS
@@ -91,7 +91,7 @@ class ActivationHeatmap(SnapshotWidget):
         return Strip(segments, _LABEL + pixels.shape[1])
 
     def _marks(self, width: int, columns: int, places: list[tuple[int, int]]) -> Strip:
-        """Stimulated units under their columns, with natural and overwritten value while there is room."""
+        """Return the line that marks stimulated units under their columns, with their values."""
         assert self.facts is not None
         assert self.snapshot is not None
         owner = unit_owners(self.map, self.snapshot.active, self.facts.layers)
@@ -131,17 +131,17 @@ def _style(upper: Color | None, lower: Color | None) -> Style:
 
 
 def layer_rows(layers: int, rows: int) -> list[tuple[int, int]]:
-    """First pixel row and number of pixel rows of each layer; layers that find no room get none."""
+    """Return the first pixel row and the number of pixel rows per layer; layers without room get none."""
     each = max(1, rows // layers)
     return [(layer * each, each if (layer + 1) * each <= rows else 0) for layer in range(layers)]
 
 
 @dataclass(frozen=True)
 class UnitGrid:
-    """Where a layer's units are: down, then right, on `rows` × `columns` pixels.
+    """The places of a layer's units, which run down, then right, on `rows` × `columns` pixels.
 
-    Fewer units than pixels are drawn wider, so that a layer always fills its strip; of more units than
-    pixels, neighbours share one.
+    Fewer units than pixels are drawn wider, so that a layer always fills its rows; if there are more units
+    than pixels, neighbours share one.
     """
 
     units: int
@@ -154,13 +154,13 @@ class UnitGrid:
         return min(self.columns, -(-self.units // self.rows))
 
     def column_of(self, index: int) -> int:
-        """The leftmost column that shows a unit."""
+        """Return the leftmost column that shows a unit."""
         groups = self.rows * self.steps
         group = index * groups // self.units if self.units > groups else index
         return -(-(group // self.rows) * self.columns // self.steps)
 
     def spread(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Values of the units as pixels, shape (rows, columns); the strongest of several, NaN for none."""
+        """Return the values as pixels, shape (rows, columns): the strongest of several, NaN for none."""
         groups = self.rows * self.steps
         if self.units > groups:
             group = np.arange(self.units) * groups // self.units

@@ -1,4 +1,4 @@
-"""Kinematic attributes: present value, target, and the recent past."""
+"""The table of kinematic attributes: present value, target and recent history."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _FORCES = ("N", "N m", "Nm")
 
 
 class AttributeTable(SnapshotWidget):
-    """One attribute a line; where there is no room for all, forces and torques go first."""
+    """Shows one attribute per line; if not all fit, forces and torques are left out first."""
 
     _history: AttributeHistory | None = None
 
     def on_mount(self) -> None:
-        """Name the panel."""
+        """Set the title."""
         self.border_title = "attributes"
 
     def remember(self, snapshot: DriveSnapshot) -> None:
@@ -36,7 +36,7 @@ class AttributeTable(SnapshotWidget):
 
     def paint(self, width: int, height: int) -> list[Strip]:
         if self.facts is None:
-            return [ScreenRow(width).add("values come with the policy", self.palette.faint).strip()]
+            return [ScreenRow(width).add("waiting for the policy", self.palette.faint).strip()]
         shown = self._choose(height)
         attributes = [self.facts.attributes[index] for index in shown]
         widest = max(cell_len(make_printable(attribute.name)) for attribute in attributes)
@@ -65,7 +65,7 @@ class AttributeTable(SnapshotWidget):
         return strips
 
     def _choose(self, height: int) -> list[int]:
-        """Rows of the robot's attributes that are shown, in the robot's order."""
+        """Return the indices of the attributes to show, in the robot's order."""
         assert self.facts is not None
         named = {primitive.attribute for primitive in self.map.primitives.values()}
         for behavior in self.map.behaviors.values():
@@ -80,7 +80,7 @@ class AttributeTable(SnapshotWidget):
         return sorted(sorted(range(len(self.facts.attributes)), key=rank)[:height])
 
     def _targets(self) -> dict[str, tuple[float, int]]:
-        """Target and behavior row of each attribute that a controller holds now."""
+        """Return target and behavior row of each attribute that a controller holds."""
         targets: dict[str, tuple[float, int]] = {}
         for active in self.snapshot.active if self.snapshot is not None else ():
             behavior = self.map.behaviors.get(active.name)
@@ -96,7 +96,7 @@ class AttributeTable(SnapshotWidget):
         per_cell = min(max(1, ceil(_SECONDS / self.facts.dt / cells)), _ROWS_KEPT // cells)
         means = self._history.means(cells, per_cell)[:, shown]
         low, high = self._history.low[shown], self._history.high[shown]
-        # An angle's line has the whole turn for its scale: a jump at ±π is then a jump from edge to edge.
+        # An angle is scaled to several turns, so that its jump at ±π stays small in the line.
         for column, index in enumerate(shown):
             if self.facts.attributes[index].wraps and np.nanmax(np.abs(means[:, column]), initial=0.0) > 1.5:
                 low[column], high[column] = -20 * pi, 20 * pi

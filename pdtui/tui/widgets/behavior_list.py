@@ -1,4 +1,4 @@
-"""Behaviors: their keys, what they do, which are latched and for how long."""
+"""The list of behaviors: keys, descriptions, and which are latched for how long."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _BLOCKS = " ▏▎▍▌▋▊▉"
 
 
 class BehaviorList(SnapshotWidget):
-    """Two lines a behavior where there is room, else one; latched ones are always in sight."""
+    """Shows two lines per behavior if there is room, else one; latched behaviors are never hidden."""
 
     def on_mount(self) -> None:
-        """Name the panel."""
+        """Set the title."""
         self.border_title = "behaviors"
 
     def paint(self, width: int, height: int) -> list[Strip]:
@@ -37,7 +37,7 @@ class BehaviorList(SnapshotWidget):
         key_width = max((cell_len(key) for key in keys), default=0) + 2
         name_width = min(max((cell_len(name) for name in names), default=0), max(8, width // 3))
         self._columns = (key_width, name_width)
-        # Room for the controllers' lines counts even while none is latched: a key must not change the layout.
+        # Controllers' lines count even while none is latched, so that a key press does not change the layout.
         controllers = sum(behavior.pid is not None for behavior in behaviors)
         roomy = 2 * len(behaviors) + controllers + 2 <= height
         entries = [
@@ -83,7 +83,7 @@ class BehaviorList(SnapshotWidget):
         return lines
 
     def _add_cap(self, line: ScreenRow, key: str, style: Style) -> None:
-        """The key as a cap, padded to the widest of all."""
+        """Add the key as a cap, padded to the width of the widest."""
         cap = f" {key_name(key)} "
         line.add(cap, style).add(" " * (self._columns[0] - cell_len(cap)), self.palette.text)
 
@@ -93,7 +93,7 @@ class BehaviorList(SnapshotWidget):
         return "" if behavior.period is None else f"for {format_number(behavior.period)} s"
 
     def _add_state(self, line: ScreenRow, behavior: Behavior, active: ActiveBehavior, color: Style) -> None:
-        """How long it still lasts: a draining bar, or the word latched."""
+        """Add the time left as a draining bar, or the word "latched"."""
         dt = None if self.facts is None else self.facts.dt
         if active.remaining is None or dt is None or behavior.period is None:
             line.add("latched", color)
@@ -105,7 +105,7 @@ class BehaviorList(SnapshotWidget):
             line.add(f"  × {format_number(active.factor)}", self.palette.accent)
 
     def _control(self, behavior: Behavior, active: ActiveBehavior, width: int) -> Strip:
-        """Target, value, error and c of a controller."""
+        """Return the line with value, target, error and magnitude c of a controller."""
         palette = self.palette
         unit = self._unit_of(behavior)
         row = ScreenRow(width).add(" " * (self._columns[0] + 2), palette.text)
@@ -125,7 +125,7 @@ class BehaviorList(SnapshotWidget):
         return make_printable(named.get(behavior.pid.attribute, ""))
 
     def _crop(self, entries: list[list[Strip]], latched: list[bool], width: int, height: int) -> list[Strip]:
-        """As many entries as fit: latched ones first, in the order of the map."""
+        """Return as many entries as fit, in the order of the map; latched ones are kept first."""
         if sum(map(len, entries)) <= height:
             return [strip for entry in entries for strip in entry]
         room = height - 1
@@ -141,7 +141,7 @@ class BehaviorList(SnapshotWidget):
 
 
 def _bar(share: float, cells: int) -> str:
-    """A bar in eighths of a cell."""
+    """Return a bar drawn in eighths of a cell."""
     eighths = round(min(max(share, 0.0), 1.0) * cells * 8)
     full, rest = divmod(eighths, 8)
     return ("█" * full + (_BLOCKS[rest] if rest else "")).ljust(cells)

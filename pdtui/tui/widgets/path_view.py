@@ -1,4 +1,4 @@
-"""The path from above, in the colours of the behaviors that made it."""
+"""The path from above, in the colours of the behaviors active along it."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _PAST, _NONE, _MARK, _LABEL, _FIRST_BEHAVIOR = range(5)
 
 
 class PathView(SnapshotWidget):
-    """North is +y, right is +x; the whole of the present path is always in the picture."""
+    """Draws the whole present path, with +x to the right and +y up."""
 
     def on_mount(self) -> None:
-        """Name the panel and start with no path."""
+        """Set the title and start with no path."""
         self.border_title = "path"
         self.trail = PathTrail()
         self._heading = 0.0
@@ -65,10 +65,10 @@ class PathView(SnapshotWidget):
         )
 
     def _frame(self, canvas: BrailleCanvas, points: Floats) -> tuple[Floats, float]:
-        """Middle of the picture in m, and dots per m.
+        """Return the middle of the picture in m and the number of dots per m.
 
-        The scale moves in steps of √2 and the middle in whole cells, so that the picture stands still
-        most of the time.
+        The scale moves in steps of √2 and the middle in whole cells, so that the picture rarely
+        moves.
         """
         low, high = points.min(axis=0), points.max(axis=0)
         room = np.array([canvas.width - 6, canvas.height - 6])

@@ -1,4 +1,4 @@
-"""The robot itself: its links as solid limbs over a ground that moves past."""
+"""The picture of the robot: solid limbs over a ground grid that moves past."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ _ELEVATION: dict[View, float] = {"side": 14.0, "above": 90.0}
 _GROUND, _AXIS, _SHADOW, _HEADING, _LABEL, _OBSTACLE, _FIRST_SHADE = range(7)
 _FARTHEST = 0.55
 _AHEAD, _ASIDE = 16.0, 8.0
-"""Length and width of what is seen from above among obstacles, in extents of the robot."""
+"""Length and width of the area seen from above with obstacles, in extents of the robot."""
 _FORWARD = 0.27
-"""Where the middle of that picture is before the robot, in its lengths."""
+"""Distance from the robot to the middle of that picture, as a share of the picture's size."""
 _EASING = 0.12
-"""Share of a turn that the picture follows in a frame: a gait that sways must not shake it."""
+"""Share of a turn that the picture follows per frame, so that a swaying gait does not shake it."""
 _ARROW = 0.5
-"""Size of the heading's arrow where the picture reaches farther than the robot, in halves of what is seen."""
+"""Least size of the heading arrow, in extents of the camera."""
 _BOX_EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1]
 
 
 class RobotView(SnapshotWidget):
-    """The robot from the side (x to the right, z up) or from above (x to the right, y up).
+    """Draws the robot from the side (x to the right, z up) or from above (x to the right, y up).
 
-    Among obstacles, the view from above is the first, reaches farther and shows more of what is ahead.
+    With obstacles around, the view from above comes first, reaches farther and shows more of what lies ahead.
     """
 
     view: reactive[View] = reactive("side", init=False, repaint=False)
@@ -47,12 +47,12 @@ class RobotView(SnapshotWidget):
     _looked = False
 
     def watch_view(self) -> None:
-        """Look from elsewhere."""
+        """Draw from the chosen side."""
         self.border_title = f"robot · {self.view}"
         self.redraw()
 
     def on_mount(self) -> None:
-        """Name the panel."""
+        """Set the title."""
         self.border_title = f"robot · {self.view}"
 
     def remember(self, snapshot: DriveSnapshot) -> None:
@@ -99,7 +99,7 @@ class RobotView(SnapshotWidget):
         palette = self.palette
         lines = [
             ("loading the policy…", palette.title),
-            ("robot and network are on their way", palette.muted),
+            ("this takes a few seconds", palette.muted),
         ]
         return [
             *blank,
@@ -122,7 +122,7 @@ class RobotView(SnapshotWidget):
         ]
 
     def _camera(self, canvas: BrailleCanvas, root: Floats, ends: Floats) -> PerspectiveCamera:
-        """Far enough away for the widest stretch that the robot has shown so far."""
+        """Return a camera far enough away for the widest stretch that the robot has shown so far."""
         assert self.facts is not None
         radii = np.array([_radius(link.size) for link in self.facts.links])
         stretch = np.linalg.norm(ends - root[:3], axis=-1).max(axis=-1) + radii
@@ -144,7 +144,7 @@ class RobotView(SnapshotWidget):
         )
 
     def _draw_ground(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
-        """A grid fixed to the world, so that its lines pass when the robot moves."""
+        """Draw a grid fixed to the world, whose lines pass by as the robot moves."""
         cell = round_length_down(camera.extent)
         reach = 9 if self.view == "side" else 6
         middle = np.round(root[:2] / cell)
@@ -168,7 +168,7 @@ class RobotView(SnapshotWidget):
         canvas.draw_segments(dots[kept, 0], dots[kept, 1], _SHADOW)
 
     def _draw_heading(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
-        """Where the robot's own x axis points, as an arrow on the ground."""
+        """Draw the direction of the robot's own x axis as an arrow on the ground."""
         x, y = _heading(root)
         if not (x or y):
             return
@@ -186,7 +186,7 @@ class RobotView(SnapshotWidget):
     def _draw_links(
         self, canvas: BrailleCanvas, camera: PerspectiveCamera, placed: Floats, ends: Floats
     ) -> None:
-        """Far links first and darker, near ones over them."""
+        """Draw far links first and darker, and near ones over them."""
         assert self.facts is not None
         dots, magnification, before = camera.project(ends)
         depth = camera.depth(ends.mean(axis=-2))
@@ -218,7 +218,7 @@ class RobotView(SnapshotWidget):
 
 
 def _heading(root: Floats) -> Floats:
-    """Where a pose's own x axis points on the ground, shape (2,); zeros where it points up or down."""
+    """Return the ground direction of a pose's x axis, shape (2,); zeros if it points up or down."""
     ahead: Floats = rotate(root[3:], np.array([1.0, 0.0, 0.0]))[:2]
     length = float(np.linalg.norm(ahead))
     return ahead / length if length > 1e-6 else np.zeros(2)

@@ -1,4 +1,4 @@
-"""The lines at the edges of the screen: how the drive stands, what happened, and which keys help."""
+"""The lines at the edges of the screen: status, notices and keys."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Part = tuple[str, Style]
 
 
 class StatusLine(SnapshotWidget):
-    """Robot on the left, state of the drive on the right; what matters less is left out first."""
+    """Shows the robot on the left and the drive's state on the right, as far as there is room."""
 
     watching: reactive[bool] = reactive(False, init=False, repaint=False)
 
@@ -43,7 +43,7 @@ class StatusLine(SnapshotWidget):
         return [row.strip()]
 
     def _parts(self) -> list[tuple[int, Part]]:
-        """Parts of the line with their importance, 0 the highest."""
+        """Return the parts of the line with their rank; 0 is the most important."""
         palette = self.palette
         if self.facts is None:
             return [
@@ -87,13 +87,13 @@ class StatusLine(SnapshotWidget):
 
 
 class NoticeLine(SnapshotWidget):
-    """What the user should read now; the end of the drive stays."""
+    """Shows what the user should read now; the reason for the drive's end stays."""
 
     notice: reactive[str] = reactive("", init=False, repaint=False)
     hints: reactive[str] = reactive("", init=False, repaint=False)
 
     def watch_notice(self) -> None:
-        """Something is to be read."""
+        """Show the notice."""
         self.redraw()
 
     def paint(self, width: int, height: int) -> list[Strip]:
@@ -119,7 +119,7 @@ class NoticeLine(SnapshotWidget):
         return [row.strip()]
 
     def _counters(self) -> str:
-        """How the episode stands, for a robot with a way to go or obstacles to run into."""
+        """Return distance, collisions and involvement of the episode, for a robot that has them."""
         statistics = self.snapshot.statistics if self.snapshot is not None else NO_STATISTICS
         shown = [] if statistics.distance is None else [f"{format_number(statistics.distance)} m"]
         if statistics.collisions is not None:
@@ -131,9 +131,9 @@ class NoticeLine(SnapshotWidget):
         return f"episode {statistics.episode}: {' · '.join([*shown, keyed])}"
 
     def _summary(self) -> str:
-        """What is there to say when nothing happened."""
+        """Return the line shown while there is no notice."""
         if self.snapshot is None or self.facts is None:
-            return "pdtui is ready when the policy is"
+            return "the drive starts once the policy is loaded"
         facts = self.facts
         place = make_printable(facts.recording) or "not recorded"
         if self._counters():
@@ -144,7 +144,7 @@ class NoticeLine(SnapshotWidget):
 
 
 class KeyLine(SnapshotWidget):
-    """The application's own keys, as far as there is room."""
+    """Shows as many of the application's keys as fit."""
 
     keys: reactive[tuple[tuple[str, str], ...]] = reactive((), init=False, repaint=False)
 
@@ -163,7 +163,7 @@ class KeyLine(SnapshotWidget):
 
 
 def _shorten(name: str, width: int) -> str:
-    """Cut in the middle: of a file's name, beginning and end say most."""
+    """Cut the middle of a file name, whose beginning and end say most."""
     if len(name) <= width:
         return name
     end = width // 2

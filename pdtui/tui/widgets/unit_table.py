@@ -1,4 +1,4 @@
-"""Stimulated units: what each would have put out, and what overwrote it."""
+"""The table of stimulated units: natural output and the value that overwrites it."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ _ADDRESS = 8
 
 
 class UnitTable(SnapshotWidget):
-    """One unit a line, in the colour of the behavior that overwrites it."""
+    """Shows one unit per line, in the colour of the behavior that overwrites it."""
 
     def on_mount(self) -> None:
-        """Name the panel."""
+        """Set the title."""
         self.border_title = "stimulated units"
 
     def paint(self, width: int, height: int) -> list[Strip]:
         palette = self.palette
         if self.facts is None or self.snapshot is None or not self.snapshot.units:
-            text = "none: the policy is on its own" if self.snapshot is not None else ""
+            text = "none: no unit is overwritten" if self.snapshot is not None else ""
             return [ScreenRow(width).add(text, palette.faint).strip()]
         head = (
             ScreenRow(width)
