@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.robot_goals import WALKING_GOALS
-from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, model_links
+from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, model_links, silence_warnings
 from pdtui.robots.training_recipe import TrainingRecipe
 
 _LEGS = {"1": "front left", "2": "back left", "3": "back right", "4": "front right"}
@@ -77,6 +77,7 @@ class Ant(MujocoRobot, AntEnv):
         return self.observe(), float(reward), reason is not None, False, info
 
     def reset_model(self) -> Floats:
+        silence_warnings(self.data)
         super().reset_model()
         qpos = self.data.qpos.copy()
         yaw = self.np_random.uniform(-np.pi, np.pi)

@@ -25,7 +25,7 @@ from pdtui.robots.legged.legged_rewards import (
     legged_rewards,
 )
 from pdtui.robots.robot_goals import WALKING_GOALS
-from pdtui.robots.simulators.mujoco_robot import MujocoRobot, model_links
+from pdtui.robots.simulators.mujoco_robot import MujocoRobot, model_links, silence_warnings
 from pdtui.robots.training_recipe import TrainingRecipe
 
 MODEL = Path(__file__).parent / "models" / "anymal_c.xml"
@@ -132,6 +132,7 @@ class Anymal(MujocoRobot):
         del options
         rng = self.np_random
         mujoco.mj_resetData(self.model, self.data)
+        silence_warnings(self.data)
         yaw = rng.uniform(-0.1, 0.1)
         self.data.qpos[2] = 0.55
         self.data.qpos[3:7] = math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)

@@ -144,8 +144,10 @@ def _from_environment(environment: str, name: str) -> Robot:
     from pdtui.robots.environments.gymnasium_robot import make_environment
     from pdtui.robots.environments.mujoco_gymnasium_robot import MujocoGymnasiumRobot, is_mujoco
     from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
+    from pdtui.robots.simulators.mujoco_robot import ignored_warnings
 
-    env = make_environment(environment)
+    with ignored_warnings():
+        env = make_environment(environment)
     kind = MujocoGymnasiumRobot if is_mujoco(env) else PlainGymnasiumRobot
     env.close()
     return kind(name, environment=environment)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pdtui.core.angles import wrap_angle
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.robots.robot_goals import WALKING_GOALS
-from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, model_links
+from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, model_links, silence_warnings
 from pdtui.robots.task import RunTrace, Task, TaskVerdict
 from pdtui.robots.training_recipe import TrainingRecipe
 
@@ -168,6 +168,7 @@ class Walker(MujocoRobot, Walker2dEnv):
         )
 
     def reset_model(self) -> Floats:
+        silence_warnings(self.data)
         self._in_air = np.zeros(len(_FEET))
         observation: Floats = super().reset_model()
         return observation

@@ -23,6 +23,7 @@ from pdtui.robots.legged.legged_rewards import (
     legged_observations,
     legged_rewards,
 )
+from pdtui.robots.simulators.mujoco_robot import ignored_warnings
 from pdtui.training.sac import TransitionBatch
 from pdtui.training.world_batch import WorldBatchState
 
@@ -96,9 +97,10 @@ class AnymalWorldBatch:
         self._last_action, self._action = self._action, actions.astype(np.float64)
         targets = DEFAULT + ACTION_SCALE * self._action
         control = np.repeat(targets[:, None], SUBSTEPS, axis=1)
-        states, sensors = rollout.rollout(
-            self._models, self._data, self._physics, control, persistent_pool=True
-        )
+        with ignored_warnings():  # a world that diverges starts over
+            states, sensors = rollout.rollout(
+                self._models, self._data, self._physics, control, persistent_pool=True
+            )
         self._physics = states[:, -1].copy()
         joints = self._physics[:, 8 : 1 + _NQ], self._physics[:, 1 + _NQ + 6 :]
         torque = np.clip(80.0 * (targets - joints[0]) - 2.0 * joints[1], -80.0, 80.0)

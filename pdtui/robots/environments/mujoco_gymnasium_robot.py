@@ -15,8 +15,10 @@ from pdtui.robots.simulators.mujoco_robot import (
     body_poses,
     check_finite,
     digest_state,
+    ignored_warnings,
     model_links,
     set_state,
+    silence_warnings,
     state_of,
 )
 
@@ -48,6 +50,17 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
         fresh = mujoco.MjData(model)
         self._derived = tuple(name for name in dir(fresh) if _is_derived(getattr(fresh, name)))
         self._posed = fresh
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats, dict[str, Any]]:
+        first = super().reset(seed=seed, options=options)
+        silence_warnings(self.world.data)
+        return first
+
+    def make_world(self) -> gymnasium.Env[Any, Any]:
+        with ignored_warnings():  # advice to the model's author
+            return super().make_world()
 
     @property
     def control_dt(self) -> float:

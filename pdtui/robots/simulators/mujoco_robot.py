@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from hashlib import blake2b
 from typing import Any, cast
@@ -24,8 +26,8 @@ _SHAPES = {
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): ("box", 3),
     int(mujoco.mjtGeom.mjGEOM_MESH): ("box", 3),
 }
-# Its own handler prints and leaves a log file in the user's folder; `_check_finite` says what matters.
-mujoco.set_mju_user_warning(lambda *_: None)
+_SILENT = 1_000_000
+"""Count that tells MuJoCo it warned before: it prints and logs only the first warning of a kind."""
 _DIVERGED = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
     mujoco.mjtWarning.mjWARN_BADQVEL,
@@ -76,8 +78,27 @@ def set_state(model: mujoco.MjModel, data: mujoco.MjData, state: Floats, owner: 
     mujoco.mj_forward(model, data)
     # mj_forward moves the solver's warm start, which the next step reads: put it back.
     mujoco.mj_setState(model, data, state, _STATE)
+    silence_warnings(data)
+
+
+@contextmanager
+def ignored_warnings() -> Iterator[None]:
+    """Take MuJoCo's warnings away from the process's handler of them while the block runs."""
+    handler = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda *_: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(handler)
+
+
+def silence_warnings(data: mujoco.MjData) -> None:
+    """Keep MuJoCo from printing warnings about this data until it is reset; `check_finite` reports them.
+
+    The handler of warnings is the process's, and stays as it is.
+    """
     for index in range(len(data.warning)):
-        data.warning[index].number = 0
+        data.warning[index].number = _SILENT
 
 
 def body_poses(data: mujoco.MjData) -> Floats:
@@ -94,13 +115,13 @@ def digest_state(state: Floats) -> int:
 def check_finite(data: mujoco.MjData, owner: str) -> None:
     """Raise where MuJoCo met a number it could not integrate.
 
-    MuJoCo resets a diverged state by itself, so only its warning counters remember what happened.
+    MuJoCo resets a diverged state by itself, so only its counters of warnings remember what happened.
 
     Raises:
         SimulationDiverged: the last steps were not finite; the message names `owner`.
     """
     for warning in _DIVERGED:
-        if data.warning[int(warning)].number:
+        if data.warning[int(warning)].number not in (0, _SILENT):
             quantity = warning.name.removeprefix("mjWARN_BAD").lower()
             raise SimulationDiverged(
                 f"{owner}: the simulation diverged at {data.time:.2f} s "
