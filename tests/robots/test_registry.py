@@ -227,6 +227,7 @@ assert not {{"gymnasium", "mujoco"}} & set(sys.modules)
 import numpy as np
 from pdtui.core.units import NO_STIMULATION
 from pdtui.dissection.dissect import dissect
+from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.drive.drive_config import DriveConfig
 from pdtui.drive.headless_drive import drive_headless
 from pdtui.drive.loop_builder import build_loop
@@ -242,7 +243,7 @@ loop = build_loop(DriveConfig("iron-cart", bare_map("iron-cart", str(weights)), 
 assert drive_headless(loop, {{}}, 40, None).steps == 40
 (verdict,) = judge_stimulations(robot, policy, robot.find_task("run"), [TimedStimulation()], 0)
 assert list(verdict.figures) == ["way (m)"]
-found = dissect(robot, policy, episodes=1, effort=SMALL, budget_minutes=0.0)
+found = dissect(DissectionConfig(robot, policy, episodes=1, settings=SMALL, budget_minutes=0.0))
 assert [one.goal.name for one in found.behaviors] == ["rush"] and not found.controllers
 print("whole")
 """
