@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from textual.widgets import Markdown, MarkdownViewer
-from textual.widgets.markdown import MarkdownBlock
+from textual.widgets.markdown import MarkdownBlock, MarkdownFence
 
 from pdtui.guide.guide_pages import GuidePassage
 
@@ -54,6 +54,11 @@ class GuideViewer(MarkdownViewer):
             for block in self.query(MarkdownBlock)
             if block.source_range[0] <= line < block.source_range[1]
         ]
-        if blocks:
-            smallest = min(blocks, key=lambda block: block.source_range[1] - block.source_range[0])
-            self.scroll_to_widget(smallest, animate=False, top=True)
+        if not blocks:
+            return
+        smallest = min(blocks, key=lambda block: block.source_range[1] - block.source_range[0])
+        below = line - smallest.source_range[0]
+        cells = smallest.query(f".row{below - 1}")  # in a table, beneath the header and its rule
+        self.scroll_to_widget(cells.first() if cells else smallest, animate=False, top=True)
+        if isinstance(smallest, MarkdownFence):
+            self.call_after_refresh(self.scroll_relative, y=below - 1, animate=False)
