@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -51,3 +53,10 @@ def test_the_guide_stays_within_itself() -> None:
 
 def test_the_readme_is_short() -> None:
     assert len(README.read_text(encoding="utf-8").split()) <= 700
+
+
+def test_the_guide_names_the_extras_that_there_are() -> None:
+    project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    named = set(re.findall(r"(?:pdtui|\.)\[(\w+)\]", text))
+    assert named == set(project["optional-dependencies"])
