@@ -76,8 +76,8 @@ class TunedGains:
     @property
     def verdict(self) -> str:
         """The result in one sentence."""
-        early = "; the minutes were over before the search was" if self.ended_early else ""
-        what = "better than the map's" if self.better else "no better than the map's, which stay"
+        early = "; the search ran out of time" if self.ended_early else ""
+        what = "better than the map's" if self.better else "no better than the map's, which remains"
         return (
             f"{self.tried} controllers tried; on seeds that the search did not see, the best is {what}{early}"
         )

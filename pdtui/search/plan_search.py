@@ -61,7 +61,7 @@ class TimeBudget:
         self._end = inf if minutes is None else (time.monotonic() if began is None else began) + 60 * minutes
 
     def share(self, searches: int = 1) -> Deadline:
-        """Return the deadline of the next search, where so many are still to run."""
+        """Return the deadline of the next search when `searches` are still to run."""
         now = time.monotonic()
         until = now + max(0.0, self._end - now) / max(1, searches)
         return lambda: time.monotonic() >= until
@@ -74,13 +74,13 @@ class EvolutionSettings:
     Attributes:
         elite: plans kept from one generation to the next.
         children: plans of one generation.
-        promoted: how many of them get the full score.
-        max_units: units of a plan at most, in the first round and in those that follow as long as the goal is
-            not reached.
-        generations: of one round, at most.
-        patience: generations without progress before a round ends.
-        finalists: best of the elite that the final score decides between.
-        bounds: of the outputs v.
+        promoted: plans of a generation that get the full score.
+        max_units: largest number of units of a plan, for each round; rounds follow as long as no score is
+            safe.
+        generations: largest number of generations of a round.
+        patience: generations without progress after which a round ends.
+        finalists: plans of the elite that the final score decides between.
+        bounds: limits of the outputs v.
     """
 
     elite: int = 16
@@ -98,8 +98,8 @@ class SearchProblem(Generic[Plan]):
     """What an evolutionary search is for.
 
     Attributes:
-        first: returns the plans that join the elite at the beginning of a round, given its number.
-        vary: returns a plan made from the elite, ranked from the best, with so many units at most.
+        first: returns the plans that a round begins with, given its number.
+        vary: returns a new plan, given the elite from the best on and the largest number of units.
         quick: scores all plans of a generation.
         full: scores the most promising of them.
         final: scores the finalists, on episodes that the search has not seen.

@@ -120,6 +120,9 @@ def choose_tracking_targets(
     untouched = runner.run([TrackingDrive(name, "", seed, (0.0, 0.0)) for seed in seeds])
     natural = finite_mean(np.array([one.values for one in untouched]))
     if not np.isfinite(natural):
-        raise MapError(f"behavior '{behavior.name}': the robot fell untouched on seeds {list(seeds)}")
+        raise MapError(
+            f"behavior '{behavior.name}': expected targets near the value without stimulation, but the robot "
+            f"falls before the first one on seeds {list(seeds)}"
+        )
     size = max(_PART * abs(natural), behavior.pid.step)
     return tuple(float(f"{natural + count * size:.4g}") for count in _SIZES)
