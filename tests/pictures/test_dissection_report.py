@@ -151,7 +151,8 @@ def test_text_and_properties_say_what_it_was_made_from(dissection: Dissection, e
     (text,) = entities["/summary"]["TextDocument:text"]
     first = summarise_dissection(dissection)["attributes"][0]
     row = f"| vx | {first['frequency']:.2f} | {first['matches'][0]['unit']} |"
-    for fact in (dissection.policy_hash, f"| seed | {dissection.seed};", "## Probing: measured effects of units", row):
+    heading = "## Probing: measured effects of units"
+    for fact in (dissection.policy_hash, f"| seed | {dissection.seed};", heading, row):
         assert fact in text
     stored = json.loads(entities["/__properties/dissection"]["summary"][0])
     assert stored == summarise_dissection(dissection)
