@@ -47,7 +47,7 @@ def locate_map_policy(
     source = stimulation_map.source
     folder = Path(source).parent
     name = policy or _from_here(stimulation_map.policy, folder, source)
-    merged = import_options.over(stimulation_map.import_options)
+    merged = import_options.or_else(stimulation_map.import_options)
     if merged.normaliser != NO_NORMALISER and not import_options.normaliser:
         merged = replace(merged, normaliser=_from_here(merged.normaliser, folder, source))
     return replace(stimulation_map, policy=name, import_options=merged)

@@ -20,7 +20,7 @@ def test_a_choice_is_one_of_the_known() -> None:
         ImportOptions("sine")
     with pytest.raises(PolicyError, match="unknown squash 'hard'; there are none, tanh, clip"):
         ImportOptions(squash="hard")
-    assert ImportOptions("elu").over(ImportOptions("tanh", "clip")) == ImportOptions("elu", "clip")
+    assert ImportOptions("elu").or_else(ImportOptions("tanh", "clip")) == ImportOptions("elu", "clip")
 
 
 def test_spaces_are_read_from_gymnasium_s() -> None:

@@ -193,7 +193,7 @@ def test_a_hidden_state_is_restored_bit_for_bit() -> None:
     policy.reset()
     assert [policy.act(x).action for x in seen[:10]] == first
     with pytest.raises(
-        PolicyError, match=r"expected a hidden state of shapes \[\(1, 24\), \(1, 24\)\], got \[\]"
+        PolicyError, match=r"expected a recurrent state of shapes \[\(1, 24\), \(1, 24\)\], got \[\]"
     ):
         policy.restore(())
 
@@ -224,9 +224,9 @@ class _Odd(nn.Module):
     [
         (
             lambda: Policy(trained_conv(), (2, SIDE, SIDE)),
-            r"cannot take an observation of shape \(2, 6, 6\) \(without a batch axis, without a hidden",
+            r"cannot take an observation of shape \(2, 6, 6\) \(without a batch axis, without a recurrent",
         ),
-        (lambda: Policy(trained_lstm(), 1), "without a hidden state"),
+        (lambda: Policy(trained_lstm(), 1), "without a recurrent state"),
         (lambda: Policy(_Odd(), 2, initial_state=torch.zeros(3)), r"expected shapes \[\(3,\)\], the"),
         (lambda: Policy(_Odd(), 2, initial_state="zero"), "expected a tensor, or tuples .*, found str"),
         (

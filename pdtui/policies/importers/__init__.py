@@ -1,4 +1,4 @@
-"""Other people's policies: one module a format, none of which runs anything that a file holds."""
+"""Import of policies that other programs wrote, one module per format; nothing in a file is executed."""
 
 from __future__ import annotations
 
@@ -38,22 +38,22 @@ def import_network(
     *,
     normaliser: Path | None = None,
 ) -> PolicyNetwork:
-    """Read somebody else's policy, a multilayer perceptron, as one of pdtui's networks.
+    """Read a multilayer perceptron that another program wrote.
 
     Args:
-        path: the file; its content says what it is, not its name.
-        import_options: what the file may leave open.
-        spaces: of the world that the policy is to act in; gives the bounds that a file may lack.
-        normaliser: file of the statistics of the observation, found already.
+        path: The file, whose format is told by its content.
+        import_options: Answers to what the file leaves open.
+        spaces: Spaces of the world in which the policy is to act; they give bounds that a file may lack.
+        normaliser: File with the statistics of the observation.
 
     Raises:
-        PolicyError: the message says what was found, or which choice is needed.
+        PolicyError: The file cannot be imported; the message says what was found, or which option is needed.
     """
     source = str(path)
     try:
         found = _find(read_bounded(path), source, import_options)
         if normaliser is not None and import_options.normaliser != NO_NORMALISER:
-            found = found.having(read_statistics(normaliser, found.layers[0].shape[1]))
+            found = found.with_statistics(read_statistics(normaliser, found.layers[0].shape[1]))
         return assemble_network(found, import_options, spaces, source)
     except PolicyError as error:
         text = str(error)

@@ -1,8 +1,8 @@
 """CleanRL state dicts, alone or as the first of several in one file.
 
 PPO's actor is ``actor_mean.0 …`` with ``actor_logstd``, or ``actor.0 …`` with logits. SAC's is ``fc1``,
-``fc2``, ``fc_mean``, ``fc_logstd``; that of TD3 and DDPG ends in ``fc_mu``; both keep ``action_scale`` and
-``action_bias``.
+``fc2``, ``fc_mean`` and ``fc_logstd``; TD3's and DDPG's ends in ``fc_mu``. These three also hold
+``action_scale`` and ``action_bias``.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.partial_policy import (
     PartialPolicy,
     check_layer_chain,
+    join_mean_and_deviation,
     read_layer_sequence,
     read_linear_layer,
-    split_mean_and_deviation_head,
 )
 from pdtui.policies.importers.tensor_files import Tensors
 
@@ -23,10 +23,10 @@ _FIRST = re.compile(r"(?:(0|actor)\.)?(?=(?:actor_mean|fc1)\.)")
 
 
 def import_cleanrl(tensors: Tensors) -> PartialPolicy | None:
-    """The actor of a CleanRL state dict; None if it is named otherwise.
+    """Return the actor of a CleanRL state dict; None if the tensors have other names.
 
     Raises:
-        PolicyError: shapes that do not go together.
+        PolicyError: The shapes do not fit each other.
     """
     prefixes = {match[0] for name in tensors if (match := _FIRST.match(name))}
     prefix = min(prefixes, key=len, default="")
@@ -49,9 +49,7 @@ def _off_policy(named: Tensors, last: str) -> PartialPolicy:
     if last == "fc_mu":
         layers = check_layer_chain([*hidden, read_linear_layer(named, last)], "fc")
         return PartialPolicy("CleanRL TD3 or DDPG", layers, squash="tanh", low=low, high=high)
-    head = split_mean_and_deviation_head(
-        read_linear_layer(named, last), read_linear_layer(named, "fc_logstd")
-    )
+    head = join_mean_and_deviation(read_linear_layer(named, last), read_linear_layer(named, "fc_logstd"))
     return PartialPolicy(
         "CleanRL SAC",
         check_layer_chain([*hidden, head], "fc"),

@@ -1,4 +1,4 @@
-"""What a file is, by its first bytes, whatever its name says."""
+"""The kind of a file, told by its first bytes and not by its name."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class FileKind(Enum):
-    """Kinds of files that weights come in, with words for messages."""
+    """Kinds of files, with their descriptions for messages."""
 
     ZIP = "a zip archive"
     SAFETENSORS = "safetensors"
@@ -19,7 +19,7 @@ class FileKind(Enum):
 
 
 def file_kind_of(content: bytes) -> FileKind:
-    """The kind of a file with this content."""
+    """Return the kind of a file with this content."""
     if not content:
         return FileKind.EMPTY
     if content.startswith(b"PK\x03\x04") or content.startswith(b"PK\x05\x06"):
@@ -30,7 +30,7 @@ def file_kind_of(content: bytes) -> FileKind:
         return FileKind.GZIP
     if content[8:9] == b"{" and 0 < int.from_bytes(content[:8], "little") < len(content):
         return FileKind.SAFETENSORS
-    # Protocol 2 and later say so; the older ones are text that ends in a full stop.
+    # Pickles of protocol 2 and later say so; older ones are text that ends in a full stop.
     if content[:1] == b"\x80" and content[1:2] in b"\x02\x03\x04\x05":
         return FileKind.PICKLE
     if content[:1] in b"(c]})l" and content.rstrip().endswith(b".") and content[:1] != b"{":

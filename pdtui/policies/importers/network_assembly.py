@@ -1,4 +1,4 @@
-"""From what a file states, the user's choices and the world's spaces to a network that is whole."""
+"""Assembly of a network from what its file states, the import options and the world's spaces."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from pdtui.policies.weights.policy_network import Head, NetworkSpec, PolicyNetwo
 def assemble_network(
     found: PartialPolicy, import_options: ImportOptions, spaces: WorldSpaces | None, source: str
 ) -> PolicyNetwork:
-    """Complete what was found; what is still open then is asked for.
+    """Return the network of a policy, completed by the options and the world's spaces.
 
     Raises:
-        PolicyError: something is open, and the message lists the choices; or the shapes do not fit the world.
+        PolicyError: Something is still open, and the message says which option answers it; or the shapes do
+            not fit the world.
     """
     if len(found.layers) < 2:
         raise PolicyError(
@@ -53,7 +54,7 @@ def assemble_network(
 
 
 def _output(found: PartialPolicy, spaces: WorldSpaces | None) -> str:
-    """What the head puts out; where the file leaves it open, by the world's spaces."""
+    """Return what the head's outputs are; the world's spaces decide where the file does not say."""
     if found.output != "unknown pair":
         return found.output
     outputs = found.layers[-1].shape[0]
@@ -116,5 +117,7 @@ def _tensors(found: PartialPolicy, network: PolicyNetwork, source: str) -> dict[
         tensors["normaliser.mean"] = found.statistics.mean.float()
         tensors["normaliser.std"] = found.statistics.std.float()
         if bool((found.statistics.std <= 0).any()):
-            raise PolicyError(f"{source}: statistics of the observation: expected positive deviations")
+            raise PolicyError(
+                f"{source}: statistics of the observation: expected positive standard deviations"
+            )
     return tensors

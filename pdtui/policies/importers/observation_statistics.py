@@ -1,8 +1,8 @@
-"""Running statistics of the observation from a file: ``.npz``, ``.json`` or ``.safetensors``.
+"""Running statistics of observations, read from an ``.npz``, ``.json`` or ``.safetensors`` file.
 
-It holds ``mean`` and ``var``, each (observations,), and optionally ``clip_obs`` and ``epsilon``: the
-observation becomes ``clip((o − mean) / sqrt(var + epsilon), ± clip_obs)``, as VecNormalize of
-Stable-Baselines3 does it. With ``std`` instead of ``var`` it is divided by that.
+The file holds ``mean`` and ``var``, each of shape (observations,), and optionally ``clip_obs`` and
+``epsilon``. An observation o becomes ``clip((o − mean) / sqrt(var + epsilon), ± clip_obs)``, as in
+VecNormalize of Stable-Baselines3. A file may hold ``std`` instead of ``var``; then o − mean is divided by it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from pdtui.policies.importers.tensor_files import Tensors, flatten_tensors, from
 from pdtui.policies.importers.zip_archive import ZipArchive, read_bounded
 
 _EPSILON = 1e-8
+"""The default of VecNormalize."""
 HOW_TO_CONVERT = (
     "in the Python that trained it: v = VecNormalize.load(FILE, env); numpy.savez('normaliser.npz', "
     "mean=v.obs_rms.mean, var=v.obs_rms.var, clip_obs=v.clip_obs, epsilon=v.epsilon)"
@@ -27,10 +28,10 @@ HOW_TO_CONVERT = (
 
 
 def read_statistics(path: Path, observations: int) -> ObservationStatistics:
-    """Statistics of observations of this length.
+    """Read the statistics of observations of this length.
 
     Raises:
-        PolicyError: unreadable, a pickle, or of another shape.
+        PolicyError: The file cannot be read, is a pickle, or holds statistics of another shape.
     """
     tensors = _tensors(path)
     if "mean" not in tensors or not {"var", "std"} & tensors.keys():
@@ -46,7 +47,7 @@ def read_statistics(path: Path, observations: int) -> ObservationStatistics:
                 f"{tuple(tensor.shape)}"
             )
         if not bool(torch.isfinite(tensor).all()) or (name != "mean" and bool((tensor < 0).any())):
-            raise PolicyError(f"{path}: '{name}': expected finite numbers, variances not below 0")
+            raise PolicyError(f"{path}: '{name}': expected finite numbers and no negative variance")
     clip, epsilon = _number(tensors, "clip_obs", 0.0, path), _number(tensors, "epsilon", _EPSILON, path)
     std = torch.sqrt(spread.double() + epsilon) if "var" in tensors else spread.double()
     return ObservationStatistics(mean.float(), std.float(), clip)
@@ -84,5 +85,5 @@ def _number(tensors: Tensors, name: str, default: float, path: Path) -> float:
         return default
     tensor = tensors[name]
     if tensor.numel() != 1 or not math.isfinite(float(tensor)) or float(tensor) < 0:
-        raise PolicyError(f"{path}: '{name}': expected one number, not below 0")
+        raise PolicyError(f"{path}: '{name}': expected one number that is not negative")
     return float(tensor)

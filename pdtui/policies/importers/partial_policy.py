@@ -1,4 +1,4 @@
-"""What an importer found in a file, before the user's choices and the world's spaces complete it."""
+"""A policy as far as its file states it; import options and the world's spaces complete it."""
 
 from __future__ import annotations
 
@@ -15,29 +15,30 @@ from pdtui.policies.importers.tensor_files import Tensors
 from pdtui.policies.importers.zip_archive import shorten
 
 MAX_WIDTH = 1_000_000
+"""Inputs or outputs of a layer, beyond which a file is damaged or hostile."""
 OutputKind = Literal["action", "categorical", "gaussian pair", "unknown pair"]
 
 
 @dataclass(frozen=True)
 class LinearLayer:
-    """One layer ``x ↦ weight x + bias``: weight (outputs, inputs), bias (outputs,)."""
+    """A layer ``x ↦ weight x + bias``: weight of shape (outputs, inputs), bias of shape (outputs,)."""
 
     weight: torch.Tensor
     bias: torch.Tensor
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Outputs, inputs."""
+        """Number of outputs and of inputs."""
         return self.weight.shape[0], self.weight.shape[1]
 
 
 @dataclass(frozen=True)
 class ObservationStatistics:
-    """Running statistics of the observation.
+    """Running statistics by which observations are normalised.
 
     Attributes:
-        mean, std: shape (observations,).
-        clip: the normalised observation is clipped to ± this; 0 for no limit.
+        mean, std: Mean and standard deviation, shape (observations,).
+        clip: Limit of the magnitude of normalised observations; 0 for none.
     """
 
     mean: torch.Tensor
@@ -50,18 +51,17 @@ class PartialPolicy:
     """A policy as far as its file states it.
 
     Attributes:
-        origin: which program wrote it, in words.
-        layers: in their order; the last one is the head.
-        output: what the head puts out: the ``action`` or its mean; logits of a ``categorical`` choice; a
-            ``gaussian pair`` of mean and log standard deviation; an ``unknown pair`` may be either of the
-            first two or a pair, which the world's spaces decide.
-        activation: empty where the file does not say.
-        squash: ``none``, ``tanh`` or ``clip``; empty where the file does not say.
-        low, high: bounds of the action; empty where the file does not say.
-        log_std: shape (actions,), where it is a parameter.
-        log_std_low, log_std_high, log_std_rule: as in `NetworkSpec`.
-        mean_limit: as in `NetworkSpec`.
-        statistics: of the observation.
+        origin: The program that wrote the file, for messages.
+        layers: All layers in order; the last one is the head.
+        output: What the head's outputs are: the ``action`` or its mean, the logits of a ``categorical``
+            distribution, or a ``gaussian pair`` of mean and log standard deviation. With ``unknown pair``,
+            the world's spaces decide which of these.
+        activation: Activation function; empty where the file does not state it.
+        squash: ``none``, ``tanh`` or ``clip``; empty where the file does not state it.
+        low, high: Bounds of the action; empty where the file does not state them.
+        log_std: Log standard deviation, shape (actions,), where it is a parameter.
+        log_std_low, log_std_high, log_std_rule, mean_limit: As in `NetworkSpec`.
+        statistics: Statistics of the observation, if the policy normalises it.
     """
 
     origin: str
@@ -78,16 +78,16 @@ class PartialPolicy:
     mean_limit: float = 0.0
     statistics: ObservationStatistics | None = None
 
-    def having(self, statistics: ObservationStatistics | None) -> PartialPolicy:
-        """The same, normalised with these statistics, if any."""
+    def with_statistics(self, statistics: ObservationStatistics | None) -> PartialPolicy:
+        """Return the policy with these statistics instead of its own; None keeps its own."""
         return self if statistics is None else replace(self, statistics=statistics)
 
 
 def read_linear_layer(tensors: Tensors, prefix: str) -> LinearLayer:
-    """The layer ``prefix.weight`` with ``prefix.bias``, zero where there is none.
+    """Return the layer of ``PREFIX.weight`` and ``PREFIX.bias``; a missing bias is zero.
 
     Raises:
-        PolicyError: the weight is missing, or shapes do not go together.
+        PolicyError: The weight is missing, or the shapes do not fit each other.
     """
     weight = tensors.get(f"{prefix}.weight")
     if weight is None or weight.ndim != 2 or 0 in weight.shape or max(weight.shape) > MAX_WIDTH:
@@ -102,10 +102,10 @@ def read_linear_layer(tensors: Tensors, prefix: str) -> LinearLayer:
 
 
 def read_layer_sequence(tensors: Tensors, prefix: str) -> tuple[LinearLayer, ...]:
-    """The layers ``prefix.0``, ``prefix.2``, … in the order of their numbers.
+    """Return the layers ``PREFIX.0``, ``PREFIX.2``, … in the order of their numbers.
 
     Raises:
-        PolicyError: as `read_linear_layer`; or widths that do not go on from layer to layer.
+        PolicyError: As for `read_linear_layer` and `check_layer_chain`.
     """
     numbers = re.compile(rf"{re.escape(prefix)}\.(\d{{1,6}})\.weight")
     found = sorted({int(match[1]) for name in tensors if (match := numbers.fullmatch(name))})
@@ -113,10 +113,10 @@ def read_layer_sequence(tensors: Tensors, prefix: str) -> tuple[LinearLayer, ...
 
 
 def check_layer_chain(layers: Iterable[LinearLayer], where: str) -> tuple[LinearLayer, ...]:
-    """The layers, seen to go on from one to the next.
+    """Return the layers, after checking that each takes what the one before puts out.
 
     Raises:
-        PolicyError: a layer takes in another width than the one before puts out.
+        PolicyError: Two successive layers do not fit each other.
     """
     chain = tuple(layers)
     for number, (before, after) in enumerate(pairwise(chain)):
@@ -128,11 +128,11 @@ def check_layer_chain(layers: Iterable[LinearLayer], where: str) -> tuple[Linear
     return chain
 
 
-def split_mean_and_deviation_head(mean: LinearLayer, log_std: LinearLayer) -> LinearLayer:
-    """One head that puts out the mean and then the log standard deviation.
+def join_mean_and_deviation(mean: LinearLayer, log_std: LinearLayer) -> LinearLayer:
+    """Return one head that puts out the mean, then the log standard deviation.
 
     Raises:
-        PolicyError: the two have different shapes.
+        PolicyError: The two layers have different shapes.
     """
     if mean.shape != log_std.shape:
         raise PolicyError(f"heads of mean and log std: shapes {mean.shape} and {log_std.shape} differ")
@@ -140,5 +140,5 @@ def split_mean_and_deviation_head(mean: LinearLayer, log_std: LinearLayer) -> Li
 
 
 def describe_tensors(tensors: Tensors) -> str:
-    """Names and shapes, for messages."""
+    """List names and shapes for messages."""
     return shorten([f"{name} {tuple(tensor.shape)}" for name, tensor in tensors.items()])

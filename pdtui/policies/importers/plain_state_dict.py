@@ -1,4 +1,4 @@
-"""A plain state dict: one chain of linear layers, whatever its names."""
+"""A plain state dict: one chain of linear layers with any names."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _NUMBERED = re.compile(r"(.*?)[._]?(\d{1,6})")
 
 
 def import_plain_state_dict(tensors: Tensors, source: str) -> PartialPolicy:
-    """The only chain of linear layers, or the only one whose names say that it acts.
+    """Return the only chain of linear layers, or the only one whose names say that it is the actor.
 
     Layers are taken in the order of the file, those of one container in the order of their numbers.
 
     Raises:
-        PolicyError: there is no chain, or several; the message names what was found.
+        PolicyError: There is no such chain, or more than one; the message lists what was found.
     """
     own = {name: tensor for name, tensor in tensors.items() if not _OTHER.search(name.lower())}
     named = {name: tensor for name, tensor in own.items() if _ACTOR.search(name.lower())}
@@ -50,7 +50,7 @@ def import_plain_state_dict(tensors: Tensors, source: str) -> PartialPolicy:
 
 
 def _chains(tensors: Tensors) -> list[tuple[tuple[LinearLayer, ...], list[str]]]:
-    """Layers that follow on one another, as chains; a layer whose inputs do not fit begins the next."""
+    """Return successive layers as chains; a layer whose inputs do not fit begins a new one."""
     chains: list[tuple[tuple[LinearLayer, ...], list[str]]] = []
     for name in _ordered(tensors):
         layer = read_linear_layer(tensors, name)

@@ -1,8 +1,8 @@
-"""RLlib weights, as its TensorFlow policies name them, in an ``.npz``.
+"""RLlib weights in an ``.npz``, named as in RLlib's TensorFlow policies.
 
-Kernels are stored (inputs, outputs). SAC's actor is ``…/action_1 … action_out``, a mean and a log standard
-deviation squashed by tanh; PPO's is ``…/fc_1 … fc_out``, whose outputs are such a pair,
-or the logits of a choice.
+Kernels have the shape (inputs, outputs). SAC's actor is ``…/action_1 … action_out``; it puts out a mean and a
+log standard deviation, squashed by tanh. PPO's actor is ``…/fc_1 … fc_out``; it puts out such a pair, or
+logits of discrete actions.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ _PPO = re.compile(r"(.*?/?)(fc)_(\d{1,4}|out)/kernel")
 
 
 def import_rllib(tensors: Tensors) -> PartialPolicy | None:
-    """The policy in RLlib's weights; None if they are named otherwise.
+    """Return the policy in RLlib's weights; None if the tensors have other names.
 
-    A policy and its target network have the same layers: the first in the file acts.
+    A policy and its target network have the same layers; the first in the file is the policy.
 
     Raises:
-        PolicyError: shapes that do not go together.
+        PolicyError: The shapes do not fit each other.
     """
     for pattern, output, squash, log_std_range in (
         (_SAC, "gaussian pair", "tanh", (-5.0, 2.0)),

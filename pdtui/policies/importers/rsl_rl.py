@@ -1,6 +1,6 @@
-"""rsl_rl weights: a checkpoint ``.pt``, or its tensors as an ``.npz`` or ``.safetensors``.
+"""rsl_rl weights: a checkpoint ``.pt``, or its tensors in an ``.npz`` or ``.safetensors``.
 
-Three generations of names are read: ``actor.0.weight`` with ``std`` or ``log_std``; the same with
+Three generations of names are understood: ``actor.0.weight`` with ``std`` or ``log_std``; the same with
 ``actor_obs_normalizer``, or statistics under ``obs_norm_state_dict``; and ``actor_state_dict`` with
 ``mlp.0.weight`` and ``distribution.std_param``.
 """
@@ -20,10 +20,10 @@ _NORMALISERS = ("actor_obs_normalizer", "obs_normalizer", "obs_norm_state_dict")
 
 
 def import_rsl_rl(tensors: Tensors) -> PartialPolicy | None:
-    """The actor of rsl_rl's weights; None if they are named otherwise.
+    """Return the actor in rsl_rl's weights; None if the tensors have other names.
 
     Raises:
-        PolicyError: shapes that do not go together.
+        PolicyError: The shapes do not fit each other.
     """
     named = _unwrapped(tensors)
     prefix = next((prefix for prefix in ("actor", "mlp") if f"{prefix}.0.weight" in named), None)
@@ -40,7 +40,7 @@ def import_rsl_rl(tensors: Tensors) -> PartialPolicy | None:
 
 
 def _unwrapped(tensors: Tensors) -> Tensors:
-    """Names without the checkpoint around them; those of the critic and of optimisers stay as they are."""
+    """Return the tensors without the prefixes that a checkpoint puts before the actor's names."""
     named: Tensors = {}
     for name, tensor in tensors.items():
         for wrapper in ("model_state_dict.", "actor_state_dict."):

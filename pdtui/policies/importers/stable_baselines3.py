@@ -1,8 +1,8 @@
-"""Stable-Baselines3 ``.zip``: PPO, A2C, SAC, TD3 and DDPG with an MlpPolicy.
+"""Stable-Baselines3 ``.zip`` files: PPO, A2C, SAC, TD3 and DDPG with an MlpPolicy.
 
-The archive holds ``data``, a JSON of readable fields beside pickles in base64, and ``policy.pth``, the
-tensors. Only the readable fields are read: for a pickled object, Stable-Baselines3 writes the text of each of
-its parts beside the pickle, which is where the activation function and the bounds of the action stand.
+The archive holds ``data``, JSON with readable fields beside pickles in base64, and ``policy.pth``, the
+tensors. The pickles are ignored: beside each, Stable-Baselines3 writes the parts of the object as text, and
+the activation function and the bounds of the action are read from there.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from pdtui.policies.importers.partial_policy import (
     PartialPolicy,
     check_layer_chain,
     describe_tensors,
+    join_mean_and_deviation,
     read_layer_sequence,
     read_linear_layer,
-    split_mean_and_deviation_head,
 )
 from pdtui.policies.importers.tensor_files import Tensors, flatten_tensors, from_torch
 from pdtui.policies.importers.zip_archive import ZipArchive
@@ -36,20 +36,19 @@ OTHER_NETWORKS = "export such a network as TorchScript, or load it from Python"
 
 
 def is_sb3(names: tuple[str, ...]) -> bool:
-    """Whether these are the entries of a Stable-Baselines3 archive."""
+    """Return whether these are the entries of a Stable-Baselines3 archive."""
     return "data" in names and "policy.pth" in names
 
 
 def import_sb3(archive: ZipArchive, import_options: ImportOptions) -> PartialPolicy:
-    """The policy of a Stable-Baselines3 archive.
+    """Return the policy of a Stable-Baselines3 archive.
 
     Args:
-        archive: the open file.
-        import_options: only to see whether the statistics of VecNormalize, which are not in the file,
-            were given.
+        archive: The archive.
+        import_options: Tell whether the user gave the statistics of VecNormalize, which the archive lacks.
 
     Raises:
-        PolicyError: no MlpPolicy of the algorithms above, or a damaged file.
+        PolicyError: The policy is not an MlpPolicy of the algorithms above, or the file is damaged.
     """
     source, data = archive.source, _data(archive)
     tensors = flatten_tensors(from_torch(archive.read("policy.pth"), f"{source}: policy.pth"))
@@ -126,7 +125,7 @@ class _Reader:
         activation, (low, high) = self._activation("relu"), self._bounds()
         origin = self._origin("SAC")
         if "actor.log_std.weight" in self._tensors:
-            head = split_mean_and_deviation_head(
+            head = join_mean_and_deviation(
                 read_linear_layer(self._tensors, "actor.mu"),
                 read_linear_layer(self._tensors, "actor.log_std"),
             )
@@ -149,18 +148,18 @@ class _Reader:
         return PartialPolicy(origin, layers, "action", activation, "tanh", low, high, mean_limit=limit)
 
     def _activation(self, default: str) -> str:
-        """What `policy_kwargs` says; else the default, where Stable-Baselines3's own class surely had it."""
+        """Return what `policy_kwargs` says, else the default of Stable-Baselines3's own policy classes."""
         text = self._kwargs.get("activation_fn")
         if text is None:
             module = str(_parts(self._data, "policy_class").get("__module__", ""))
             return default if module.startswith("stable_baselines3.") else ""
         match = _CLASS.fullmatch(str(text))
         kind = getattr(nn, match[1].rpartition(".")[2], None) if match else None
-        # An activation that pdtui does not know is asked for, as one that is not stated.
+        # The user is asked for an activation function that is unknown, as for one that is not stated.
         return next((name for name, known in ACTIVATIONS.items() if known is kind), "")
 
     def _bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Bounds of the action space as its text says, none where that is shortened or unbounded."""
+        """Return the bounds of the action space; none where its text is abbreviated or says infinity."""
         low, high = (_numbers(self._actions.get(side)) for side in ("low", "high"))
         return ((), ()) if self._unbounded() or len(low) != len(high) else (low, high)
 
@@ -192,7 +191,7 @@ def _data(archive: ZipArchive) -> dict[str, Any]:
 
 
 def _check_flat(tensors: Tensors, data: dict[str, Any], source: str) -> None:
-    """Refuse networks that look at images, dictionaries or the past."""
+    """Refuse networks that observe images or dictionaries, or that are recurrent."""
     for name, tensor in tensors.items():
         if "features_extractor." in name or "lstm" in name or tensor.ndim > 2:
             raise PolicyError(
@@ -202,7 +201,7 @@ def _check_flat(tensors: Tensors, data: dict[str, Any], source: str) -> None:
 
 
 def _parts(data: dict[str, Any], name: str) -> dict[str, Any]:
-    """The readable parts of a field; its pickle is left alone."""
+    """Return the readable parts of a field, without its pickle."""
     value = data.get(name)
     if not isinstance(value, dict):
         return {}

@@ -1,8 +1,8 @@
-"""Named tensors out of ``.npz``, ``.safetensors`` and PyTorch's archives; nothing in them is run.
+"""Named tensors from ``.npz``, ``.safetensors`` and PyTorch archives; nothing in the files is executed.
 
-PyTorch stores the names of its tensors in a pickle. It is read by `torch.load(weights_only=True)`: that is
-not the unpickler of Python but one that knows tensors, containers and numbers only, and calls nothing else
-that the file names. Older PyTorch files that are one bare pickle are refused, as every other pickle is.
+PyTorch stores the names of tensors in a pickle. It is read by `torch.load(weights_only=True)`, which is not
+Python's unpickler: it understands only tensors, containers and numbers, and calls nothing else that the file
+names. Old PyTorch files that are a bare pickle are refused, like every other pickle.
 """
 
 from __future__ import annotations
@@ -23,15 +23,18 @@ from pdtui.policies.importers.zip_archive import ZipArchive
 
 Tensors = dict[str, torch.Tensor]
 _MAX_NESTING = 6
+"""Levels of containers that are searched for tensors."""
 _MAX_PICKLE = 64 << 20
+"""Bytes of the pickle with the names of tensors."""
 _MAX_HEADER = 10_000
+"""Bytes of an array's header."""
 
 
 def from_npz(archive: ZipArchive) -> Tensors:
-    """Arrays of an ``.npz``, in the order of the file; arrays of Python objects are refused.
+    """Return the arrays of an ``.npz`` in the order of the file; arrays of Python objects are refused.
 
     Raises:
-        PolicyError: an entry is no array of numbers, or its shape does not fit its bytes.
+        PolicyError: An entry is not an array of numbers, or its shape does not fit its size.
     """
     return {
         name.removesuffix(".npy"): torch.from_numpy(_array(archive.read(name), f"{archive.source}: '{name}'"))
@@ -50,7 +53,7 @@ def _array(content: bytes, where: str) -> np.ndarray[Any, Any]:
         raise PolicyError(f"{where}: not an array that NumPy wrote: {error}") from error
     if kind.hasobject:
         raise PolicyError(
-            f"{where}: holds Python objects, which only unpickling could read; pdtui never does"
+            f"{where}: holds Python objects, which could only be read by unpickling; pdtui never unpickles"
         )
     if kind.kind not in "fiub":
         raise PolicyError(f"{where}: expected numbers, found {kind}")
@@ -63,10 +66,10 @@ def _array(content: bytes, where: str) -> np.ndarray[Any, Any]:
 
 
 def from_safetensors(content: bytes, source: str) -> Tensors:
-    """Tensors of a safetensors file.
+    """Return the tensors of a safetensors file.
 
     Raises:
-        PolicyError: it is cut off or damaged.
+        PolicyError: The file is cut off or damaged.
     """
     try:
         tensors: Tensors = load_safetensors(content)
@@ -76,10 +79,10 @@ def from_safetensors(content: bytes, source: str) -> Tensors:
 
 
 def from_torch(content: bytes, source: str) -> dict[str, Any]:
-    """What a PyTorch archive holds: tensors, and containers and numbers around them; see `flatten_tensors`.
+    """Return what a PyTorch archive holds: tensors inside containers, for `flatten_tensors`.
 
     Raises:
-        PolicyError: no such archive, packed, damaged, or with other objects than tensors in it.
+        PolicyError: The file is not such an archive, is compressed or damaged, or holds other objects.
     """
     archive = ZipArchive(content, source)
     with zipfile.ZipFile(io.BytesIO(content)) as packed:
@@ -95,22 +98,22 @@ def from_torch(content: bytes, source: str) -> dict[str, Any]:
 
 
 def _reason(error: Exception) -> str:
-    """Why PyTorch's safe reader gave up, in one line."""
+    """Return in one line why PyTorch's safe reader gave up."""
     text = str(error)
     found = next((line.strip() for line in text.splitlines() if "GLOBAL" in line), "")
     if found:
         return (
-            f"holds other objects than tensors, which pdtui does not load ({found[:160]}); save the state "
+            f"holds objects other than tensors, which pdtui does not load ({found[:160]}); save the state "
             "dict alone: torch.save(model.state_dict(), FILE)"
         )
     return f"a PyTorch file that is cut off or damaged: {text.splitlines()[0].split('. ')[0][:160]}"
 
 
 def flatten_tensors(content: Any, prefix: str = "", depth: int = 0) -> Tensors:
-    """All tensors below nested containers, by dotted names, float32 where they are floating point.
+    """Return all tensors in nested containers by dotted names, floating-point ones as float32.
 
     Raises:
-        PolicyError: a tensor claims more numbers than it stores.
+        PolicyError: A tensor claims more numbers than it stores.
     """
     if isinstance(content, torch.Tensor):
         return {prefix: _checked(content, prefix)}

@@ -1,4 +1,4 @@
-"""Zip archives from anywhere: sizes are bounded before anything is unpacked."""
+"""Zip archives from untrusted sources: sizes are checked before anything is unpacked."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class ZipArchive:
     """The entries of a zip file.
 
     Args:
-        content: the whole file.
-        source: its name, for messages.
+        content: The whole file.
+        source: Its name, for messages.
 
     Raises:
-        PolicyError: it is no whole zip file, or would unpack to more than is bearable.
+        PolicyError: The file is not a whole zip file, or would unpack to too many bytes.
     """
 
     def __init__(self, content: bytes, source: str) -> None:
@@ -32,7 +32,7 @@ class ZipArchive:
         except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError) as error:
             raise PolicyError(f"{source}: a zip file that is cut off or damaged: {error}") from error
         if min((info.header_offset for info in self._zip.infolist()), default=0) > 0:
-            # The directory that was found is that of an archive inside, its own being gone.
+            # The directory found is that of an archive inside; the file's own is missing.
             raise PolicyError(
                 f"{source}: a zip file that is cut off or damaged: it has no directory of its own"
             )
@@ -46,10 +46,10 @@ class ZipArchive:
             )
 
     def read(self, name: str) -> bytes:
-        """Unpack one entry; never more than the archive's directory says that it holds.
+        """Unpack one entry, but no more bytes than the archive's directory states.
 
         Raises:
-            PolicyError: it is not there, encrypted, damaged or larger than the directory says.
+            PolicyError: The entry is missing, encrypted, damaged or larger than stated.
         """
         if name not in self._entries:
             raise PolicyError(f"{self.source}: no entry '{name}'; there are {self.listing()}")
@@ -73,22 +73,22 @@ class ZipArchive:
         return content
 
     def listing(self) -> str:
-        """The entries in words, for messages."""
+        """List the entries for messages."""
         return shorten(self.names)
 
 
 def shorten(names: tuple[str, ...] | list[str]) -> str:
-    """The first names, and how many more there are; printable whatever they hold."""
+    """List the first names and how many more there are, all printable."""
     shown = [name if name.isprintable() else ascii(name) for name in names[:_SHOWN]]
     more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
     return (", ".join(name[:80] for name in shown) or "nothing") + more
 
 
 def read_bounded(path: Path) -> bytes:
-    """A whole file of bearable size.
+    """Return the content of a file.
 
     Raises:
-        PolicyError: it cannot be read, or is too large.
+        PolicyError: The file cannot be read, or is too large.
     """
     try:
         size = path.stat().st_size

@@ -1,4 +1,4 @@
-"""From a network's output to an action."""
+"""Decoders, which turn the output of a network into an action."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ Decoder = Callable[[torch.Tensor, np.random.Generator | None], _Floats]
 
 
 def mean_action(output: torch.Tensor, rng: np.random.Generator | None) -> NDArray[np.float32]:
-    """The network's output is the action."""
+    """Take the network's output as the action."""
     del rng
     action: NDArray[np.float32] = output.reshape(-1).numpy().astype(np.float32)
     return action
 
 
 def categorical(output: torch.Tensor, rng: np.random.Generator | None) -> NDArray[np.float32]:
-    """The network's output are the logits of discrete actions; the action is an index, shape (1,).
+    """Take the network's output as logits of discrete actions; the action is an index, shape (1,).
 
-    Without a generator the likeliest action is taken (the first of equals), with one it is drawn from the
-    softmax of the logits.
+    Without a generator, the most likely action is taken, the first among equals; with one, it is drawn from
+    the softmax of the logits.
     """
     logits = output.reshape(-1).numpy().astype(np.float64)
     if rng is None:
@@ -37,9 +37,9 @@ def categorical(output: torch.Tensor, rng: np.random.Generator | None) -> NDArra
 
 
 def decoder_for(network: PolicyNetwork) -> Decoder:
-    """How this network's output becomes an action, float32, inside its bounds.
+    """Return the decoder of a network: its actions are float32 and inside the bounds.
 
-    The action is shape (actions,), or (1,) with the number of the choice where actions are discrete.
+    Actions have the shape (actions,), or (1,) with an index where actions are discrete.
     """
     spec = network.spec
     if spec.head == "categorical":

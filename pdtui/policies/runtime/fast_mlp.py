@@ -1,7 +1,7 @@
-"""A small network computed in arrays that stay in place.
+"""Fast forward passes of small multilayer perceptrons.
 
-In a control step the simulator runs between two passes, so that each call finds cold caches: fewer calls, and
-the same memory every time, halve what a pass costs.
+In a drive, the simulator runs between two passes, so each call meets cold caches. Fewer calls that reuse the
+same memory take half the time of a pass.
 """
 
 from __future__ import annotations
@@ -30,10 +30,11 @@ ACTIVATION_TYPES: tuple[type[nn.Module], ...] = (
 )
 
 _TRIALS = 8
+"""Observations on which the fast pass is compared with the module."""
 
 
 class _Part(NamedTuple):
-    """What computes one layer of units, flat indices low to high − 1."""
+    """The calls that compute one layer of units, with flat indices low to high − 1."""
 
     calls: tuple[Callable[[], Any], ...]
     low: int
@@ -41,14 +42,14 @@ class _Part(NamedTuple):
 
 
 class FastMlp:
-    """Stages that are called one after the other with one vector.
+    """A network of stages that are called one after the other with one vector.
 
     Args:
-        stages: the submodules in their order, none of them with submodules of its own.
-        observations: length of the observation.
+        stages: Submodules in order, none of them with submodules of its own.
+        observations: Length of the observation.
 
     Raises:
-        RuntimeError: the stages do not fit each other.
+        RuntimeError: The stages do not fit each other.
     """
 
     def __init__(self, stages: list[nn.Module], observations: int) -> None:
@@ -76,11 +77,11 @@ class FastMlp:
     def run(
         self, observation: NDArray[Any], stimulation: Stimulation
     ) -> tuple[torch.Tensor, NDArray[np.float32], dict[int, float]]:
-        """One pass.
+        """Run one forward pass.
 
         Returns:
-            The output, which the next pass overwrites; all activations; and what each stimulated unit that
-            exists would have put out.
+            The output, which the next pass overwrites; all activations; and the natural output of each
+            stimulated unit that exists.
         """
         self._input[:] = observation
         values = self._activations
@@ -99,10 +100,10 @@ class FastMlp:
 
 
 def fast_mlp_of(module: nn.Module, observations: int) -> FastMlp | None:
-    """The module as such a chain, if it is one and gives the module's own bits on a few observations.
+    """Return the module as a `FastMlp`; None unless that gives the same bits on a few observations.
 
-    A module can be one if it is an `nn.Sequential` of unnamed layers, or has a method ``stages()`` that lists
-    its submodules in their order.
+    The module must be an `nn.Sequential` of unnamed layers, or have a method ``stages()`` that returns its
+    submodules in order.
     """
     if isinstance(module, nn.Sequential) and all(name.isdigit() for name, _ in module.named_children()):
         stages: list[nn.Module] = list(module)
@@ -114,7 +115,7 @@ def fast_mlp_of(module: nn.Module, observations: int) -> FastMlp | None:
         return None
     try:
         chain = FastMlp(stages, observations)
-    except (RuntimeError, TypeError, ValueError, IndexError):  # the module says so itself when it is tried
+    except (RuntimeError, TypeError, ValueError, IndexError):  # trying the module itself gives the error
         return None
     rng = np.random.default_rng(0)
     for observation in rng.normal(size=(_TRIALS, observations)).astype(np.float32):
@@ -126,7 +127,7 @@ def fast_mlp_of(module: nn.Module, observations: int) -> FastMlp | None:
 
 
 def _is_plain(stage: nn.Module) -> bool:
-    """Whether calling the stage is all that it takes, and its weights, if it has any, are a `nn.Linear`'s."""
+    """Return whether the stage is a plain call, and any weights of it are those of an `nn.Linear`."""
     if next(stage.children(), None) is not None or stage._forward_hooks or stage._forward_pre_hooks:
         return False
     if getattr(stage, "is_activation", False):
@@ -147,7 +148,7 @@ def _widths(stages: list[nn.Module], observations: int) -> list[int]:
 
 
 def _call(stage: nn.Module, x: torch.Tensor, out: torch.Tensor) -> Callable[[], Any]:
-    """Computes the stage into `out`; where x is `out`, in place."""
+    """Return a call that computes the stage into `out`, in place where `x` is `out`."""
     if type(stage) is nn.Linear and stage.bias is not None:
         return partial(torch.addmv, stage.bias.detach(), stage.weight.detach(), x, out=out)
     if type(stage) is nn.Tanh:

@@ -1,4 +1,4 @@
-"""A policy from a network that is held in memory."""
+"""Policies from networks in memory."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pdtui.policies.runtime.policy import Policy
 
 
 def hash_network(module: nn.Module) -> str:
-    """SHA-256 of a network's structure (as it prints itself) and of its weights and buffers, hexadecimal."""
+    """Return the SHA-256 of a network's printed structure, weights and buffers, as hexadecimal digits."""
     digest = hashlib.sha256(str(module).encode())
     for name, tensor in sorted(module.state_dict().items()):
         array = tensor.detach().cpu().contiguous()
@@ -38,21 +38,21 @@ def policy_from_network(
     name: str = "",
     sha256: str = "",
 ) -> Policy:
-    """A policy that acts with the network as it is now; later changes of the weights do not reach it.
+    """Return a policy that acts with a copy of the network as it is now.
 
     Args:
-        module: the network, on the CPU; what it has to be like is said at `Policy`.
-        observation_space: of the world, for the shape of the observation.
-        action_space: of the world: where it is discrete, the network's output are the logits of the choices,
-            else the output is the action.
-        observations: length or shape of the observation, instead of the world's.
-        hidden, batched, initial_state: as for `Policy`.
-        decode: turns the output into an action, instead of what the action space says.
-        name: for messages and maps; by default that of the module's class.
-        sha256: of the file that it came from; by default `hash_network`.
+        module: The network, on the CPU; `Policy` says what it must be like.
+        observation_space: The world's, which gives the shape of the observation.
+        action_space: The world's. Where it is discrete, the network's output is taken as logits, otherwise as
+            the action.
+        observations: Length or shape of the observation, if there is no observation space.
+        hidden, batched, initial_state: As for `Policy`.
+        decode: Turns the output into an action, instead of the action space's decoder.
+        name: Name for messages and maps; by default that of the module's class.
+        sha256: Hash of the file that the network came from; by default `hash_network`.
 
     Raises:
-        PolicyError: the shape of the observation is not known, or as for `Policy`.
+        PolicyError: The shape of the observation is unknown; or as for `Policy`.
     """
     shape = observations if observations is not None else getattr(observation_space, "shape", None)
     owner = name or type(module).__name__

@@ -1,4 +1,4 @@
-"""Run a network one control step at a time, overwriting hidden units on the way."""
+"""Policies: networks that act one control step at a time while hidden units are overwritten."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from pdtui.policies.runtime.unit_layers import hidden_modules, name_layers
 
 
 class PolicyStep(NamedTuple):
-    """What one control step of a policy gives.
+    """Result of one control step of a policy.
 
     Attributes:
-        action: shape (A,), float32.
-        activations: output of every hidden unit as the next layer saw it, shape (U,), float32.
-        natural: what the stimulated units would have put out, in the order of the stimulation.
+        action: The action, shape (A,), float32.
+        activations: Output of every hidden unit as the next layer saw it, shape (U,), float32.
+        natural: Outputs that the stimulated units would have had, in the order of the stimulation.
     """
 
     action: NDArray[np.float32]
@@ -41,28 +41,27 @@ class Policy:
 
     A unit's output is taken after its activation function and before the next layer (section 3.3 of the
     paper). Layers count in the order in which the network calls them; the units of a layer of any shape count
-    in C order. The units of a recurrent layer are its output h: overwriting it is what the next layer reads,
-    while the state that the recurrent layer itself is fed in the next step keeps the natural h. (A cell's h
-    is found again in the state that the network returns if it is there as it is, not stacked with others.)
+    in C order. The units of a recurrent layer are its output h: the next layer reads the overwritten h, while
+    the state that the recurrent layer is fed in the next step keeps the natural one. (A cell's h is
+    recognised in the returned state if it is there by itself, not stacked with others.)
 
     A network with a hidden state is called ``module(observation, state) -> (output, state)``. The state is
-    part of the run: whoever resets the world calls `reset`, whoever restores it calls `restore`.
+    part of the run: call `reset` when the world is reset, and `restore` when it is restored.
 
     Args:
-        module: the network; it maps an observation, float32, to its output. The policy works on a copy.
-        observations: length or shape of the observation.
-        hidden: names of the submodules whose outputs are the units; by default every activation function and
+        module: The network, which maps a float32 observation to its output; the policy works on a copy.
+        observations: Length or shape of the observation.
+        hidden: Names of the submodules whose outputs are units; by default every activation function and
             every recurrent layer.
-        decode: turns the network's output into an action, an array of its own: the next step overwrites the
-            output.
-        batched: whether the network wants a leading axis of length 1 before the observation's own.
-        initial_state: what a recurrent network is fed first: a tensor, or tuples of tensors.
-        name: for messages.
-        sha256: hash of the file that it came from.
+        decode: Turns the network's output into an action. It must copy: the next step overwrites the output.
+        batched: Whether the network expects a leading axis of length 1.
+        initial_state: First state of a recurrent network: a tensor, or tuples of tensors.
+        name: Name for messages.
+        sha256: Hash of the file that the network came from.
 
     Raises:
-        PolicyError: a name in `hidden` does not exist, there is no hidden layer, or the network cannot take
-            such an observation or hands back another state.
+        PolicyError: A name in `hidden` does not exist, there is no hidden layer, or the network cannot take
+            such an observation or returns a state of another shape.
     """
 
     def __init__(
@@ -102,23 +101,23 @@ class Policy:
 
     @property
     def recurrent(self) -> bool:
-        """Whether the network has a hidden state."""
+        """Whether the network has a recurrent state."""
         return self._initial is not None
 
     def reset(self) -> None:
-        """An episode begins: back to the initial hidden state."""
+        """Return to the initial recurrent state, for a new episode."""
         if self._initial is not None:
             self._state = recurrent_state.clone_state(self._initial)
 
     def snapshot(self) -> PolicyState:
-        """Copy the hidden state; empty for a network without one."""
+        """Return a copy of the recurrent state; empty for a network without one."""
         return () if self._initial is None else recurrent_state.state_to_arrays(self._state)
 
     def restore(self, state: PolicyState) -> None:
-        """Return to a hidden state that `snapshot` gave.
+        """Return to a recurrent state that `snapshot` gave.
 
         Raises:
-            PolicyError: it is another network's.
+            PolicyError: The state is another network's.
         """
         if self._initial is None and not state:
             return
@@ -128,7 +127,7 @@ class Policy:
         ]
         found = [array.shape for array in state]
         if expected != found:
-            raise PolicyError(f"{self.name}: expected a hidden state of shapes {expected}, got {found}")
+            raise PolicyError(f"{self.name}: expected a recurrent state of shapes {expected}, got {found}")
         self._state = recurrent_state.rebuild_state(
             self._initial, (torch.from_numpy(array.copy()) for array in state)
         )
@@ -152,7 +151,7 @@ class Policy:
             raise PolicyError(
                 f"{self.name}: the network cannot take an observation of shape {self.shape} "
                 f"({'with' if self._batched else 'without'} a batch axis, "
-                f"{'with' if self.recurrent else 'without'} a hidden state): {reason}"
+                f"{'with' if self.recurrent else 'without'} a recurrent state): {reason}"
             ) from error
 
     def _run_network(self, observation: NDArray[Any]) -> torch.Tensor:
@@ -175,15 +174,16 @@ class Policy:
         stimulation: Stimulation = NO_STIMULATION,
         rng: np.random.Generator | None = None,
     ) -> PolicyStep:
-        """One control step.
+        """Act for one control step.
 
         Args:
-            observation: of the policy's shape.
-            stimulation: the units to overwrite.
-            rng: draw the action from the policy's distribution with it; without, take the mean action.
+            observation: An observation of the policy's shape.
+            stimulation: The units to overwrite.
+            rng: Generator with which the action is drawn from the policy's distribution; without it, the mean
+                action is taken.
 
         Raises:
-            PolicyError: the observation has another shape, or a unit does not exist.
+            PolicyError: The observation has another shape, or a unit does not exist.
         """
         if observation.shape != self.shape:
             raise PolicyError(

@@ -1,4 +1,4 @@
-"""Does a policy fit a world? Asked where the two meet, also of one that came from no file."""
+"""Check that a policy fits a world."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from pdtui.policies.runtime.policy import Policy
 
 
 def check_fit(policy: Policy, world: gymnasium.Env[Any, Any], name: str) -> None:
-    """See that a policy takes what a world shows, and gives what it takes.
+    """Check that a policy takes a world's observations and gives its actions.
 
     Args:
-        policy: acts once, on an observation of zeros; its hidden state stays.
-        world: the robot; only its spaces are looked at.
-        name: of the robot, for the message.
+        policy: The policy; it acts once on zeros, and its recurrent state is restored.
+        world: The robot, of which only the spaces are read.
+        name: Name of the robot, for the message.
 
     Raises:
-        PolicyError: a shape differs; the message has the policy's and the robot's.
+        PolicyError: A shape differs; the message states the policy's and the robot's.
     """
     observed = world.observation_space.shape or ()
     taken = policy.shape
@@ -41,5 +41,5 @@ def check_fit(policy: Policy, world: gymnasium.Env[Any, Any], name: str) -> None
 
 
 def _action_shape(space: spaces.Space[Any]) -> tuple[int, ...]:
-    """Of the vector that a policy gives: one number for a Discrete space."""
+    """Return the shape of the vector that a policy gives: one number for a Discrete space."""
     return space.shape or (1,)

@@ -1,4 +1,4 @@
-"""The hidden state of a recurrent network: a tensor, or tuples and lists of tensors."""
+"""States of recurrent networks: a tensor, or nested tuples and lists of tensors."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from pdtui.core.errors import PolicyError
 
 PolicyState = tuple[NDArray[Any], ...]
-"""A saved hidden state: its tensors in their order; empty for a network without one."""
+"""A saved recurrent state: its tensors in order; empty for a network without one."""
 
 
 def flatten_state(state: Any) -> Iterator[torch.Tensor]:
-    """The tensors of a hidden state, in their order.
+    """Yield the tensors of a recurrent state in order.
 
     Raises:
-        PolicyError: there is something else in it.
+        PolicyError: The state holds something else.
     """
     if isinstance(state, torch.Tensor):
         yield state
@@ -32,7 +32,7 @@ def flatten_state(state: Any) -> Iterator[torch.Tensor]:
 
 
 def rebuild_state(template: Any, tensors: Iterator[torch.Tensor]) -> Any:
-    """The tensors in the shape of the template."""
+    """Return the tensors, nested as in the template."""
     if isinstance(template, torch.Tensor):
         return next(tensors)
     parts = [rebuild_state(part, tensors) for part in template]
@@ -40,20 +40,24 @@ def rebuild_state(template: Any, tensors: Iterator[torch.Tensor]) -> Any:
 
 
 def clone_state(state: Any) -> Any:
-    """A copy that shares no memory."""
+    """Return a copy that shares no memory."""
     return rebuild_state(state, iter([tensor.detach().clone() for tensor in flatten_state(state)]))
 
 
 def state_to_arrays(state: Any) -> PolicyState:
-    """A copy as arrays, which travel between processes."""
+    """Return a copy as arrays, which can be sent between processes."""
     return tuple(np.array(tensor.detach().numpy()) for tensor in flatten_state(state))
 
 
 def check_state(template: Any, state: Any) -> None:
-    """See that a state that the network gave can be fed to it again.
+    """Check that a state returned by the network can be fed to it again.
+
+    Args:
+        template: The initial state; None for a network without one.
+        state: The returned state.
 
     Raises:
-        PolicyError: its shapes are not the initial state's (None: the network has no state).
+        PolicyError: The shapes differ.
     """
     if template is None:
         return

@@ -1,4 +1,4 @@
-"""Reading and overwriting the outputs of hidden layers while a network runs."""
+"""Hooks that read and overwrite the outputs of hidden layers while a network runs."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from pdtui.policies.runtime.unit_layers import output_tensor
 
 
 class UnitHooks:
-    """What sits at the output of every hidden layer of one network, during one forward pass.
+    """Reads and overwrites the outputs of all hidden layers of one network during a forward pass.
 
     Attributes:
-        outputs: of each layer so far, as the next layer sees it, flattened in C order.
-        natural: what the stimulated units would have put out, by flat index.
+        outputs: Output of each layer so far, as the next layer sees it, flattened in C order.
+        natural: Outputs that the stimulated units would have had, by flat index.
     """
 
     def __init__(self) -> None:
@@ -29,7 +29,7 @@ class UnitHooks:
         self._offset = 0
 
     def begin(self, stimulation: Stimulation = NO_STIMULATION) -> None:
-        """A forward pass begins."""
+        """Prepare for a forward pass."""
         self.outputs, self._offset = [], 0
         if self._replaced:
             self._replaced = []
@@ -40,9 +40,9 @@ class UnitHooks:
             self._pending = ()
 
     def replace(self, output: Any) -> Any:
-        """Take what a hidden submodule puts out, and return what it puts out instead; None lets it be.
+        """Return a hidden submodule's output with stimulated units overwritten; None leaves it unchanged.
 
-        A copy is overwritten: other layers, or the recurrent state, may hold the same memory.
+        A copy is overwritten, since other layers or the recurrent state may share the memory.
         """
         own = output_tensor(output)
         low, high = self._offset, self._offset + own.numel()
@@ -60,6 +60,6 @@ class UnitHooks:
         return (shown, *output[1:]) if isinstance(output, tuple) else shown
 
     def natural_of(self, tensors: Iterable[torch.Tensor]) -> Iterable[torch.Tensor]:
-        """The tensors, with the natural output in the place of each that was overwritten in this pass."""
+        """Return the tensors, each that was overwritten in this pass replaced by its natural output."""
         own = {id(shown): natural for shown, natural in self._replaced}
         return (own.get(id(tensor), tensor) for tensor in tensors)

@@ -1,4 +1,4 @@
-"""Which submodules of a network put out its hidden units, and what their layers are called."""
+"""The hidden layers of a network: the submodules whose outputs are units, and their names."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ RECURRENT_TYPES: tuple[type[nn.Module], ...] = (nn.RNNBase, nn.RNNCellBase)
 
 
 def hidden_modules(module: nn.Module, hidden: Sequence[str] | None, owner: str) -> dict[nn.Module, str]:
-    """The submodules whose outputs are units, with their names.
+    """Return the submodules whose outputs are units, with their names.
 
     Args:
-        module: the network.
-        hidden: their names; by default every activation function and every recurrent layer.
-        owner: for messages.
+        module: The network.
+        hidden: Names of the submodules; by default every activation function and every recurrent layer.
+        owner: Name of the policy, for messages.
 
     Raises:
-        PolicyError: a name does not exist.
+        PolicyError: A name does not exist.
     """
     modules = dict(module.named_modules())
     if hidden is None:
@@ -46,10 +46,10 @@ def _has_weights(module: nn.Module) -> bool:
 
 
 def output_tensor(output: Any) -> torch.Tensor:
-    """The tensor that the next layer reads; of a recurrent layer the output h, without its state.
+    """Return the tensor that the next layer reads: of a recurrent layer, the output h without its state.
 
     Raises:
-        PolicyError: there is none.
+        PolicyError: The output is not a tensor.
     """
     first = output[0] if isinstance(output, tuple) and output else output
     if not isinstance(first, torch.Tensor):
@@ -60,17 +60,17 @@ def output_tensor(output: Any) -> torch.Tensor:
 def name_layers(
     module: nn.Module, chosen: dict[nn.Module, str], run: Callable[[], object]
 ) -> list[list[str]]:
-    """Names of the layers in the order of the calls.
+    """Return the names of the layers in the order in which the network calls them.
 
-    A layer is called by the submodule whose output goes straight into its activation function (``conv1``),
-    and by the activation function's own name.
+    A layer is named after the submodule whose output goes straight into its activation function (``conv1``),
+    and also after the activation function itself.
 
     Args:
-        module: the network.
-        chosen: the submodules whose outputs are units.
-        run: runs the network once.
+        module: The network.
+        chosen: The submodules whose outputs are units.
+        run: Runs the network once.
     """
-    # The tensors stay referred to, so that none takes another's place and identity.
+    # Keeping references to the tensors prevents a new tensor from getting the identity of an old one.
     producers: list[tuple[torch.Tensor, str]] = []
     names: list[list[str]] = []
 

@@ -1,4 +1,4 @@
-"""A pickle read as data: opcodes are looked at, and nothing that they name is imported or called."""
+"""Reads a pickle as data: nothing that it names is imported or called."""
 
 from __future__ import annotations
 
@@ -20,29 +20,30 @@ _MARK = object()
 
 @dataclass(frozen=True)
 class PickledName:
-    """A class or function that the pickle names; it is not looked up."""
+    """The name of a class or function in the pickle, which is never imported."""
 
     text: str
 
 
 @dataclass
 class PickledObject:
-    """An object of a class that the archive defines: its class and its attributes."""
+    """An object of a class that the archive defines, as the class's name and the object's attributes."""
 
     kind: str
     attributes: dict[str, Any] = field(default_factory=dict)
 
 
 def read_pickle(content: bytes, storage: Storage, source: str) -> Any:
-    """The tree of objects, with tensors in it.
+    """Return the tree of objects, with its tensors.
 
     Args:
-        content: the pickle.
-        storage: gives the numbers of a storage, flat, by its key, its kind and their number.
-        source: for messages.
+        content: The pickle.
+        storage: Returns the numbers of a storage as a flat tensor, by key, kind and count.
+        source: Name of the file, for messages.
 
     Raises:
-        PolicyError: an opcode, or a name that it calls, is none that a TorchScript archive needs.
+        PolicyError: The pickle is damaged, or uses an opcode or calls a name that no TorchScript archive
+            needs.
     """
     stack: list[Any] = []
     memo: dict[int, Any] = {}
@@ -77,7 +78,7 @@ def _step(name: str, argument: Any, stack: list[Any], memo: dict[int, Any], stor
         _combine(name, stack)
 
 
-def _combine(name: str, stack: list[Any]) -> None:  # noqa: PLR0912 - one case an opcode
+def _combine(name: str, stack: list[Any]) -> None:  # noqa: PLR0912 - one case per opcode
     match name:
         case "MARK":
             stack.append(_MARK)

@@ -1,4 +1,4 @@
-"""From a TorchScript file to a network."""
+"""Reads the network of a TorchScript file."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pdtui.policies.torchscript.pickle_reader import PickledObject, Storage, rea
 from pdtui.policies.torchscript.torchscript_program import ScriptedModule, TorchScriptProgram
 
 _MAX_BYTES = 1 << 30
+"""Unpacked bytes of an archive."""
 _KINDS = {
     "FloatStorage": torch.float32,
     "DoubleStorage": torch.float64,
@@ -26,7 +27,7 @@ _KINDS = {
 
 
 def is_torchscript(path: Path) -> bool:
-    """Whether a file is an archive with TorchScript's code in it."""
+    """Return whether a file is an archive with TorchScript code."""
     try:
         with zipfile.ZipFile(path) as archive:
             return any(name.split("/", 1)[-1].startswith("code/__torch__") for name in archive.namelist())
@@ -35,13 +36,14 @@ def is_torchscript(path: Path) -> bool:
 
 
 def read_torchscript(path: Path) -> torch.nn.Module:
-    """The network of a file that ``torch.jit.save`` wrote, scripted or traced, on the CPU.
+    """Return the network of a file that ``torch.jit.save`` wrote, scripted or traced, on the CPU.
 
-    Its submodules have their own names. Code that this reader does not run (a loop, an operator that is not
-    on the list) is refused when it is reached, so at the latest when a `Policy` tries the network.
+    Submodules keep their names. Code that cannot be interpreted (a loop, an operator that is not listed) is
+    refused when it is reached, at the latest when a `Policy` tries the network.
 
     Raises:
-        PolicyError: it is no such file, damaged, or holds what pdtui does not do for a file.
+        PolicyError: The file is not a TorchScript archive, is damaged, or holds code that pdtui refuses to
+            run.
     """
     try:
         with zipfile.ZipFile(path) as archive:

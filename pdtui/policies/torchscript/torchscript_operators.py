@@ -1,4 +1,4 @@
-"""The operators that a TorchScript network may use: mathematics on tensors, nothing that reaches outside."""
+"""The operators that a TorchScript network may use: mathematics on tensors, without any side effect."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The code of a TorchScript archive, walked as a syntax tree: a network whose submodules can be watched."""
+"""Interprets the code of a TorchScript archive, so that the outputs of its submodules can be read."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ _UNITS = {kind.__name__ for kind in ACTIVATION_TYPES} | {
 }
 _CASTS: dict[str, Any] = {"int": int, "float": float, "bool": bool}
 _MOST_STATEMENTS = 20_000
+"""Statements per forward pass, which bounds recursion and time."""
 
 
 class TorchScriptProgram:
-    """Functions and methods by their full names.
+    """The functions and methods of an archive, by their full names.
 
     Args:
-        texts: source code by the dotted name of its module.
-        constants: the archive's constants.
+        texts: Source code by the dotted name of its module.
+        constants: The archive's constants.
 
     Raises:
-        PolicyError: a text is no TorchScript.
+        PolicyError: A text is not TorchScript.
     """
 
     def __init__(self, texts: Mapping[str, str], constants: tuple[Any, ...]) -> None:
@@ -66,7 +67,7 @@ class TorchScriptProgram:
         """Run a function of the archive.
 
         Raises:
-            PolicyError: there is none, or it does what pdtui does not do for a file.
+            PolicyError: There is no such function, or it does something that pdtui refuses to do.
         """
         function = self.functions.get(name)
         if function is None:
@@ -85,7 +86,7 @@ class TorchScriptProgram:
 
 
 class ScriptedModule(nn.Module):
-    """A submodule of the archive; `forward` runs its method of that name."""
+    """A submodule of the archive, whose methods are interpreted."""
 
     def __init__(
         self, thing: PickledObject, program: TorchScriptProgram, built: dict[int, ScriptedModule]
@@ -112,14 +113,14 @@ class ScriptedModule(nn.Module):
         return self.run(method, list(arguments))
 
     def run(self, method: str, arguments: list[Any], keywords: dict[str, Any] | None = None) -> Any:
-        """Run a method."""
+        """Run a method of the submodule."""
         return self._program.call(f"{self.kind}.{method}", [self, *arguments], keywords)
 
     def read(self, name: str) -> Any:
-        """An attribute that the archive gives it.
+        """Return an attribute of the submodule.
 
         Raises:
-            PolicyError: it has none of that name.
+            PolicyError: There is none of that name.
         """
         for table in (self._plain, self._modules, self._parameters, self._buffers):
             if name in table:
@@ -128,7 +129,7 @@ class ScriptedModule(nn.Module):
 
 
 class _Function(str):
-    """Full name of a function that the code holds in a variable."""
+    """The full name of a function that is held in a variable."""
 
 
 class _Return(Exception):  # noqa: N818 - it carries a value
@@ -150,7 +151,7 @@ class _Frame:
         for node in body:
             self._program.statements += 1
             if self._program.statements > _MOST_STATEMENTS:
-                raise PolicyError(f"its code runs more than {_MOST_STATEMENTS} statements a step")
+                raise PolicyError(f"its code runs more than {_MOST_STATEMENTS} statements per step")
             match node:
                 case ast.Return():
                     raise _Return(None if node.value is None else self._value(node.value))
@@ -178,7 +179,7 @@ class _Frame:
         else:
             raise PolicyError("its code changes an attribute, which pdtui does not do for a file")
 
-    def _value(self, node: ast.expr) -> Any:  # noqa: PLR0912 - one case a kind of expression
+    def _value(self, node: ast.expr) -> Any:  # noqa: PLR0912 - one case per kind of expression
         match node:
             case ast.Constant():
                 return node.value
@@ -233,7 +234,7 @@ class _Frame:
             owner = self._value(node.func.value)
             if isinstance(owner, ScriptedModule):
                 method = node.func.attr
-                # Called as a module, so that whoever watches its output sees it; forward__0 is an overload.
+                # Called as a module, so that hooks see the output; forward__0 is an overload.
                 if method.partition("__")[0] == "forward" and not keywords:
                     return owner(*arguments, method=method)
                 return owner.run(method, arguments, keywords)

@@ -1,4 +1,4 @@
-"""Where files that a map or a session names may lie. Loads no heavy library."""
+"""Search for the files that maps and sessions name."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ from pathlib import Path
 from pdtui.core.errors import PolicyError
 
 FOLDERS = "PDTUI_POLICY_FOLDERS"
-"""Environment variable: folders in which maps and sessions may name files, separated as in PATH."""
+"""Environment variable: further folders whose files maps and sessions may name, separated as in PATH."""
 
 
 def find_beside(name: str, folders: Sequence[Path]) -> Path | None:
-    """A file by its path from the working directory, or else from one of the folders."""
+    """Return the path of a file in the working directory or one of the folders, None if it is in none."""
     places = (Path(name), *(folder / name for folder in folders))
     return next((path for path in places if _is_file(path)), None)
 
 
 def find_inside(name: str, folders: Sequence[Path], source: str) -> Path | None:
-    """As `find_beside`, for a name that a map or a session gives: nothing outside the folders is looked at.
+    """Find a file as `find_beside` does, but only inside allowed folders, for names in untrusted files.
 
-    Those are the working directory, the folders given, and those of the environment variable `FOLDERS`. What
-    a link points to counts, not where it lies.
+    Allowed are the working directory, `folders`, and the folders in the environment variable `FOLDERS`. A
+    symbolic link counts as the file that it points to.
 
     Args:
-        name: of a file.
-        folders: where it may lie beside the working directory.
-        source: what names it, for the message.
+        name: Name of the file.
+        folders: Further folders to search.
+        source: The map or session that names the file, for messages.
 
     Raises:
-        PolicyError: the name leads out of them.
+        PolicyError: The name leads outside of the allowed folders.
     """
     allowed = [Path.cwd(), *folders, *map(Path, filter(None, os.environ.get(FOLDERS, "").split(os.pathsep)))]
     inside = [folder.resolve() for folder in allowed]
@@ -38,7 +38,7 @@ def find_inside(name: str, folders: Sequence[Path], source: str) -> Path | None:
     for path in (Path(name), *(folder / name for folder in folders)):
         try:
             real = path.resolve()
-        except (OSError, RuntimeError, ValueError):  # too long, a circle of links, or no name at all
+        except (OSError, RuntimeError, ValueError):  # too long, a loop of links, or not a name
             continue
         if not any(real.is_relative_to(folder) for folder in inside):
             outside = True
@@ -55,5 +55,5 @@ def find_inside(name: str, folders: Sequence[Path], source: str) -> Path | None:
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except OSError:  # a name that is too long
+    except OSError:  # the name is too long
         return False

@@ -1,4 +1,4 @@
-"""What a weights file may leave open, and what the world says about it. Loads no heavy library."""
+"""Answers to what a weights file leaves open: the user's options and the world's spaces."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ NO_NORMALISER = "none"
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """Answers to what a weights file does not state. An answer beats what the file says.
+    """Answers to what a weights file does not state; they take precedence over the file.
 
     Attributes:
-        activation: function of the hidden layers, one of `ACTIVATION_NAMES`; empty: as the file says.
-        squash: how the output becomes an action, one of `SQUASH_NAMES`: ``none`` takes it as it is, ``tanh``
-            squashes it into the bounds, ``clip`` clips it to them; empty: as the file says.
-        normaliser: file with the statistics of the observation; ``none`` for none at all; empty: those in
-            the weights file, if any.
+        activation: Activation function of the hidden layers, one of `ACTIVATION_NAMES`; empty for the file's.
+        squash: How an output becomes an action, one of `SQUASH_NAMES`: ``none`` takes it as it is, ``tanh``
+            squashes it into the bounds, ``clip`` clips it to them; empty for what the file says.
+        normaliser: File with the statistics of the observation; ``none`` for no normalisation; empty for the
+            statistics in the weights file, if any.
     """
 
     activation: str = ""
@@ -37,8 +37,8 @@ class ImportOptions:
             if value and value not in names:
                 raise PolicyError(f"unknown {what} '{value}'; there are {', '.join(names)}")
 
-    def over(self, others: ImportOptions) -> ImportOptions:
-        """These choices, and the others where these are silent."""
+    def or_else(self, others: ImportOptions) -> ImportOptions:
+        """Return these options, completed by the others where these are empty."""
         return ImportOptions(
             self.activation or others.activation,
             self.squash or others.squash,
@@ -51,15 +51,15 @@ NO_OPTIONS = ImportOptions()
 
 @dataclass(frozen=True)
 class WorldSpaces:
-    """What a world gives to a policy and takes from it.
+    """The observations and actions of a world.
 
     Attributes:
-        owner: name of the world, for messages.
-        observations: length of the observation.
-        actions: length of the action; of a discrete action, 1.
-        low, high: bounds of each action; empty where there are none, or where actions are discrete.
-        discrete_actions: number of discrete actions; 0 where actions are continuous.
-        shape: of the observation.
+        owner: Name of the world, for messages.
+        observations: Length of the flattened observation.
+        actions: Length of the action; 1 for a discrete action.
+        low, high: Bounds of each action; empty where there are none, and for discrete actions.
+        discrete_actions: Number of discrete actions; 0 where actions are continuous.
+        shape: Shape of the observation.
     """
 
     owner: str
@@ -72,10 +72,10 @@ class WorldSpaces:
 
     @classmethod
     def of(cls, owner: str, observation_space: Any, action_space: Any) -> WorldSpaces:
-        """From Gymnasium's spaces, whose shapes are flattened.
+        """Return the description of Gymnasium's spaces, with flattened shapes.
 
         Raises:
-            PolicyError: observations that are no array of numbers.
+            PolicyError: Observations are not an array of numbers.
         """
         if observation_space.shape is None:
             raise PolicyError(f"{owner}: expected observations of one shape, found {observation_space}")
@@ -93,18 +93,18 @@ class WorldSpaces:
 
     @classmethod
     def of_world(cls, world: Any) -> WorldSpaces:
-        """Of a robot, by its name and spaces.
+        """Return the description of a robot's spaces.
 
         Raises:
-            PolicyError: as `of`.
+            PolicyError: As for `of`.
         """
         return cls.of(world.name, world.observation_space, world.action_space)
 
     def check(self, source: str, observations: int, actions: int, discrete_actions: int) -> None:
-        """See that a policy of these sizes fits.
+        """Check that a policy of these sizes fits.
 
         Raises:
-            PolicyError: it does not; the message names both shapes.
+            PolicyError: The policy does not fit; the message states both shapes.
         """
         if (observations, actions, discrete_actions) == (
             self.observations,

@@ -1,4 +1,4 @@
-"""From a weights file to a policy that can be driven."""
+"""Loading and conversion of policies."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ def load_policy(
 ) -> Policy:
     """Load a weights file, or a shipped policy by its name.
 
-    A file that pdtui did not write is imported (`pdtui.policies.importers`); its policy belongs to no robot
-    and fits every world with its shapes.
+    A file that another program wrote is imported (`pdtui.policies.importers`); its policy fits every world
+    with its shapes.
 
     Args:
-        name: file or shipped name.
-        robot: what it is to drive.
-        import_options: what the file may leave open.
-        spaces: of the world that it is to act in, to be compared with the policy's shapes.
-        folders: where to look for files beside the working directory.
+        name: Weights file or name of a shipped policy.
+        robot: Name of the robot to drive.
+        import_options: Answers to what the file leaves open.
+        spaces: The world's spaces, with which the policy's shapes are compared.
+        folders: Folders to search besides the working directory.
 
     Raises:
-        PolicyError: no such file, unreadable, made for another robot, of other shapes than the world's, or
-            in need of a choice.
+        PolicyError: There is no such file, or it cannot be read, is for another robot, has other shapes than
+            the world, or needs an option.
     """
     path = find_weights_file(str(name), folders)
     if is_torchscript(path):
@@ -65,12 +65,12 @@ def load_policy(
 def load_any_network(
     path: Path, import_options: ImportOptions, spaces: WorldSpaces | None, folders: Sequence[Path] = ()
 ) -> tuple[PolicyNetwork, str]:
-    """The network of a file that pdtui or somebody else wrote, and its hash.
+    """Return the network of a file that pdtui or another program wrote, and its hash.
 
-    The hash is the file's SHA-256; choices enter it, too, because with others it is another policy.
+    The hash is the file's SHA-256, combined with the import options if any, since they make another policy.
 
     Raises:
-        PolicyError: as `load_policy`.
+        PolicyError: As for `load_policy`.
     """
     digest = hash_file(path)
     if is_own_format(path):
@@ -91,7 +91,7 @@ def load_any_network(
 
 
 def _check_agreement(path: Path, spec: NetworkSpec, import_options: ImportOptions) -> None:
-    """A file of pdtui's own states everything: a choice may repeat it, not change it."""
+    """Refuse options that contradict a file of pdtui's own, which states everything."""
     squash = "tanh" if spec.head in ("squashed_gaussian", "tanh") else "clip" if spec.action_low else "none"
     for what, stated, chosen in (
         ("activation", spec.activation, import_options.activation),
@@ -103,7 +103,7 @@ def _check_agreement(path: Path, spec: NetworkSpec, import_options: ImportOption
 
 
 def _find_statistics(path: Path, import_options: ImportOptions, folders: Sequence[Path]) -> Path | None:
-    """The file that the choices name: from the working directory, a folder, or beside the weights."""
+    """Return the statistics file that the options name, in a folder or beside the weights."""
     name = import_options.normaliser
     if not name or name == NO_NORMALISER:
         return None
@@ -116,13 +116,13 @@ def _find_statistics(path: Path, import_options: ImportOptions, folders: Sequenc
 def convert_policy(
     path: Path, output: Path, import_options: ImportOptions, spaces: WorldSpaces | None
 ) -> NetworkSpec:
-    """Write somebody else's policy as safetensors that state everything, for the world of these spaces.
+    """Write a policy of another program as a safetensors file that states everything.
 
     Returns:
-        What was written, without the weights.
+        The specification that was written.
 
     Raises:
-        PolicyError: as `load_policy`; or the output exists already or cannot be written.
+        PolicyError: As for `load_policy`; or the output exists already or cannot be written.
     """
     if output.exists():
         raise PolicyError(f"{output}: exists already; a policy is converted into a new file")

@@ -1,4 +1,4 @@
-"""The network that pdtui trains and loads: a multilayer perceptron with a head that says how it acts."""
+"""The multilayer perceptron that pdtui trains and loads, and its specification."""
 
 from __future__ import annotations
 
@@ -24,32 +24,33 @@ ACTIVATIONS: dict[str, type[nn.Module]] = {
     "softplus": nn.Softplus,
 }
 MAX_WIDTH, MAX_LAYERS = 1 << 20, 100
+"""Limits beyond which a file is damaged or hostile."""
 Head = Literal["squashed_gaussian", "tanh", "gaussian", "mean", "categorical"]
 LogStd = Literal["output", "parameter"]
 
 
 @dataclass(frozen=True)
 class NetworkSpec:
-    """Everything but the weights.
+    """Everything about a policy network but its weights.
 
     Attributes:
-        robot: the robot that the policy drives; empty for any whose shapes fit.
-        observations: length of the observation.
-        layers: widths of the hidden layers.
-        activation: one of `ACTIVATIONS`.
-        actions: length of the action; with ``categorical``, number of discrete actions.
-        head: ``squashed_gaussian`` is tanh of a Gaussian sample, rescaled to the bounds; ``gaussian`` is a
-            Gaussian sample, clipped to the bounds; ``tanh`` and ``mean`` are the same two without a
-            distribution; ``categorical`` chooses by logits, the action being the number of the choice.
-        action_low, action_high: bounds of each action; both empty where there are none.
-        command: command line that trained it, or where it came from.
-        score: what the training measured of it.
-        log_std: where a Gaussian's log standard deviation comes from: further outputs of the head, or
-            parameters that do not depend on the observation.
-        log_std_low, log_std_high: its range.
-        log_std_rule: how it is brought there: clipped, or by tanh.
-        mean_limit: the mean is clipped to ± this before tanh; 0 for no limit.
-        observation_clip: the normalised observation is clipped to ± this; 0 for no limit.
+        robot: Robot that the policy drives; empty for any robot whose shapes fit.
+        observations: Length of the observation.
+        layers: Widths of the hidden layers.
+        activation: Activation function, one of `ACTIVATIONS`.
+        actions: Length of the action; with ``categorical``, the number of discrete actions.
+        head: How the action is computed. ``squashed_gaussian`` is tanh of a Gaussian sample, rescaled to the
+            bounds; ``gaussian`` is a Gaussian sample, clipped to the bounds; ``tanh`` and ``mean`` are these
+            two without a distribution; ``categorical`` selects by logits, and the action is an index.
+        action_low, action_high: Bounds of each action; both empty where there are none.
+        command: Command line that trained the policy, or where it came from.
+        score: What the training measured.
+        log_std: Source of a Gaussian's log standard deviation: further outputs of the head, or parameters
+            that do not depend on the observation.
+        log_std_low, log_std_high: Range of the log standard deviation.
+        log_std_rule: How it is brought into the range: by clipping or by tanh.
+        mean_limit: Limit of the magnitude of the mean before tanh; 0 for none.
+        observation_clip: Limit of the magnitude of normalised observations; 0 for none.
     """
 
     robot: str
@@ -87,10 +88,10 @@ class NetworkSpec:
             )
 
     def check_values(self) -> None:
-        """See that every field is what it is said to be; a file may say anything.
+        """Check every field, since a file may hold anything.
 
         Raises:
-            PolicyError: one is not.
+            PolicyError: A field is not what it should be.
         """
         sizes = (self.observations, self.actions, *self.layers)
         if not all(type(size) is int and 0 < size <= MAX_WIDTH for size in sizes):
@@ -108,17 +109,17 @@ class NetworkSpec:
 
     @property
     def gaussian(self) -> bool:
-        """Whether the action is drawn from a Gaussian."""
+        """Whether the policy has a Gaussian distribution of actions."""
         return self.head in ("squashed_gaussian", "gaussian")
 
     @property
     def action_size(self) -> int:
-        """Length of the action that the policy gives."""
+        """Length of the action: 1 for a discrete one."""
         return 1 if self.head == "categorical" else self.actions
 
 
 class Normaliser(nn.Module):
-    """``(observation − mean) / std``, clipped to ± `clip` unless that is 0."""
+    """Computes ``(observation − mean) / std``, clipped to ± `clip` unless that is 0."""
 
     mean: torch.Tensor
     std: torch.Tensor
@@ -135,9 +136,9 @@ class Normaliser(nn.Module):
 
 
 class PolicyNetwork(nn.Module):
-    """observation → normaliser → (linear → activation) × L → head.
+    """The network: observation → normaliser → (linear → activation) × L → head.
 
-    The normaliser is skipped unless the weights bring one. `log_std`, shape (actions,), is there where the
+    The normaliser is skipped unless the weights contain one. `log_std`, shape (actions,), exists where the
     specification says that it is a parameter.
     """
 
@@ -157,10 +158,10 @@ class PolicyNetwork(nn.Module):
         self.normalises = False
 
     def load_tensors(self, tensors: dict[str, torch.Tensor]) -> None:
-        """Take weights by name.
+        """Load weights by name.
 
         Raises:
-            PolicyError: a tensor is missing, superfluous, of another shape or not finite.
+            PolicyError: A tensor is missing, superfluous, of another shape or not finite.
         """
         check_tensors(self.state_dict(), tensors)
         for name, tensor in tensors.items():
@@ -172,13 +173,13 @@ class PolicyNetwork(nn.Module):
         self.normalises = moved or self.normaliser.clip > 0
 
     def stages(self) -> list[nn.Module]:
-        """The submodules in the order in which `forward` calls them."""
+        """Return the submodules in the order in which `forward` calls them."""
         pairs = zip(self.hidden, self.activations, strict=True)
         first: list[nn.Module] = [self.normaliser] if self.normalises else []
         return [*first, *(stage for pair in pairs for stage in pair), self.head]
 
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
-        """Head output for observations of shape (..., observations)."""
+        """Return the head's output for observations of shape (..., observations)."""
         x = observation
         for stage in self.stages():
             x = stage(x)
@@ -186,10 +187,10 @@ class PolicyNetwork(nn.Module):
 
 
 def check_tensors(expected: Mapping[str, torch.Tensor], found: Mapping[str, torch.Tensor]) -> None:
-    """See that tensors have the names and shapes of others, whose numbers are not looked at.
+    """Check that tensors have the expected names and shapes.
 
     Raises:
-        PolicyError: a tensor is missing, superfluous, or of another shape.
+        PolicyError: A tensor is missing, superfluous, or of another shape.
     """
     shapes, others = ({name: tuple(one.shape) for name, one in all.items()} for all in (expected, found))
     for name in sorted(shapes.keys() | others.keys()):

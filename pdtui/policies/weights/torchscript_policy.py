@@ -1,4 +1,4 @@
-"""A policy from a TorchScript file and the world that it is to act in."""
+"""Policies from TorchScript files."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from pdtui.policies.weights.weights_file import hash_file
 def load_torchscript_policy(
     path: Path, spaces: WorldSpaces | None, import_options: ImportOptions = NO_OPTIONS
 ) -> Policy:
-    """The network of a TorchScript file, whose output is the action, or the logits of discrete actions.
+    """Load a TorchScript network, whose output is the action or the logits of discrete actions.
 
-    It is tried without a batch axis and then with one. A network with a hidden state says nowhere what the
-    state begins with: `pdtui.load_policy` takes that from Python.
+    The network is tried without a batch axis, then with one. The file of a recurrent network does not state
+    its initial state; from Python, `pdtui.load_policy` takes it.
 
     Raises:
-        PolicyError: it cannot be read, does not take the world's observations or give its actions, or
-            choices are given, which a file that states its whole computation does not leave open.
+        PolicyError: The file cannot be read, the network does not fit the world, or import options are given,
+            which a file that states its whole computation does not need.
     """
     if spaces is None:
         raise PolicyError(f"{path}: TorchScript says no shapes; expected the robot that it is for")
     if import_options != NO_OPTIONS:
-        raise PolicyError(f"{path}: TorchScript states its whole computation; expected no choices")
+        raise PolicyError(f"{path}: TorchScript states its whole computation; expected no import options")
     module, digest = read_torchscript(path), hash_file(path)
     shape = spaces.shape or (spaces.observations,)
     problems: list[str] = []

@@ -1,4 +1,4 @@
-"""Weights on disk: safetensors, with metadata that makes them whole. Nothing is ever unpickled."""
+"""Weights on disk: safetensors whose metadata states everything else about the network."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork, ch
 
 WEIGHTS = Path(__file__).parent / "shipped"
 MAX_BYTES = 1 << 30
-"""Of a file of weights."""
+"""Bytes of a weights file."""
 _KEY = "pdtui"
 
 
 def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
-    """Path of a weights file: as given, from one of the folders, or a shipped one by its name.
+    """Return the path of a weights file: as given, in one of the folders, or a shipped one by its name.
 
     Raises:
-        PolicyError: there is none; the message lists the shipped ones.
+        PolicyError: There is none; the message lists the shipped policies.
     """
     own = find_beside(name, folders)
     if own is not None:
@@ -42,10 +42,10 @@ def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
 
 
 def is_own_format(path: Path) -> bool:
-    """Whether `save_network` wrote the file: safetensors with metadata of ours."""
+    """Return whether `save_network` wrote the file: safetensors with pdtui's metadata."""
     try:
         with open_regular_file(path):
-            pass  # no pipe is waited for
+            pass  # refuses pipes, on which opening could wait forever
         with safe_open(str(path), framework="pt") as handle:
             return _KEY in (handle.metadata() or {})
     except (OSError, SafetensorError):
@@ -53,10 +53,10 @@ def is_own_format(path: Path) -> bool:
 
 
 def hash_file(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal.
+    """Return the SHA-256 of a file as hexadecimal digits.
 
     Raises:
-        PolicyError: the file cannot be read.
+        PolicyError: The file cannot be read.
     """
     try:
         with open_regular_file(path) as file:
@@ -77,10 +77,10 @@ def save_network(path: Path, network: PolicyNetwork) -> None:
 
 
 def load_network(path: Path) -> PolicyNetwork:
-    """Read weights that `save_network` wrote.
+    """Read a network that `save_network` wrote.
 
     Raises:
-        PolicyError: not a safetensors file, no metadata of ours, or tensors that do not fit it.
+        PolicyError: The file is not a safetensors file, lacks pdtui's metadata, or its tensors do not fit it.
     """
     metadata, tensors = _read(path)
     if _KEY not in metadata:
@@ -91,7 +91,7 @@ def load_network(path: Path) -> PolicyNetwork:
         for name in ("layers", "action_low", "action_high"):
             fields[name] = tuple(fields[name])
         spec = NetworkSpec(**fields)
-        # Before anything of the sizes that it names is made.
+        # Checked before any memory of the stated sizes is allocated.
         spec.check_values()
         with torch.device("meta"):
             expected = PolicyNetwork(spec).state_dict()
