@@ -6,9 +6,7 @@ of them is first accessed, not when pdtui is imported.
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -39,17 +37,6 @@ __all__ = [
     "load_policy",
     "replay",
 ]
-
-
-class _Package(ModuleType):
-    """Keeps `pdtui.drive` the function: importing the subpackage of that name would replace it."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in __all__ and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
 
 
 def __getattr__(name: str) -> Any:

@@ -16,11 +16,11 @@ from pdtui.dissection.dissect import dissect as run_dissection
 from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_settings import QUICK_DISSECTION, DissectionSettings
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.keystrokes import read_keystrokes
-from pdtui.drive.loop_builder import build_loop
-from pdtui.drive.replay import ReplayResult, replay_session
-from pdtui.drive.trajectory import Trajectory, collect_trajectory
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.keystrokes import read_keystrokes
+from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.replay import ReplayResult, replay_session
+from pdtui.driving.trajectory import Trajectory, collect_trajectory
 from pdtui.policies.runtime.action_decoders import Decoder
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
@@ -240,7 +240,7 @@ def replay(
         robot: The robot, if the session's cannot be built from its name.
         policy: The policy, if the session's is not where its map says.
         judging: ``strict``, ``tolerance``, ``required_steps`` and ``force``, as for
-            `pdtui.drive.replay.replay_session`.
+            `pdtui.driving.replay.replay_session`.
 
     Raises:
         PdtuiError: The session cannot be read, or the robot or the policy cannot be loaded.

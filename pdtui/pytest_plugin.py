@@ -11,7 +11,7 @@ Example::
 
 A failing test names the first step that differs, and how far each attribute is off. On the machine and with
 the versions that recorded the session, every bit must be the same. Elsewhere, the attributes have to agree
-for the first seconds (see `pdtui.drive.replay.TOLERANCE`), unless ``strict=True`` demands the same bits.
+for the first seconds (see `pdtui.driving.replay.TOLERANCE`), unless ``strict=True`` demands the same bits.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import pytest
 if TYPE_CHECKING:
     from torch import nn
 
-    from pdtui.drive.replay import ReplayResult
+    from pdtui.driving.replay import ReplayResult
     from pdtui.policies.runtime.policy import Policy
     from pdtui.robots.robot import Robot
 
@@ -55,7 +55,7 @@ def pdtui_session(request: pytest.FixtureRequest) -> SessionCheck:
     - ``policy``: a weights file (found like the session), the name of a shipped policy, or a live network;
       by default the session's. Other weights than the session's are run and compared all the same;
     - ``robot``: the robot, if the session's cannot be built from its name;
-    - ``strict``, ``tolerance``, ``required_steps``: as for `pdtui.drive.replay.replay_session`.
+    - ``strict``, ``tolerance``, ``required_steps``: as for `pdtui.driving.replay.replay_session`.
 
     It returns the `ReplayResult` of a drive that repeats.
     """

@@ -16,13 +16,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pdtui.core.errors import PdtuiError
-from pdtui.drive.client import DriveClient
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.drive_snapshot import DriveSnapshot
-from pdtui.drive.headless_drive import key_events
-from pdtui.drive.loop_builder import build_loop
-from pdtui.drive.replay import replay_session
-from pdtui.drive.server import PACED_ROWS_PER_WRITE
+from pdtui.driving.client import DriveClient
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.drive_snapshot import DriveSnapshot
+from pdtui.driving.headless_drive import key_events
+from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.replay import replay_session
+from pdtui.driving.server import PACED_ROWS_PER_WRITE
 from pdtui.sessions.session_repair import examine_session, repair_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_reader import load_map

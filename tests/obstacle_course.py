@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.robot_data import Link, RobotState
-from pdtui.drive.control_loop import ControlLoop
+from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.runtime.action_decoders import decoder_for
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork

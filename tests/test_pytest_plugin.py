@@ -12,9 +12,9 @@ import pytest
 import torch
 
 from pdtui import pytest_plugin
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless_drive import drive_headless
-from pdtui.drive.loop_builder import build_loop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.headless_drive import drive_headless
+from pdtui.driving.loop_builder import build_loop
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.weights_file import load_network, save_network
 from pdtui.sessions.writer.session_recorder import SessionRecorder

@@ -15,8 +15,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from pdtui.cli import main
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.loop_builder import build_loop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.loop_builder import build_loop
 from pdtui.sessions.session_reader import read_activations, read_session
 from pdtui.stimulation.map_library import shipped_folder
 from pdtui.stimulation.map_reader import load_map

@@ -12,9 +12,9 @@ from pathlib import Path
 import pexpect
 import pytest
 
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.loop_builder import build_loop
-from pdtui.drive.replay import replay_session
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.replay import replay_session
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.stimulation_map import StimulationMap

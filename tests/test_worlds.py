@@ -14,10 +14,10 @@ from click.testing import CliRunner, Result
 
 from pdtui.cli import main
 from pdtui.core.events import Event
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.drive_snapshot import DriveFacts
-from pdtui.drive.loop_builder import build_loop
-from pdtui.drive.snapshot_builder import SnapshotBuilder
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.drive_snapshot import DriveFacts
+from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.policies.weights.policy_network import Head, NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import hash_file, save_network
 from pdtui.robots import make_robot

@@ -10,10 +10,9 @@ import torch
 from numpy.typing import NDArray
 
 from pdtui.api import load_policy
-from pdtui.core.angles import wrap_angle
-from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.core.robot_data import Link, RobotState
-from pdtui.drive.control_loop import ControlLoop
+from pdtui.driving.control_loop import ControlLoop
 from pdtui.robots.robot import Robot
 from pdtui.stimulation.map_reader import parse_map
 

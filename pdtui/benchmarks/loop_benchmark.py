@@ -12,9 +12,9 @@ import numpy as np
 
 from pdtui.core.events import Event
 from pdtui.core.units import Stimulation
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.loop_builder import build_loop
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.loop_builder import build_loop
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 ROUNDS = 7

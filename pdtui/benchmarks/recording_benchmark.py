@@ -12,11 +12,11 @@ from pathlib import Path
 from pdtui.core.errors import ScreenError
 from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.loop_builder import build_loop
-from pdtui.drive.replay import replay_session
-from pdtui.drive.server import PACED_ROWS_PER_WRITE
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.replay import replay_session
+from pdtui.driving.server import PACED_ROWS_PER_WRITE
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_repair import examine_session
 from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept

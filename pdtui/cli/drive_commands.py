@@ -26,7 +26,7 @@ from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept
 from pdtui.sessions.viewer.viewer_address import LOCAL, PORT, ViewerAddress
 
 if TYPE_CHECKING:
-    from pdtui.drive.drive_config import DriveConfig
+    from pdtui.driving.drive_config import DriveConfig
 
 
 @click.command()
@@ -128,7 +128,7 @@ def drive(
 @criteria_options
 def replay(session: Path, watch: bool, policy: str, criteria: dict[str, Any]) -> None:
     """Run SESSION again and compare every step. Exits with 1 if it does not repeat."""
-    from pdtui.drive.replay import replay_config, replay_session
+    from pdtui.driving.replay import replay_config, replay_session
 
     if watch:
         from pdtui.sessions.session_reader import read_session
@@ -158,10 +158,10 @@ def _new_session(config: DriveConfig) -> Path:
 
 
 def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, record: Path | None) -> None:
-    from pdtui.drive.ending_signals import catch_ending_signals
-    from pdtui.drive.headless_drive import drive_headless
-    from pdtui.drive.keystrokes import read_keystrokes
-    from pdtui.drive.loop_builder import build_loop
+    from pdtui.driving.ending_signals import catch_ending_signals
+    from pdtui.driving.headless_drive import drive_headless
+    from pdtui.driving.keystrokes import read_keystrokes
+    from pdtui.driving.loop_builder import build_loop
     from pdtui.sessions.writer.session_recorder import SessionRecorder
 
     presses = read_keystrokes(keys, config.stimulation_map) if keys is not None else {}
@@ -192,7 +192,7 @@ def _drive_on_screen(config: DriveConfig, recording: Path | None, fps: int) -> N
 def _show(config: DriveConfig, *, fps: int, watching: bool = False) -> None:
     """Start the simulation's process, then show it on the screen."""
     _check_terminal()
-    from pdtui.drive.client import DriveClient
+    from pdtui.driving.client import DriveClient
 
     connection = DriveClient(config)
     try:

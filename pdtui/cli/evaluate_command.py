@@ -26,7 +26,7 @@ from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
 
 if TYPE_CHECKING:
-    from pdtui.drive.drive_config import DriveConfig
+    from pdtui.driving.drive_config import DriveConfig
     from pdtui.paper.experiment import Experiment
 
 

@@ -119,7 +119,7 @@ def verify(files: tuple[Path, ...], policy: str, criteria: dict[str, Any], as_js
 
 
 def _verify_file(file: Path, policy: str, criteria: dict[str, Any], as_json: bool) -> dict[str, Any]:
-    from pdtui.drive.replay import replay_session
+    from pdtui.driving.replay import replay_session
     from pdtui.sessions.session_repair import examine_session
 
     row: dict[str, Any] = {"path": str(file), "whole": False, "repeats": None}
@@ -188,7 +188,7 @@ def export(file: Path, stream: str | None, output: Path | None, keys: Path | Non
 
 
 def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
-    from pdtui.drive.keystrokes import format_keystrokes
+    from pdtui.driving.keystrokes import format_keystrokes
     from pdtui.sessions.session_header import read_session_header
 
     if output.exists() and not overwrite:

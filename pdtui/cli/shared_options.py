@@ -17,7 +17,7 @@ from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, NO_OPTIONS, SQUASH_NAMES, ImportOptions
 
 if TYPE_CHECKING:
-    from pdtui.drive.drive_config import DriveConfig
+    from pdtui.driving.drive_config import DriveConfig
     from pdtui.stimulation.stimulation_map import StimulationMap
 
 
@@ -157,7 +157,7 @@ def drive_config(
     Raises:
         PdtuiError: the robot or the map does not exist or cannot be read.
     """
-    from pdtui.drive.drive_config import DriveConfig
+    from pdtui.driving.drive_config import DriveConfig
     from pdtui.robots import check_robot, file_stem, trust_module
     from pdtui.stimulation.map_library import find_map
     from pdtui.stimulation.map_policy_lookup import resolve_map_policy
@@ -210,6 +210,6 @@ def progress_bar_or_none(
     """Return a context manager for a progress bar on standard error, or for None where `quiet`."""
     if quiet:
         return nullcontext(None)
-    from pdtui.core.progress_bar import progress_bar
+    from pdtui.cli.progress_bar import progress_bar
 
     return progress_bar(label)

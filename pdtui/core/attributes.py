@@ -1,4 +1,4 @@
-"""Kinematic attributes: the quantities of a robot that are measured at each control step."""
+"""Kinematic attributes: the quantities of a robot that are measured at each control step, and angles."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class Attribute:
     """A kinematic attribute: a measured quantity of the robot.
 
     Attributes:
-        name: short name, as maps and screens use it.
-        unit: physical unit of the values that `Robot.read_attributes` returns.
-        scale: factor that dissection applies before it compares spectra. It brings the attribute to the
-            scale at which the policy observes (or, for a torque, commands) it: the discrepancy of
-            the paper compares magnitudes, so this factor decides which unit matches.
-        wraps: whether the value is an angle that jumps at ±π.
+        name: Short name, as maps and screens use it.
+        unit: Physical unit of the values that `Robot.read_attributes` returns.
+        scale: Factor that dissection applies before it compares spectra. It brings the attribute to the scale
+            at which the policy observes (or, for a torque, commands) it. The paper's discrepancy compares
+            magnitudes, so this factor decides which unit matches.
+        wraps: Whether the value is an angle that jumps at ±π.
     """
 
     name: str
@@ -76,3 +76,15 @@ class BehaviorAim:
     def sign(self) -> float:
         """1 where more of the attribute is wanted, −1 where less of it is."""
         return 1.0 if self.direction in ("increase", "raise") else -1.0
+
+
+def wrap_angle(angle: float) -> float:
+    """Return the same angle in (−π, π], rad."""
+    wrapped = (angle + np.pi) % (2.0 * np.pi) - np.pi
+    return float(np.pi if wrapped == -np.pi else wrapped)
+
+
+def wrap_angles(angles: Floats) -> Floats:
+    """Return the same angles in [−π, π), rad, in any shape; NaN stays NaN."""
+    wrapped: Floats = np.mod(angles + np.pi, 2.0 * np.pi) - np.pi
+    return wrapped

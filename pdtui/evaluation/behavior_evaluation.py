@@ -17,10 +17,10 @@ from pdtui.core.attributes import Floats
 from pdtui.core.events import Event
 from pdtui.core.intervals import confidence_interval
 from pdtui.core.worker_pool import WorkerPool
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless_drive import run_episode
-from pdtui.drive.loop_builder import build_loop
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.headless_drive import run_episode
+from pdtui.driving.loop_builder import build_loop
 from pdtui.evaluation.task_evaluation import TaskEvaluation, TaskRun, run_task, summarise_task
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
 

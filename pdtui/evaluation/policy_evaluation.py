@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless_drive import run_episode
-from pdtui.drive.loop_builder import build_loop
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.headless_drive import run_episode
+from pdtui.driving.loop_builder import build_loop
 
 
 @dataclass(frozen=True)

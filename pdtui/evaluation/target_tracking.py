@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from pdtui.core.errors import MapError
-from pdtui.drive.drive_config import DriveConfig
+from pdtui.driving.drive_config import DriveConfig
 from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveRunner
 from pdtui.search.tracking_summary import (
     TrackingSummary,

@@ -9,8 +9,8 @@ import numpy as np
 
 from pdtui.core.attributes import Floats, unwrap_angles
 from pdtui.core.events import Event
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.headless_drive import run_episode
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.headless_drive import run_episode
 from pdtui.robots.task import RunTrace, Task, TaskVerdict, mean_figures
 from pdtui.search.task_rollout import walk_steps
 from pdtui.stimulation.stimulation_map import Behavior

@@ -11,10 +11,10 @@ import numpy as np
 from pdtui.core.errors import RobotError
 from pdtui.core.events import Event
 from pdtui.core.intervals import confidence_interval
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless_drive import run_episode
-from pdtui.drive.loop_builder import build_loop
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.headless_drive import run_episode
+from pdtui.driving.loop_builder import build_loop
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 SETTLED = 100

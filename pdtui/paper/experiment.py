@@ -20,7 +20,7 @@ import pdtui.paper
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from pdtui.drive.drive_config import DriveConfig
+    from pdtui.driving.drive_config import DriveConfig
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from scipy import stats
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
-from pdtui.drive.drive_config import DriveConfig
+from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.target_tracking import find_pid_behaviors
 from pdtui.search.tracking_drives import STEPS_EACH, TrackingDrive, TrackingDriveResult, TrackingDriveRunner
 from pdtui.search.tracking_summary import HEADINGS, TrackingSummary, seed_errors, summarise_tracking

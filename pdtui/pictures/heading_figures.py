@@ -13,8 +13,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rich.table import Table
 
-from pdtui.core.angles import wrap_angles
-from pdtui.core.attributes import Floats
+from pdtui.core.attributes import Floats, wrap_angles
 from pdtui.core.errors import PictureError
 from pdtui.core.json_text import to_json
 from pdtui.pictures.markdown_report import table_to_markdown

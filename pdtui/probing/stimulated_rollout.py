@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pdtui.core.angles import wrap_angle, wrap_angles
-from pdtui.core.attributes import Floats
+from pdtui.core.attributes import Floats, wrap_angle, wrap_angles
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy

@@ -11,8 +11,7 @@ import numpy as np
 from gymnasium.envs.box2d import bipedal_walker as stock
 from numpy.typing import NDArray
 
-from pdtui.core.angles import wrap_angle
-from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.core.robot_data import Link
 from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot

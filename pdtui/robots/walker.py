@@ -10,8 +10,7 @@ import numpy as np
 from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv
 from numpy.typing import NDArray
 
-from pdtui.core.angles import wrap_angle
-from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.robots.robot_goals import WALKING_GOALS
 from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, model_links, silence_warnings
 from pdtui.robots.task import RunTrace, Task, TaskVerdict

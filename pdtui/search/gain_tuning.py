@@ -19,8 +19,8 @@ from scipy.optimize import minimize
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
 from pdtui.search.gain_search_space import gains_from_point, point_from_gains, sample_gain_points
 from pdtui.search.plan_search import Deadline, ScoringStage, TimeBudget, select_plans
 from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveResult, TrackingDriveRunner

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.core.angles import wrap_angle
-from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.core.units import Stimulation
 from pdtui.search.stimulation_sampler import round_outputs
 from pdtui.spectra.monitor import MonitoredEpisode

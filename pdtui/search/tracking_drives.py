@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pdtui.core.angles import wrap_angle, wrap_angles
-from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.attributes import Attribute, Floats, wrap_angle, wrap_angles
 from pdtui.core.closable import Closable
 from pdtui.core.events import Event
 from pdtui.core.worker_pool import WorkerPool
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.loop_builder import build_loop
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.loop_builder import build_loop
 from pdtui.search.step_response import StepResponse, measure_step_response
 from pdtui.stimulation.stimulation_map import PidGains
 

@@ -9,8 +9,7 @@ from itertools import zip_longest
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.core.angles import wrap_angles
-from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.attributes import Attribute, Floats, wrap_angles
 from pdtui.core.errors import SessionError
 from pdtui.core.events import Event, describe_event
 from pdtui.sessions.session_reader import Session

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from simple_pid import PID
 
-from pdtui.core.angles import wrap_angle
+from pdtui.core.attributes import wrap_angle
 from pdtui.stimulation.stimulation_map import PidGains
 
 

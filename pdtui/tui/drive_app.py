@@ -14,9 +14,9 @@ from textual.containers import Container
 from textual.reactive import reactive
 
 from pdtui.core.errors import PdtuiError
-from pdtui.drive.client import DriveConnection
-from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
-from pdtui.drive.pacer import PaceRequest
+from pdtui.driving.client import DriveConnection
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import key_name
 from pdtui.tui.help_screen import HelpScreen

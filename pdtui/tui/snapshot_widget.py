@@ -19,7 +19,7 @@ from pdtui.tui.theme import ThemeStyles, theme_styles
 if TYPE_CHECKING:
     from textual import events
 
-    from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
+    from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
     from pdtui.stimulation.stimulation_map import StimulationMap
 
 

@@ -16,8 +16,8 @@ from pdtui.core.errors import MapError, WorkerError
 from pdtui.core.intervals import confidence_interval
 from pdtui.core.text_tables import mean_with_interval
 from pdtui.core.units import Stimulation
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.behavior_evaluation import STEPS, evaluate_map, run_behavior
 from pdtui.evaluation.policy_evaluation import evaluate_policy
 from pdtui.evaluation.target_tracking import evaluate_tracking, find_pid_behaviors

@@ -71,8 +71,8 @@ def read_session_file(path: Path) -> None:
     from rich.console import Console
 
     from pdtui.cli.session_tables import compare_table, show_table
-    from pdtui.drive.keystrokes import format_keystrokes
-    from pdtui.drive.replay import replay_config
+    from pdtui.driving.keystrokes import format_keystrokes
+    from pdtui.driving.replay import replay_config
     from pdtui.sessions.session_comparison import compare_sessions
     from pdtui.sessions.session_header import read_session_header
     from pdtui.sessions.session_reader import read_activations, read_session
@@ -100,7 +100,7 @@ def read_session_file(path: Path) -> None:
 
 
 def _reads(map_path: Path) -> dict[str, Callable[[Path], object]]:
-    from pdtui.drive.keystrokes import read_keystrokes
+    from pdtui.driving.keystrokes import read_keystrokes
     from pdtui.policies.weights.policy_loading import load_policy
     from pdtui.stimulation.map_policy_lookup import resolve_map_policy
     from pdtui.stimulation.map_reader import load_map

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from pdtui.cli import main
 from pdtui.core.errors import RobotError
-from pdtui.drive.drive_config import DriveConfig
+from pdtui.driving.drive_config import DriveConfig
 from pdtui.paper.command_following import evaluate_command_following
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from pdtui.cli import main
 from pdtui.core.errors import MapError
-from pdtui.drive.drive_config import DriveConfig
+from pdtui.driving.drive_config import DriveConfig
 from pdtui.paper.heading_precision import compare_heading_precision, paired_ratio
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.policies.weights.policy_loading import load_any_network

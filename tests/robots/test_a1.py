@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pdtui.core.angles import wrap_angle
+from pdtui.core.attributes import wrap_angle
 from pdtui.core.errors import RobotError
 from pdtui.robots import make_robot
 from pdtui.robots.geometry import place_links

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pdtui.core.angles import wrap_angle
+from pdtui.core.attributes import wrap_angle
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.robots import make_robot
 from pdtui.robots.ant import Ant

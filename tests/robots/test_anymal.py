@@ -10,7 +10,7 @@ import pytest
 from pdtui.api import load_policy
 from pdtui.core.errors import MapError
 from pdtui.core.events import Event
-from pdtui.drive.control_loop import ControlLoop
+from pdtui.driving.control_loop import ControlLoop
 from pdtui.robots import make_robot
 from pdtui.robots.anymal import DEFAULT, Anymal
 from pdtui.robots.anymal_forward import AnymalForward

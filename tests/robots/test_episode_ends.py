@@ -15,8 +15,8 @@ from pdtui.api import load_policy
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.robot_data import RobotState
 from pdtui.core.units import NO_STIMULATION
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.headless_drive import drive_headless
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.headless_drive import drive_headless
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.start_states import collect_start_states, measure_walk_lengths
 from pdtui.probing.stimulated_rollout import run_rollout

@@ -228,9 +228,9 @@ import numpy as np
 from pdtui.core.units import NO_STIMULATION
 from pdtui.dissection.dissect import dissect
 from pdtui.dissection.dissection_config import DissectionConfig
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless_drive import drive_headless
-from pdtui.drive.loop_builder import build_loop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.headless_drive import drive_headless
+from pdtui.driving.loop_builder import build_loop
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
 from pdtui.stimulation.map_library import bare_map

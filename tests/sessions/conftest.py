@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.step_record import StepRecord
-from pdtui.drive.control_loop import ControlLoop
+from pdtui.driving.control_loop import ControlLoop
 from tests.sessions.recorded_drives import random_weights, record_drive
 
 Recorded = tuple[Path, ControlLoop, list[StepRecord]]

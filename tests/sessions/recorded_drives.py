@@ -9,7 +9,7 @@ import torch
 
 from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
-from pdtui.drive.control_loop import ControlLoop
+from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import save_network

@@ -11,7 +11,7 @@ from rerun.chunk import RrdReader
 
 from pdtui.core.attributes import Floats
 from pdtui.core.events import Event
-from pdtui.drive.snapshot_builder import SnapshotBuilder
+from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.episode_statistics import EpisodeStatistics, EpisodeStatisticsCounter
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_repair import repair_session

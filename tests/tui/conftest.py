@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import PdtuiError
-from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
-from pdtui.drive.pacer import PaceRequest
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.drive_app import DriveApp
 from tests.tui.recorded_snapshots import drive_map, load

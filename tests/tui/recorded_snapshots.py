@@ -12,7 +12,7 @@ import numpy as np
 from pdtui.core.attributes import Attribute, BehaviorAim
 from pdtui.core.robot_data import Link
 from pdtui.core.step_record import ActiveBehavior
-from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUnit
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUnit
 from pdtui.stimulation.stimulation_map import Behavior, MotorPrimitive, PidGains, StimulationMap
 
 ARRAYS = ("activations", "attributes", "poses", "history", "path")

@@ -12,9 +12,9 @@ import pytest
 from pdtui.core.errors import PdtuiError
 from pdtui.core.events import Event
 from pdtui.core.key_table import RESERVED_KEYS
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
-from pdtui.drive.snapshot_builder import SnapshotBuilder
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap

@@ -7,8 +7,8 @@ import pytest
 from pdtui.core.errors import MapError
 from pdtui.core.events import Event, describe_event
 from pdtui.core.key_table import EVENT_WORDINGS, FIXED_KEYS, RUN_KEYS, FixedKey
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.keystrokes import interpret_key, run_keys
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.keystrokes import interpret_key, run_keys
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.map_reader import parse_map

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.sessions.episode_statistics import EpisodeStatistics
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.obstacle_drawing import draw_from_above, draw_from_side

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
-from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.tui.map_picker import MapPickerApp
 from tests.tui.conftest import MakeApp, ScriptedConnection
 from tests.tui.screens import played

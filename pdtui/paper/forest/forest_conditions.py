@@ -13,9 +13,9 @@ from typing import Literal
 
 from pdtui.core.errors import PdtuiError, PolicyError, SessionError
 from pdtui.core.worker_pool import WorkerPool
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.loop_builder import build_loop
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.loop_builder import build_loop
 from pdtui.paper.forest.forest_episode import (
     FOREST,
     ROUGH,

@@ -11,9 +11,9 @@ import numpy as np
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import SessionError
 from pdtui.core.events import Event
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.headless_drive import key_events, run_episode
-from pdtui.drive.keystrokes import format_keystrokes
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.headless_drive import key_events, run_episode
+from pdtui.driving.keystrokes import format_keystrokes
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
 from pdtui.paper.forest.scripted_operator import DEFAULT, ScriptedOperator, operator_keys
 from pdtui.robots.legged.terrain import AHEAD

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from pdtui.core.angles import wrap_angle
-from pdtui.core.attributes import Floats
+from pdtui.core.attributes import Floats, wrap_angle
 from pdtui.core.errors import RobotError
 from pdtui.paper.forest.key_motion_model import (
     STEPS_OBSERVED,

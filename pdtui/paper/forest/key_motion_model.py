@@ -16,8 +16,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.core.angles import wrap_angle
-from pdtui.core.attributes import Floats
+from pdtui.core.attributes import Floats, wrap_angle
 
 STEPS_OBSERVED = 16
 """Control steps over which the motion is estimated: about one stride."""

@@ -11,8 +11,7 @@ import math
 
 import numpy as np
 
-from pdtui.core.angles import wrap_angle
-from pdtui.core.attributes import Floats
+from pdtui.core.attributes import Floats, wrap_angle
 
 STUCK_TIME = 0.5
 """Time without progress after which the robot counts as stuck, s."""

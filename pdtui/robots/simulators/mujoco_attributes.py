@@ -11,8 +11,7 @@ from functools import partial
 import mujoco
 import numpy as np
 
-from pdtui.core.angles import wrap_angle
-from pdtui.core.attributes import Attribute
+from pdtui.core.attributes import Attribute, wrap_angle
 from pdtui.robots.geometry import roll_pitch_yaw, rotate
 
 _FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint

@@ -14,7 +14,7 @@ from textual.color import Color
 from textual.strip import Strip
 
 from pdtui.core.units import format_unit, locate_unit
-from pdtui.drive.drive_snapshot import DriveSnapshot, StimulatedUnit
+from pdtui.driving.drive_snapshot import DriveSnapshot, StimulatedUnit
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import HEAT_LEVELS

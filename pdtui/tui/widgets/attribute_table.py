@@ -9,7 +9,7 @@ from rich.cells import cell_len
 from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
-from pdtui.drive.drive_snapshot import DriveSnapshot
+from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.sparkline import AttributeHistory, draw_sparklines

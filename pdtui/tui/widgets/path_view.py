@@ -7,7 +7,7 @@ from math import atan2, ceil, log2, pi
 import numpy as np
 from textual.strip import Strip
 
-from pdtui.drive.drive_snapshot import DriveSnapshot
+from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.robots.geometry import root_body, rotate
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import format_number

@@ -10,7 +10,7 @@ from textual.reactive import reactive
 from textual.strip import Strip
 
 from pdtui.core.robot_data import NO_OBSTACLES
-from pdtui.drive.drive_snapshot import DriveSnapshot
+from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.robots.geometry import capsule_ends, place_links, root_body, rotate
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import ScreenRow, format_number

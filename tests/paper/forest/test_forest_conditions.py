@@ -13,12 +13,12 @@ from click.testing import CliRunner, Result
 
 from pdtui.cli import main
 from pdtui.core.errors import MapError, PdtuiError, SessionError, WorkerError
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.headless_drive import drive_headless
-from pdtui.drive.keystrokes import read_keystrokes
-from pdtui.drive.loop_builder import build_loop
-from pdtui.drive.replay import replay_session
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.headless_drive import drive_headless
+from pdtui.driving.keystrokes import read_keystrokes
+from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.replay import replay_session
 from pdtui.paper.forest.forest_conditions import PERSON, REPEATS, evaluate_forest
 from pdtui.paper.forest.forest_episode import (
     build_operator,

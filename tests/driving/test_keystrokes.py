@@ -9,8 +9,14 @@ import pytest
 
 from pdtui.core.errors import KeystrokeError
 from pdtui.core.events import Event
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.keystrokes import format_keystrokes, interpret_key, interpret_keys, read_keystrokes, run_keys
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.keystrokes import (
+    format_keystrokes,
+    interpret_key,
+    interpret_keys,
+    read_keystrokes,
+    run_keys,
+)
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import StimulationMap

@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import PdtuiError
-from pdtui.drive import server
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.ending_signals import ENDING_SIGNALS, catch_ending_signals
-from pdtui.drive.loop_builder import build_loop
+from pdtui.driving import server
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.ending_signals import ENDING_SIGNALS, catch_ending_signals
+from pdtui.driving.loop_builder import build_loop
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_repair import examine_session
 from pdtui.stimulation.stimulation_map import StimulationMap

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from torch import nn
 
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_fit import check_fit

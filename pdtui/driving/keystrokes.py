@@ -10,7 +10,7 @@ from pdtui.core.errors import KeystrokeError
 from pdtui.core.events import Event
 from pdtui.core.key_table import RUN_KEYS, FixedKey
 from pdtui.core.step_record import ActiveBehavior
-from pdtui.drive.control_loop import ControlLoop
+from pdtui.driving.control_loop import ControlLoop
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 MAX_BYTES = 10_000_000

@@ -8,8 +8,8 @@ from pdtui.core.attributes import Floats
 from pdtui.core.events import describe_event
 from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.core.step_record import ActiveBehavior, StepRecord
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_snapshot import DriveSnapshot, StimulatedUnit
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_snapshot import DriveSnapshot, StimulatedUnit
 from pdtui.sessions.episode_statistics import EpisodeStatisticsCounter
 
 _ROWS_KEPT = 4000

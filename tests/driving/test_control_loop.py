@@ -11,7 +11,7 @@ import pytest
 from pdtui.core.errors import KeystrokeError
 from pdtui.core.events import Event, group_events_by_step
 from pdtui.core.step_record import StepRecord
-from pdtui.drive.control_loop import ControlLoop
+from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import StimulationMap

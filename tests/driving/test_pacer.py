@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pdtui.drive.pacer import Pacer
+from pdtui.driving.pacer import Pacer
 
 
 def _run(pacer: Pacer, start: float, seconds: float) -> int:

@@ -8,7 +8,7 @@ import sys
 
 CODE = """
 import torch
-from pdtui.drive.replay import replay_session
+from pdtui.driving.replay import replay_session
 from pdtui.policies.runtime.action_decoders import decoder_for
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.weights_file import find_weights_file, load_network

@@ -13,8 +13,8 @@ from pdtui.core.attributes import Floats, column_of
 from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
 from pdtui.core.units import Stimulation, parse_unit
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.headless_drive import drive_keys, step_recording
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.headless_drive import drive_keys, step_recording
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Protocol
 
 from pdtui.core.errors import PdtuiError
 from pdtui.core.worker_pool import describe_exit
-from pdtui.drive.drive_snapshot import DriveFacts, DriveSnapshot
-from pdtui.drive.pacer import PaceRequest
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.driving.pacer import PaceRequest
 
 if TYPE_CHECKING:
-    from pdtui.drive.drive_config import DriveConfig
+    from pdtui.driving.drive_config import DriveConfig
 
 _PATIENCE = 60.0
 """Longest wait for the recording to be completed, s; after it, the process is killed."""
@@ -45,7 +45,9 @@ class DriveConnection(Protocol):
 def _simulate(connection: Connection, config: DriveConfig) -> None:
     # The recording library would print over the screen when the disk is full or a viewer has gone.
     os.environ.setdefault("RUST_LOG", "off")
-    from pdtui.drive.server import serve_drive  # loads torch and the simulator, which the screen does without
+    from pdtui.driving.server import (
+        serve_drive,  # loads torch and the simulator, which the screen does without
+    )
 
     serve_drive(connection, config)
 

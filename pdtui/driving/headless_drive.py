@@ -17,8 +17,8 @@ from pdtui.core.errors import (
 )
 from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.keystrokes import interpret_keys
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.keystrokes import interpret_keys
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 

@@ -12,9 +12,9 @@ from torch import nn
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.events import group_events_by_step
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.loop_builder import build_loop
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.loop_builder import build_loop
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot

@@ -12,7 +12,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import KeystrokeError, MapError, SimulationDiverged
 from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
-from pdtui.drive.rewind_history import STEPS_PER_KEPT_STATE, DriveState, RewindHistory
+from pdtui.driving.rewind_history import STEPS_PER_KEPT_STATE, DriveState, RewindHistory
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot, is_fall
 from pdtui.sessions.drive_info import DriveInfo

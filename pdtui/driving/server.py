@@ -14,14 +14,14 @@ from typing import Any
 from pdtui.core.errors import PdtuiError, SessionError, format_error_in_one_line
 from pdtui.core.events import Event, group_events_by_step
 from pdtui.core.step_record import StepRecord
-from pdtui.drive.control_loop import ControlLoop
-from pdtui.drive.drive_config import DriveConfig
-from pdtui.drive.drive_snapshot import DriveFacts
-from pdtui.drive.keystrokes import interpret_keys
-from pdtui.drive.loop_builder import build_loop
-from pdtui.drive.message_sender import MessageSender
-from pdtui.drive.pacer import Pacer
-from pdtui.drive.snapshot_builder import SnapshotBuilder
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.drive_snapshot import DriveFacts
+from pdtui.driving.keystrokes import interpret_keys
+from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.message_sender import MessageSender
+from pdtui.driving.pacer import Pacer
+from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 _IDLE = 0.05

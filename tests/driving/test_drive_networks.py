@@ -9,7 +9,7 @@ import pytest
 
 from pdtui.core.events import Event, group_events_by_step
 from pdtui.core.step_record import StepRecord
-from pdtui.drive.control_loop import ControlLoop
+from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
