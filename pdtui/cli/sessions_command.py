@@ -19,8 +19,7 @@ from pdtui.cli.shared_options import (
 )
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PdtuiError, SessionError
-from pdtui.core.json_text import to_json
-from pdtui.core.printable_text import make_printable
+from pdtui.core.printable_text import make_printable, to_json
 
 BROKEN, DIFFERS = 1, 3
 """Exit codes."""

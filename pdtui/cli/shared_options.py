@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pdtui.core.errors import MapError
-from pdtui.core.json_text import to_json
-from pdtui.core.printable_text import make_printable
+from pdtui.core.printable_text import make_printable, to_json
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, NO_OPTIONS, SQUASH_NAMES, ImportOptions
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from pdtui.core.attributes import Floats, wrap_angles
 from pdtui.core.errors import PictureError
-from pdtui.core.json_text import to_json
+from pdtui.core.printable_text import to_json
 from pdtui.pictures.markdown_report import table_to_markdown
 from pdtui.pictures.matplotlib_page import figure_page
 from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, to_hex

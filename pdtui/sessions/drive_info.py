@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, TypeVar
 
 from pdtui.core.attributes import Attribute
+from pdtui.core.errors import SessionError
 from pdtui.core.robot_data import Link
-from pdtui.sessions.session_schema import ActivationsKept
+from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, SCHEMA, ActivationsKept
 
 
 @dataclass(frozen=True)
@@ -41,3 +46,144 @@ class DriveInfo:
     activations: ActivationsKept = "all"
     start: str = ""
     obstacles: bool = False
+
+
+T = TypeVar("T")
+_SIZES = {"capsule": 2, "sphere": 1, "box": 3}
+_MAX_LINKS, _MAX_UNITS, _MAX_TEXT = 10_000, 4_000_000, 1000
+
+
+def encode_drive_info(info: DriveInfo, created: str) -> dict[str, Any]:
+    """Return the properties of a drive: plain values, which the viewer shows, and structures as JSON.
+
+    Args:
+        info: the drive.
+        created: date and time at which it began, ISO 8601.
+    """
+    return {
+        "schema": SCHEMA,
+        "created": created,
+        "robot": info.robot,
+        # As text, because a seed may exceed 64 bits.
+        "seed": str(info.seed),
+        "policy": info.policy,
+        "policy_hash": info.policy_hash,
+        "stochastic": info.stochastic,
+        "start": info.start,
+        "obstacles": info.obstacles,
+        "dt": info.dt,
+        "layers": list(info.layers),
+        "activations": info.activations,
+        "attributes": json.dumps([asdict(attribute) for attribute in info.attributes]),
+        "links": json.dumps([asdict(link) for link in info.links]),
+        "map": info.map_text,
+    }
+
+
+def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, str]:
+    """Decode the properties that `encode_drive_info` returned, trusting none of them.
+
+    Args:
+        properties: a list of values for each name, as the file contains them.
+
+    Returns:
+        The drive, and the date and time at which it began.
+
+    Raises:
+        SessionError: a property is missing or invalid; the message names it.
+    """
+    schema = _read_value(properties, "schema", int)
+    if schema != SCHEMA:
+        raise SessionError(f"property 'schema': expected {SCHEMA}, found {schema}")
+    seed = _read_value(properties, "seed", str)
+    if not (seed.isascii() and seed.isdigit() and len(seed) < 100):
+        raise SessionError(f"property 'seed': expected a whole number, found '{seed[:40]}'")
+    dt = _read_value(properties, "dt", float)
+    if not (math.isfinite(dt) and 0 < dt < 1e6):
+        raise SessionError(f"property 'dt': expected a positive time in s, found {dt}")
+    layers = properties.get("layers", [])
+    if not layers or not all(type(width) is int and width > 0 for width in layers):
+        raise SessionError("property 'layers': expected the widths of the hidden layers")
+    if sum(layers) > _MAX_UNITS:
+        raise SessionError(f"property 'layers': expected at most {_MAX_UNITS} units, found {sum(layers)}")
+    # Older sessions, which lack the property, contain all activations.
+    kept = _read_value(properties, "activations", str) if "activations" in properties else "all"
+    if kept not in ACTIVATIONS_KEPT:
+        raise SessionError(
+            f"property 'activations': expected one of {', '.join(ACTIVATIONS_KEPT)}, found '{kept[:40]}'"
+        )
+    info = DriveInfo(
+        robot=_read_value(properties, "robot", str),
+        seed=int(seed),
+        policy=_read_value(properties, "policy", str),
+        policy_hash=_read_value(properties, "policy_hash", str),
+        map_text=_read_value(properties, "map", str),
+        stochastic=_read_value(properties, "stochastic", bool),
+        dt=dt,
+        attributes=_read_list(properties, "attributes", _attribute),
+        links=_read_list(properties, "links", _link),
+        layers=tuple(layers),
+        activations=kept,
+        # Older sessions lack the following properties.
+        start=_read_value(properties, "start", str) if "start" in properties else "",
+        obstacles=_read_value(properties, "obstacles", bool) if "obstacles" in properties else False,
+    )
+    return info, _read_value(properties, "created", str)
+
+
+def _read_value(properties: Mapping[str, list[Any]], name: str, kind: type[T]) -> T:
+    values = properties.get(name)
+    if not isinstance(values, list) or len(values) != 1 or type(values[0]) is not kind:
+        found = "nothing" if not values else f"{type(values[0]).__name__} × {len(values)}"
+        raise SessionError(f"property '{name}': expected one {kind.__name__}, found {found}")
+    return values[0]
+
+
+def _read_list(
+    properties: Mapping[str, list[Any]], name: str, build: Callable[[dict[str, Any]], T]
+) -> tuple[T, ...]:
+    text = _read_value(properties, name, str)
+    try:
+        items = json.loads(text)
+        if not isinstance(items, list) or len(items) > _MAX_LINKS:
+            raise ValueError(f"expected a list of at most {_MAX_LINKS} items")
+        return tuple(build(item) for item in items)
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
+        raise SessionError(f"property '{name}': invalid: {error!r}") from error
+
+
+def _attribute(item: dict[str, Any]) -> Attribute:
+    wraps = item["wraps"]
+    if type(wraps) is not bool:
+        raise ValueError("'wraps' is not a boolean")
+    (scale,) = _numbers([item["scale"]], 1)
+    return Attribute(_text(item["name"]), _text(item["unit"]), scale, wraps)
+
+
+def _link(item: dict[str, Any]) -> Link:
+    shape, body = item["shape"], item["body"]
+    if shape not in _SIZES:
+        raise ValueError(f"unknown shape {shape!r}")
+    if type(body) is not int or not 0 <= body < _MAX_LINKS:
+        raise ValueError("'body' is not a row number")
+    size = _numbers(item["size"], _SIZES[shape])
+    x, y, z = _numbers(item["position"], 3)
+    a, b, c, d = _numbers(item["quaternion"], 4)
+    return Link(_text(item["name"]), body, shape, size, (x, y, z), (a, b, c, d))
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"expected text, found {type(value).__name__}")
+    if len(value) > _MAX_TEXT:
+        raise ValueError(f"expected at most {_MAX_TEXT} characters, found {len(value)}")
+    value.encode()  # fails for the lone surrogates that JSON can contain
+    return value
+
+
+def _numbers(values: Any, count: int) -> tuple[float, ...]:
+    if not isinstance(values, list) or len(values) != count:
+        raise ValueError(f"expected {count} numbers")
+    if not all(type(value) in (int, float) and math.isfinite(value) for value in values):
+        raise ValueError("expected finite numbers")
+    return tuple(float(value) for value in values)

@@ -10,8 +10,7 @@ import numpy as np
 from pdtui.core.errors import SessionError
 from pdtui.core.events import Event
 from pdtui.core.key_table import EVENT_WORDINGS
-from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.drive_info_codec import decode_drive_info
+from pdtui.sessions.drive_info import DriveInfo, decode_drive_info
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS

@@ -14,7 +14,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import SessionError
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.core.units import Stimulation
-from pdtui.sessions.drive_info_codec import decode_drive_info
+from pdtui.sessions.drive_info import decode_drive_info
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_header import SessionHeader, count_steps, decode_header

@@ -13,8 +13,7 @@ import rerun.chunk
 
 from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import SessionError
-from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.drive_info_codec import decode_drive_info
+from pdtui.sessions.drive_info import DriveInfo, decode_drive_info
 from pdtui.sessions.rrd.chunk_stream import ChunkStream
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_header import SessionHeader, count_steps, decode_header, read_outcome

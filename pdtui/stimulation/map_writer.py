@@ -1,40 +1,43 @@
 """Writing maps. In a map that somebody edited, everything but the change stays as it was, comments included.
 
-Every text is read again before it is returned, so that what is written is a map.
+Every text is read again before it is returned, so that what is written is a map; a `MapError` names the map
+as `source` and says what is wrong.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import InlineTable, Table
 
 from pdtui.core.atomic_file import write_file
+from pdtui.core.attributes import BehaviorAim
 from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.stimulation.map_reader import parse_map
-from pdtui.stimulation.map_toml import (
-    array_of,
-    behavior_fields,
-    effect_table,
-    policy_fields,
-    primitive_fields,
-    table_of,
+from pdtui.stimulation.stimulation_map import (
+    SCHEMA,
+    Behavior,
+    MeasuredEffect,
+    MotorPrimitive,
+    PidGains,
+    StimulationMap,
 )
-from pdtui.stimulation.stimulation_map import SCHEMA, Behavior, MeasuredEffect, PidGains, StimulationMap
 
 Value = TypeVar("Value")
+_MAX_INLINE = 5
+"""Units that are written on one line; more of them get a line each."""
+_OPTIONAL_FIELDS = "says mode period task magnitudes base commands together pid aim measured"
+"""Fields of a behavior in the order in which they are written."""
 
 
 def compose_map(stimulation_map: StimulationMap, comments: Sequence[str] = ()) -> str:
-    """Return the text of a new map.
-
-    Args:
-        stimulation_map: What the map holds; its `text` is not used.
-        comments: Lines at the top.
+    """Return the text of a new map with comments at the top; the map's own `text` is not used.
 
     Raises:
         MapError: Something in it is not allowed in a map.
@@ -45,42 +48,36 @@ def compose_map(stimulation_map: StimulationMap, comments: Sequence[str] = ()) -
     document.add("schema", tomlkit.item(SCHEMA))
     document.add("robot", tomlkit.item(stimulation_map.robot))
     policy = stimulation_map.policy, stimulation_map.policy_hash, stimulation_map.import_options
-    document.add("policy", table_of(policy_fields(*policy)))
-    document.add("keys", table_of({"default": stimulation_map.default_key}))
-    if primitives := [primitive_fields(one) for one in stimulation_map.primitives.values()]:
-        document.add("primitives", array_of(primitives))
-    if behaviors := [behavior_fields(one) for one in stimulation_map.behaviors.values()]:
-        document.add("behaviors", array_of(behaviors))
+    document.add("policy", _table_of(_policy_fields(*policy)))
+    document.add("keys", _table_of({"default": stimulation_map.default_key}))
+    primitives = [_primitive_fields(one) for one in stimulation_map.primitives.values()]
+    behaviors = [_behavior_fields(one) for one in stimulation_map.behaviors.values()]
+    for name, tables in (("primitives", primitives), ("behaviors", behaviors)):
+        array = tomlkit.aot()
+        for fields in tables:
+            array.append(_table_of(fields))
+        if tables:
+            document.add(name, array)
     text = tomlkit.dumps(document)
     parse_map(text, stimulation_map.source)
     return text
 
 
 def replace_effects(text: str, measured: Mapping[str, MeasuredEffect], source: str) -> str:
-    """Return the text of a map with other measured effects.
-
-    Args:
-        text: The map.
-        measured: Effects by the names of their behaviors.
-        source: Name of the map in messages.
+    """Return the text of a map with other measured effects, given by the names of their behaviors.
 
     Raises:
         MapError: The text is no map, or it lacks one of the behaviors.
     """
 
     def replace(behavior: Any, effect: MeasuredEffect) -> None:
-        behavior["measured"] = effect_table(effect)
+        behavior["measured"] = _effect_table(effect)
 
     return _edit_behaviors(text, source, measured, replace)
 
 
 def replace_gains(text: str, gains: Mapping[str, PidGains], source: str) -> str:
-    """Return the text of a map with other gains and limits of behaviors of mode ``pid``.
-
-    Args:
-        text: The map.
-        gains: Controllers by the names of their behaviors.
-        source: Name of the map in messages.
+    """Return the text of a map with other gains and limits, given by the names of behaviors of mode ``pid``.
 
     Raises:
         MapError: As `replace_effects`, or a behavior has another mode.
@@ -95,13 +92,7 @@ def replace_gains(text: str, gains: Mapping[str, PidGains], source: str) -> str:
 
 
 def replace_policy(text: str, name: str, import_options: ImportOptions, source: str) -> str:
-    """Return the text of a map that names its policy's file otherwise. The hash stays.
-
-    Args:
-        text: The map.
-        name: Weights file, or name of a shipped policy.
-        import_options: Answers to what the weights file does not state.
-        source: Name of the map in messages.
+    """Return the text of a map that names another weights file or shipped policy. The hash stays.
 
     Raises:
         MapError: The text is no map.
@@ -109,33 +100,28 @@ def replace_policy(text: str, name: str, import_options: ImportOptions, source: 
 
     def replace(document: Any) -> None:
         policy = document["policy"]
-        policy.update(policy_fields(name, policy["sha256"], import_options))
+        policy.update(_policy_fields(name, policy["sha256"], import_options))
 
     return _edit(text, source, replace)
 
 
 def add_behavior(text: str, behavior: Behavior, source: str) -> str:
-    """Return the text of a map with one more behavior, or with a new one in place of that of the same name.
-
-    Args:
-        text: The map.
-        behavior: The behavior. One that takes another's place keeps the other's key.
-        source: Name of the map in messages.
+    """Return the text of a map with one more behavior; one of the same name is replaced but keeps its key.
 
     Raises:
         MapError: The text is no map, or the behavior does not fit into it.
     """
-    fields = behavior_fields(behavior)
+    fields = _behavior_fields(behavior)
 
     def add(document: Any) -> None:
         behaviors = document.setdefault("behaviors", tomlkit.aot())
         table = next((one for one in behaviors if one["name"] == behavior.name), None)
         if table is None:
-            behaviors.append(table_of(fields))
+            behaviors.append(_table_of(fields))
             return
         for name in [name for name in table if name not in ("name", "key")]:
             del table[name]
-        for name, value in table_of(fields).items():
+        for name, value in _table_of(fields).items():
             if name not in ("name", "key"):
                 table[name] = value
 
@@ -178,3 +164,56 @@ def _edit(text: str, source: str, change: Callable[[Any], None]) -> str:
     changed = tomlkit.dumps(document)
     parse_map(changed, source)
     return changed
+
+
+def _policy_fields(name: str, sha256: str, import_options: ImportOptions) -> dict[str, Any]:
+    """Return the fields of the policy's table. Import options that say nothing are left out."""
+    options = {option: value for option, value in asdict(import_options).items() if value}
+    return {"name": name, "sha256": sha256, **options}
+
+
+def _primitive_fields(primitive: MotorPrimitive) -> dict[str, Any]:
+    """Return the fields of a motor primitive. What is not known is left out."""
+    return {name: _to_toml(value) for name, value in vars(primitive).items() if value is not None}
+
+
+def _behavior_fields(behavior: Behavior) -> dict[str, Any]:
+    """Return the fields of a behavior. Those that have their default are left out."""
+    fields: dict[str, Any] = {"name": behavior.name, "key": behavior.key}
+    for name in _OPTIONAL_FIELDS.split():
+        value = getattr(behavior, name)
+        if value and (name, value) != ("mode", "fixed"):
+            fields[name] = _to_toml(value)
+    return fields
+
+
+def _to_toml(value: Any) -> Any:
+    if isinstance(value, MeasuredEffect):
+        return _effect_table(value)
+    if isinstance(value, PidGains | BehaviorAim):
+        return _inline(asdict(value))
+    if isinstance(value, dict):
+        return _inline(value) if len(value) <= _MAX_INLINE else _table_of(value)
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _effect_table(measured: MeasuredEffect) -> InlineTable:
+    """Return an effect with four significant digits, and the falls where they were counted."""
+    numbers = {name: float(f"{getattr(measured, name):.4g}") for name in ("effect", "low", "high")}
+    if measured.falls is None or measured.of is None:
+        return _inline(numbers)
+    return _inline({**numbers, "falls": measured.falls, "of": measured.of})
+
+
+def _table_of(fields: Mapping[str, Any]) -> Table:
+    """Return a table with a line for each field. Subtables come last, as TOML requires."""
+    table = tomlkit.table()
+    for name, value in sorted(fields.items(), key=lambda field: isinstance(field[1], Table)):
+        table.add(name, value)
+    return table
+
+
+def _inline(values: Mapping[str, Any]) -> InlineTable:
+    table = tomlkit.inline_table()
+    table.update(values)
+    return table

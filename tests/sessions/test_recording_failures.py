@@ -15,7 +15,7 @@ import pytest
 import rerun as rr
 
 from pdtui.core.errors import SessionError
-from pdtui.sessions.drive_info_codec import decode_drive_info, encode_drive_info
+from pdtui.sessions.drive_info import decode_drive_info, encode_drive_info
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pytest
 
 from pdtui.core.errors import SessionError
-from pdtui.sessions.rrd.chunk_head import decompress_start
+from pdtui.sessions.rrd.message_decoder import decompress_start
 from pdtui.sessions.rrd.message_framing import CHUNK, read_message_frames
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_reader import read_session

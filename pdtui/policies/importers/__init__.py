@@ -6,7 +6,6 @@ from pathlib import Path
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.cleanrl import import_cleanrl
-from pdtui.policies.importers.file_kind import FileKind, file_kind_of
 from pdtui.policies.importers.network_assembly import assemble_network
 from pdtui.policies.importers.observation_statistics import read_statistics
 from pdtui.policies.importers.partial_policy import PartialPolicy
@@ -15,7 +14,9 @@ from pdtui.policies.importers.rllib import import_rllib
 from pdtui.policies.importers.rsl_rl import import_rsl_rl
 from pdtui.policies.importers.stable_baselines3 import OTHER_NETWORKS, import_sb3, is_sb3
 from pdtui.policies.importers.tensor_files import (
+    FileKind,
     Tensors,
+    file_kind_of,
     flatten_tensors,
     from_npz,
     from_safetensors,

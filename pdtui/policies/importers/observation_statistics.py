@@ -14,9 +14,15 @@ from pathlib import Path
 import torch
 
 from pdtui.core.errors import PolicyError
-from pdtui.policies.importers.file_kind import FileKind, file_kind_of
 from pdtui.policies.importers.partial_policy import ObservationStatistics
-from pdtui.policies.importers.tensor_files import Tensors, flatten_tensors, from_npz, from_safetensors
+from pdtui.policies.importers.tensor_files import (
+    FileKind,
+    Tensors,
+    file_kind_of,
+    flatten_tensors,
+    from_npz,
+    from_safetensors,
+)
 from pdtui.policies.importers.zip_archive import ZipArchive, read_bounded
 
 _EPSILON = 1e-8

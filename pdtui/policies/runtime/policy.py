@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,9 +18,7 @@ from pdtui.policies.runtime import recurrent_state
 from pdtui.policies.runtime.action_decoders import Decoder, mean_action
 from pdtui.policies.runtime.fast_mlp import fast_mlp_of
 from pdtui.policies.runtime.recurrent_state import PolicyState
-from pdtui.policies.runtime.torch_threads import one_thread
-from pdtui.policies.runtime.unit_hooks import UnitHooks
-from pdtui.policies.runtime.unit_layers import hidden_modules, name_layers
+from pdtui.policies.runtime.unit_layers import UnitHooks, hidden_modules, name_layers
 
 
 class PolicyStep(NamedTuple):
@@ -205,3 +204,21 @@ class Policy:
                 f"the policy has {describe_layers(self.layers)}"
             ) from None
         return PolicyStep(action, activations, natural)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let PyTorch compute with one thread inside the block, then with as many as before.
+
+    For networks of the size of a policy, more threads only cost time, and they change the order of sums, so
+    that runs would not repeat bit for bit.
+    """
+    threads = torch.get_num_threads()
+    if threads == 1:
+        yield
+        return
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)

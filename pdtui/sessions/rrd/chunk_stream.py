@@ -12,13 +12,13 @@ import pyarrow as pa
 
 from pdtui.core.errors import SessionError
 from pdtui.core.untrusted_file import open_regular_file
-from pdtui.sessions.rrd.chunk_head import read_chunk_head
 from pdtui.sessions.rrd.message_decoder import (
     MAX_MESSAGE,
     EntityChunk,
     StoreInfo,
     decode_chunk,
     decode_store_info,
+    read_chunk_head,
 )
 from pdtui.sessions.rrd.message_framing import (
     CHUNK,

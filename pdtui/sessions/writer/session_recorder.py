@@ -14,8 +14,7 @@ import rerun as rr
 
 from pdtui.core.errors import RecordingEnded, SessionError
 from pdtui.core.step_record import StepRecord
-from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.drive_info_codec import encode_drive_info
+from pdtui.sessions.drive_info import DriveInfo, encode_drive_info
 from pdtui.sessions.environment_versions import collect_versions
 from pdtui.sessions.rrd.message_framing import undamaged_length
 from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 
-from pdtui.core.json_text import to_json
+from pdtui.core.printable_text import to_json
 
 
 def test_numbers_that_json_does_not_know_are_null() -> None:
