@@ -57,8 +57,8 @@ class DriveSnapshot:
         step: number of control steps done.
         time: simulated time, s.
         episode: number of the episode.
-        active: latched behaviors, in the order in which they were latched.
-        units: the stimulated units.
+        active_behaviors: latched behaviors, in the order in which they were latched.
+        stimulated_units: the units that they overwrite.
         activations: activation of every hidden unit, shape (U,).
         attributes: present values, shape (J,).
         poses: body poses, shape (B, 7).
@@ -80,8 +80,8 @@ class DriveSnapshot:
     step: int
     time: float
     episode: int
-    active: tuple[ActiveBehavior, ...]
-    units: tuple[StimulatedUnit, ...]
+    active_behaviors: tuple[ActiveBehavior, ...]
+    stimulated_units: tuple[StimulatedUnit, ...]
     activations: NDArray[np.float32]
     attributes: Floats
     poses: Floats

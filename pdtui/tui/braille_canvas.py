@@ -12,7 +12,7 @@ from rich.segment import Segment
 from rich.style import Style
 from textual.strip import Strip
 
-Floats = NDArray[np.float64]
+from pdtui.core.attributes import Floats
 
 DOTS_X, DOTS_Y = 2, 4
 # Unicode numbers the dots of a braille cell column by column, the lowest row (7 and 8) last.

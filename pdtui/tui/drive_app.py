@@ -10,21 +10,24 @@ from typing import cast
 
 from textual import events
 from textual.app import App, ComposeResult
+from textual.binding import Binding
 from textual.containers import Container
+from textual.geometry import Size
 from textual.reactive import reactive
+from textual.strip import Strip
+from textual.widget import Widget
 
 from pdtui.core.errors import PdtuiError
+from pdtui.core.key_table import FIXED_KEYS
 from pdtui.driving.client import DriveConnection
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
-from pdtui.tui.cell_text import key_name
+from pdtui.tui.cell_text import ScreenRow, key_name
 from pdtui.tui.help_screen import HelpScreen
-from pdtui.tui.key_bindings import BINDINGS, HINTS, map_keys
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
-from pdtui.tui.terminal_size_notice import TerminalSizeNotice, is_too_small
-from pdtui.tui.theme import THEME
+from pdtui.tui.theme import STYLES, THEME
 from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
 from pdtui.tui.widgets.attribute_table import AttributeTable
 from pdtui.tui.widgets.behavior_list import BehaviorList
@@ -34,7 +37,16 @@ from pdtui.tui.widgets.status_lines import KeyLine, NoticeLine, StatusLine
 from pdtui.tui.widgets.unit_table import UnitTable
 
 NOTICE_SECONDS = 4.0
+LEAST_SIZE = Size(80, 24)
 _ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
+# A key that changes the run goes to the drive under its original name, whatever key the user gave it.
+# Each binding has an id, so that users can remap it.
+BINDINGS: list[Binding] = [
+    *(Binding(row.key, row.action or f"run_key('{row.key}')", row.says, id=row.id) for row in FIXED_KEYS),
+    Binding("ctrl+c", "leave", "ends the drive and quits, always", id="quit_always", priority=True),
+]
+_HINTS = {row.id: row.hint for row in sorted(FIXED_KEYS, key=lambda row: row.hint_rank) if row.hint}
+"""Words of the key line by the bindings' ids, the most useful first."""
 
 
 class DriveApp(App[str]):
@@ -71,7 +83,9 @@ class DriveApp(App[str]):
     ) -> None:
         super().__init__()
         self.connection, self.map, self.fps, self.watching = connection, stimulation_map, fps, watching
-        self._map_keys = map_keys(stimulation_map)
+        # The map's keys come before the application's own.
+        behaviors = stimulation_map.behaviors.values()
+        self._map_keys = {stimulation_map.default_key, *(behavior.key for behavior in behaviors)}
         self._notice_until = 0.0
         self._help: HelpScreen | None = None
         self.register_theme(THEME)
@@ -97,11 +111,11 @@ class DriveApp(App[str]):
         yield TerminalSizeNotice(id="too-small")
 
     def on_mount(self) -> None:
-        """Start polling."""
         self.query_one(StatusLine).watching = self.watching
         self._show_keys()
         self.set_interval(1.0 / self.fps, self._poll)
-        # By default, these signals would leave the terminal raw and the recording unfinished.
+        # By default, these signals would leave the terminal raw and the recording unfinished. The event loop
+        # removes the handlers when it is closed.
         loop = asyncio.get_running_loop()
         for number in _ENDING_SIGNALS:
             loop.add_signal_handler(number, self._end, number)
@@ -110,18 +124,12 @@ class DriveApp(App[str]):
         """Leave out the robot's picture for a world without links."""
         self.screen_stack[0].set_class(facts is not None and not facts.links, "-bodiless")
 
-    def on_unmount(self) -> None:
-        """Restore the signals' handlers."""
-        loop = asyncio.get_running_loop()
-        for number in _ENDING_SIGNALS:
-            loop.remove_signal_handler(number)
-
     def _end(self, number: signal.Signals) -> None:
         self.exit(f"ended by {number.name}", return_code=1)
 
     def on_resize(self, event: events.Resize) -> None:
-        """Show the drive, or say that the terminal is too small for it."""
-        self.screen_stack[0].set_class(is_too_small(event.size), "-too-small")
+        too_small = event.size.width < LEAST_SIZE.width or event.size.height < LEAST_SIZE.height
+        self.screen_stack[0].set_class(too_small, "-too-small")
 
     def set_keymap(self, keymap: Mapping[str, str]) -> None:
         """Bind other keys, by the bindings' ids in `pdtui.core.key_table`."""
@@ -144,7 +152,7 @@ class DriveApp(App[str]):
 
     def _show_keys(self) -> None:
         now = self.keys_now
-        shown = tuple((key_name(now[name][0]), says) for name, says in HINTS.items() if name in now)
+        shown = tuple((key_name(now[name][0]), says) for name, says in _HINTS.items() if name in now)
         self.query_one(KeyLine).keys = shown
         leave = now.get("quit", now["quit_always"])[0]
         self.query_one(NoticeLine).hints = f"{key_name(leave)} quits"
@@ -210,3 +218,23 @@ class DriveApp(App[str]):
     def action_leave(self) -> None:
         """Quit; the caller of `run` then ends the drive."""
         self.exit()
+
+
+class TerminalSizeNotice(Widget, can_focus=False):
+    """Shows the needed and the present size instead of a drive that does not fit; the drive continues."""
+
+    def render_line(self, y: int) -> Strip:
+        """Render one line; the message is centred in the terminal."""
+        (width, height), terminal = self.size, self.app.size
+        lines = [
+            ("terminal too small", STYLES.accent),
+            (f"need {LEAST_SIZE.width} × {LEAST_SIZE.height}", STYLES.text),
+            (f"have {terminal.width} × {terminal.height}", STYLES.warn),
+            ("the drive continues", STYLES.muted),
+        ]
+        row = y - max(0, (height - len(lines)) // 2)
+        if not 0 <= row < len(lines):
+            return Strip.blank(width, STYLES.base)
+        text, style = lines[row]
+        line = ScreenRow(width).add(" " * max(0, (width - len(text)) // 2), style).add(text, style)
+        return line.strip().apply_style(STYLES.base)

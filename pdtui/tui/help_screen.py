@@ -16,7 +16,7 @@ from textual.widgets import Static
 from pdtui.core.printable_text import make_printable
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import key_name
-from pdtui.tui.theme import ThemeStyles, theme_styles
+from pdtui.tui.theme import STYLES
 
 _LATCHING = (
     "A key latches its behavior, which stays active until its period ends, or until you press the key of "
@@ -47,13 +47,13 @@ class HelpScreen(ModalScreen[None]):
         with VerticalScroll(id="help", can_focus=False) as box:
             box.border_title = "keys"
             box.border_subtitle = "? q ↵ close   ↑ ↓ scroll"
-            yield Static(self._text(theme_styles(self.app.theme_variables)))
+            yield Static(self._text())
 
     def action_scroll(self, direction: int) -> None:
         """Scroll the list by a few lines."""
         self.query_one("#help").scroll_relative(y=3 * direction, animate=False)
 
-    def _text(self, palette: ThemeStyles) -> Text:
+    def _text(self) -> Text:
         text = Text(no_wrap=False)
 
         def line(key: str, says: str, cap: Style, style: Style) -> None:
@@ -61,19 +61,14 @@ class HelpScreen(ModalScreen[None]):
             text.append(" " * max(1, 9 - len(key_name(key))))
             text.append(f"{make_printable(says)}\n", style)
 
-        text.append("behaviors\n", palette.accent)
+        text.append("behaviors\n", STYLES.accent)
         for row, behavior in enumerate(self._map.behaviors.values()):
-            cap = palette.caps[row % len(palette.caps)]
-            line(
-                behavior.key, f"{behavior.name}: {behavior.says}{_detail(behavior.period)}", cap, palette.text
-            )
-        line(self._map.default_key, "clears all stimulation", palette.key, palette.text)
-        text.append(f"\n{_LATCHING}\n", palette.muted)
-        text.append("\nother keys\n", palette.accent)
+            cap = STYLES.caps[row % len(STYLES.caps)]
+            period = "" if behavior.period is None else f" ({behavior.period:g} s)"
+            line(behavior.key, f"{behavior.name}: {behavior.says}{period}", cap, STYLES.text)
+        line(self._map.default_key, "clears all stimulation", STYLES.key, STYLES.text)
+        text.append(f"\n{_LATCHING}\n", STYLES.muted)
+        text.append("\nother keys\n", STYLES.accent)
         for key, says in self._keys:
-            line(key, says, palette.key, palette.text)
+            line(key, says, STYLES.key, STYLES.text)
         return text
-
-
-def _detail(period: float | None) -> str:
-    return "" if period is None else f" ({period:g} s)"

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pdtui.core.attributes import Floats
 from pdtui.tui.braille_canvas import BrailleCanvas
-from pdtui.tui.perspective_camera import Floats, PerspectiveCamera
+from pdtui.tui.perspective_camera import PerspectiveCamera
 
 _LEAST = 1.0
 """Radius of the smallest disc, in dots: larger than a dot of the ground."""

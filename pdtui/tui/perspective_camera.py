@@ -8,7 +8,7 @@ from math import cos, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from pdtui.core.attributes import Floats
 
 _DISTANCE = 6.0
 _NEAREST = 0.15

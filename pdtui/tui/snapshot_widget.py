@@ -14,8 +14,6 @@ from textual.reactive import reactive
 from textual.strip import Strip
 from textual.widget import Widget
 
-from pdtui.tui.theme import ThemeStyles, theme_styles
-
 if TYPE_CHECKING:
     from textual import events
 
@@ -44,7 +42,6 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         self._strips: list[Strip] = []
         self._framed: list[Strip | None] = []
         self._sides: Sides | None = None
-        self._palette: ThemeStyles | None = None
 
     @abstractmethod
     def paint(self, width: int, height: int) -> list[Strip]:
@@ -54,25 +51,15 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         """Keep what later frames need of a snapshot; called once per snapshot."""
         del snapshot
 
-    @property
-    def palette(self) -> ThemeStyles:
-        """The styles of the present theme."""
-        if self._palette is None:
-            self._palette = theme_styles(self.app.theme_variables)
-        return self._palette
-
     def watch_facts(self) -> None:
-        """Paint once robot and policy are loaded."""
         self.redraw()
 
     def watch_snapshot(self, snapshot: DriveSnapshot | None) -> None:
-        """Paint the newest snapshot."""
         if snapshot is not None:
             self.remember(snapshot)
         self.redraw()
 
     def on_resize(self, _event: events.Resize) -> None:
-        """Paint for the new size."""
         self.redraw()
 
     def redraw(self) -> None:
@@ -97,7 +84,7 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
     def notify_style_update(self) -> None:
         """Drop what was painted with the old styles."""
         super().notify_style_update()
-        self._palette = self._sides = None
+        self._sides = None
         self._framed = [None] * len(self._framed)
 
     def render_line(self, y: int) -> Strip:
@@ -147,9 +134,13 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
     def _make_sides(self) -> Sides:
         width, gutter = self.outer_size.width, self.gutter
         (line,) = super().render_lines(Region(0, gutter.top, width, 1))
-        left, right = line.crop(0, gutter.left), line.crop(width - gutter.right, width)
         background = self.background_colors[1]
-        self._sides = left, right, background, Style(bgcolor=background.rich_color)
+        self._sides = (
+            line.crop(0, gutter.left),
+            line.crop(width - gutter.right, width),
+            background,
+            Style(bgcolor=background.rich_color),
+        )
         return self._sides
 
     def row_of(self, name: str) -> int:

@@ -68,25 +68,3 @@ HelpScreen { align: center middle; background: $background 60%; }
     scrollbar-background: $surface;
 }
 """
-
-PICKER = """
-Screen { align: center middle; background: $background; }
-#picker {
-    width: 92;
-    max-width: 100%;
-    height: auto;
-    max-height: 100%;
-    border: round $primary;
-    border-title-color: $primary;
-    border-title-style: bold;
-    border-subtitle-color: $foreground 60%;
-    background: $surface;
-    padding: 0 1;
-}
-#filter { border: none; border-bottom: solid $foreground 22%; height: 2; padding: 0 1; background: $surface; }
-#rows { border: none; height: auto; max-height: 1fr; background: $surface; padding: 0; }
-#rows > .option-list--option { padding: 0 1; }
-#rows > .option-list--option-highlighted { background: $primary 28%; text-style: none; }
-#rows > .option-list--option-disabled { text-opacity: 100%; }
-#none { height: auto; color: $foreground 60%; padding: 0 1; }
-"""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 
 from rich.style import Style
 from textual.color import Color
@@ -26,8 +24,10 @@ THEME = Theme(
     panel="#18202b",
     dark=True,
 )
-_COLD, _WARM = "#4aa3ff", "#ff9d4d"
+_COLD, _WARM = Color.parse("#4aa3ff"), Color.parse("#ff9d4d")
 HEAT_LEVELS = 8
+_DEPTHS = ((0.0, 0.45), (0.0, 0.62), (0.0, 0.80), (0.03, 1.0), (0.16, 1.0))
+"""From far to near: the lightening of the robot's colour, and its share in the blend with the background."""
 
 
 @dataclass(frozen=True)
@@ -71,34 +71,21 @@ class ThemeStyles:
         return self.faint if row < 0 else self.behaviors[row % len(self.behaviors)]
 
 
-def theme_styles(variables: Mapping[str, str]) -> ThemeStyles:
-    """Return the styles for Textual's theme variables."""
+def _derive_styles(theme: Theme) -> ThemeStyles:
+    variables = theme.to_color_system().generate()
     names = ("background", "foreground", "primary", "accent", "success", "warning", "error", "panel")
-    return _palette(*(variables[name] for name in names))
-
-
-@lru_cache(maxsize=8)
-def _palette(
-    background: str,
-    foreground: str,
-    primary: str,
-    accent: str,
-    success: str,
-    warning: str,
-    error: str,
-    panel: str,
-) -> ThemeStyles:
-    back, front, main = Color.parse(background), Color.parse(foreground), Color.parse(primary)
+    back, front, main, accent, success, warning, error, panel = (
+        Color.parse(variables[name]) for name in names
+    )
     colors = [Color.parse(color) for color in BEHAVIOR_COLORS]
-    cold, warm = Color.parse(_COLD), Color.parse(_WARM)
-    zero = back.blend(Color.parse(panel), 0.8)
+    zero = back.blend(panel, 0.8)
 
     def style(color: Color, *, bold: bool = False, on: Color | None = None) -> Style:
         return Style(color=color.rich_color, bold=bold or None, bgcolor=None if on is None else on.rich_color)
 
     def heat(level: int) -> Color:
         share = (abs(level) / HEAT_LEVELS) ** 0.8
-        return zero.blend(warm if level > 0 else cold, share)
+        return zero.blend(_WARM if level > 0 else _COLD, share)
 
     return ThemeStyles(
         base=Style(bgcolor=back.rich_color),
@@ -107,12 +94,12 @@ def _palette(
         faint=style(back.blend(front, 0.30)),
         title=style(front, bold=True),
         primary=style(main),
-        accent=style(Color.parse(accent), bold=True),
-        good=style(Color.parse(success)),
-        warn=style(Color.parse(warning)),
-        bad=style(Color.parse(error)),
-        alert=style(back, bold=True, on=Color.parse(error)),
-        obstacle=style(Color.parse(success), bold=True),
+        accent=style(accent, bold=True),
+        good=style(success),
+        warn=style(warning),
+        bad=style(error),
+        alert=style(back, bold=True, on=error),
+        obstacle=style(success, bold=True),
         key=style(front, bold=True, on=back.blend(front, 0.16)),
         behaviors=tuple(style(color) for color in colors),
         caps=tuple(style(back, bold=True, on=color) for color in colors),
@@ -121,4 +108,5 @@ def _palette(
     )
 
 
-_DEPTHS = ((0.0, 0.45), (0.0, 0.62), (0.0, 0.80), (0.03, 1.0), (0.16, 1.0))
+STYLES = _derive_styles(THEME)
+"""The styles of the screen's only theme."""

@@ -70,15 +70,15 @@ def test_a_drive_through_the_pipe_is_recorded_and_replays(connection: DriveClien
     facts = _briefing(connection)
     assert (facts.title, facts.layers) == ("Ant (MuJoCo)", (16, 16))
     connection.press_key("w")
-    pushed = _until(connection, lambda snapshot: bool(snapshot.active))
-    assert pushed[-1].active[0].name == "push"
-    assert {view.unit for view in pushed[-1].units} == {3, 23}
-    assert {view.overwritten for view in pushed[-1].units} == {-2.0, 2.0}
+    pushed = _until(connection, lambda snapshot: bool(snapshot.active_behaviors))
+    assert pushed[-1].active_behaviors[0].name == "push"
+    assert {view.unit for view in pushed[-1].stimulated_units} == {3, 23}
+    assert {view.overwritten for view in pushed[-1].stimulated_units} == {-2.0, 2.0}
     connection.press_key("z")
     refused = _until(connection, lambda snapshot: bool(snapshot.notice))
     assert refused[-1].notice == "no behavior has key 'z'"
     connection.press_key("space")
-    cleared = _until(connection, lambda snapshot: not snapshot.active)
+    cleared = _until(connection, lambda snapshot: not snapshot.active_behaviors)
     histories = [*pushed, *refused, *cleared]
     assert sum(len(snapshot.history) for snapshot in histories) == cleared[-1].step
     assert cleared[-1].involvement == 2
@@ -189,7 +189,7 @@ def test_a_session_can_be_watched(
 ) -> None:
     _until(connection, lambda snapshot: snapshot.step >= 3)
     connection.press_key("t")
-    _until(connection, lambda snapshot: bool(snapshot.active))
+    _until(connection, lambda snapshot: bool(snapshot.active_behaviors))
     connection.close()
     session = read_session(recording)
     digests = tuple(int(digest) for digest in session.digests)

@@ -52,7 +52,10 @@ def save(path: Path, facts: DriveFacts, snapshots: list[DriveSnapshot]) -> None:
     """Write a drive: arrays as they are, everything else as JSON."""
     plain = [
         {name: value for name, value in vars(snapshot).items() if name not in (*ARRAYS, *ABSENT)}
-        | {"active": [asdict(view) for view in snapshot.active], "units": [asdict(u) for u in snapshot.units]}
+        | {
+            "active": [asdict(behavior) for behavior in snapshot.active_behaviors],
+            "units": [asdict(unit) for unit in snapshot.stimulated_units],
+        }
         for snapshot in snapshots
     ]
     for fields in plain:
@@ -77,8 +80,8 @@ def load(path: Path) -> tuple[DriveFacts, list[DriveSnapshot]]:
         snapshots = []
         for index, fields in enumerate(stored["snapshots"]):
             fields["achieved_speed"] = fields.pop("achieved")
-            fields["active"] = tuple(ActiveBehavior(**view) for view in fields["active"])
-            fields["units"] = tuple(StimulatedUnit(**view) for view in fields["units"])
+            fields["active_behaviors"] = tuple(ActiveBehavior(**view) for view in fields.pop("active"))
+            fields["stimulated_units"] = tuple(StimulatedUnit(**view) for view in fields.pop("units"))
             arrays = {name: file[f"{name}_{index}"].astype(np.float64) for name in ARRAYS}
             arrays["activations"] = arrays["activations"].astype(np.float32)
             snapshots.append(DriveSnapshot(**fields, **arrays))

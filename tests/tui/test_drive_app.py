@@ -18,8 +18,8 @@ from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
+from pdtui.tui.drive_app import BINDINGS
 from pdtui.tui.help_screen import HelpScreen
-from pdtui.tui.key_bindings import BINDINGS
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.widgets.robot_view import RobotView
 from tests.tui.conftest import MakeApp
@@ -288,7 +288,7 @@ async def test_a_live_loop_is_drawn(policy: Policy, small_map: StimulationMap, m
         behaviors = shown(app.query_one("#behaviors"))
         assert "▌push" in behaviors
         assert "▌twitch" in behaviors
-        remaining = snapshots[8].active[-1].remaining
+        remaining = snapshots[8].active_behaviors[-1].remaining
         assert remaining is not None
         assert f"{remaining * loop.robot.control_dt:.1f} s" in behaviors
         units = shown(app.query_one("#units"))

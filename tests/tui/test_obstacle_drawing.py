@@ -12,6 +12,7 @@ from pdtui.sessions.episode_statistics import EpisodeStatistics
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.obstacle_drawing import draw_from_above, draw_from_side
 from pdtui.tui.perspective_camera import PerspectiveCamera
+from pdtui.tui.theme import STYLES
 from pdtui.tui.widgets.robot_view import RobotView
 from tests.tui.conftest import MakeApp
 from tests.tui.screens import notice, played, shown
@@ -58,12 +59,12 @@ async def test_a_drive_among_obstacles_begins_from_above(
         await played(pilot, connection)
         robot = app.query_one(RobotView)
         assert robot.view == "above"
-        palette = robot.palette
+        obstacle = STYLES.obstacle
         inks = [
             segment.text.strip()
             for strip in robot.paint(*robot.content_size)
             for segment in strip
-            if segment.style == palette.obstacle
+            if segment.style == obstacle
         ]
         assert any(inks), "what is 6 m ahead of an Ant is in the picture"
         await pilot.press("v")

@@ -9,11 +9,11 @@ from rich import filesize
 from pdtui.core.printable_text import make_printable
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.tui.cell_text import fit_cells, format_number, format_signed, wrap_text
-from pdtui.tui.path_trail import MOST_POINTS, PathTrail
 from pdtui.tui.perspective_camera import PerspectiveCamera, round_length_down
-from pdtui.tui.sparkline import AttributeHistory, draw_sparklines
-from pdtui.tui.unit_owners import unit_owners
 from pdtui.tui.widgets.activation_heatmap import UnitGrid, layer_rows
+from pdtui.tui.widgets.attribute_table import AttributeHistory, draw_sparklines
+from pdtui.tui.widgets.path_view import MOST_POINTS, PathTrail
+from pdtui.tui.widgets.unit_table import behaviors_of_units
 from tests.tui.recorded_snapshots import drive_map
 
 
@@ -148,8 +148,8 @@ def test_lines_are_shared_out_between_layers() -> None:
 
 def test_the_behavior_latched_last_owns_a_shared_unit() -> None:
     views = [ActiveBehavior("spin left", 3), ActiveBehavior("spin right", 3), ActiveBehavior("heading", None)]
-    assert unit_owners(drive_map(), views, (256, 256)) == {12: "spin right", 5: "heading"}
-    assert unit_owners(drive_map(), views, (8,)) == {5: "heading"}
+    assert behaviors_of_units(drive_map(), views, (256, 256)) == {12: "spin right", 5: "heading"}
+    assert behaviors_of_units(drive_map(), views, (8,)) == {5: "heading"}
 
 
 @pytest.mark.parametrize(

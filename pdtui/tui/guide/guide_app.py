@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
+from rich.text import Text
 from textual import work
 from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal
+from textual.screen import ModalScreen
 from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
 from pdtui.guide.guide_pages import GUIDE_FOLDER, GuidePage, search_guide
-from pdtui.tui.guide.guide_chooser import ChoiceFinder, GuideChoice, GuideChooser
+from pdtui.tui.choice_list import MAX_CHOICES, Choice, ChoiceList, has_all_words
 from pdtui.tui.guide.guide_viewer import GuideViewer, line_link
 from pdtui.tui.style_sheets import WIDTHS
-from pdtui.tui.theme import THEME
+from pdtui.tui.theme import STYLES, THEME
 
 GUIDE_STYLE = """
 Screen { background: $background; }
@@ -29,19 +31,7 @@ GuideViewer { background: $background; scrollbar-size-vertical: 1; }
 GuideViewer Markdown { padding: 0 2; max-width: 130; }
 GuideViewer MarkdownH1 { margin: 1 0; }
 GuideChooser { align: center middle; background: $background 60%; }
-#chooser {
-    width: 96;
-    max-width: 100%;
-    height: 80%;
-    border: round $primary;
-    border-title-color: $primary;
-    border-title-style: bold;
-    border-subtitle-color: $foreground 60%;
-    background: $surface;
-    padding: 0 1;
-}
-#query { border: none; border-bottom: solid $foreground 22%; height: 2; padding: 0 1; background: $surface; }
-#choices { border: none; height: 1fr; background: $surface; padding: 0; }
+GuideChooser ChoiceList { width: 96; height: 80%; }
 """
 _KEYS = "/ search   l links   t contents   b back   [ ] pages   ↑ ↓ scroll   q quit"
 
@@ -89,39 +79,46 @@ class GuideApp(App[None]):
         yield Static(_KEYS, id="keys", markup=False)
 
     async def on_mount(self) -> None:
-        """Show the first page."""
         self.query_one("#pages").can_focus = False
         viewer = self.query_one(GuideViewer)
         viewer.document.focus()
         await viewer.follow(str(GUIDE_FOLDER / f"{self._first}.md"))
 
     def on_markdown_viewer_navigator_updated(self) -> None:
-        """Name the page that is shown."""
         self.query_one("#title", Static).update(f"pdtui guide · {self.page.title}")
         self.query_one("#pages", OptionList).highlighted = list(self._pages).index(self.page.topic)
 
     async def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Show the page that was clicked in the list."""
         await self.query_one(GuideViewer).follow(f"{event.option_id}.md")
 
     def action_search(self) -> None:
         """Find text in all pages."""
-        self._choose("search the guide", lambda query: _hits(self._pages, query))
+        self._choose("search the guide", self._find_text)
+
+    def _find_text(self, query: str) -> list[Choice]:
+        return [
+            _choice(hit.text, f"{self._pages[hit.topic].title} › {hit.heading}", line_link(hit))
+            for hit in search_guide(self._pages, query)[:MAX_CHOICES]
+        ]
 
     def action_links(self) -> None:
         """Choose a link of this page."""
-        links = [GuideChoice(text, target, target) for text, target in self.page.links]
-        self._choose(f"links of '{self.page.title}'", lambda query: _filtered(links, query))
+        links = [(text, target, target) for text, target in self.page.links]
+        self._choose_among(f"links of '{self.page.title}'", links)
 
     def action_contents(self) -> None:
         """Choose a page or a heading."""
         headings = [
-            GuideChoice("  " * (passage.level - 1) + passage.text, "", line_link(passage))
+            ("  " * (passage.level - 1) + passage.text, "", line_link(passage))
             for page in self._pages.values()
             for passage in page.passages()
             if passage.level
         ]
-        self._choose("contents", lambda query: _filtered(headings, query))
+        self._choose_among("contents", headings)
+
+    def _choose_among(self, title: str, links: Sequence[tuple[str, str, str]]) -> None:
+        """Offer links, each a text, the place that it leads to, and the target."""
+        self._choose(title, lambda query: [_choice(*link) for link in links if has_all_words(link[0], query)])
 
     async def action_back(self) -> None:
         """Go back to where the last link was followed."""
@@ -135,19 +132,42 @@ class GuideApp(App[None]):
             await self.query_one(GuideViewer).follow(f"{topics[place]}.md")
 
     @work
-    async def _choose(self, title: str, find: ChoiceFinder) -> None:
-        target = await self.push_screen_wait(GuideChooser(title, find))
+    async def _choose(self, title: str, find_choices: Callable[[str], Sequence[Choice]]) -> None:
+        target = await self.push_screen_wait(GuideChooser(title, find_choices))
         if target is not None:
             await self.query_one(GuideViewer).follow(target)
 
 
-def _hits(pages: Mapping[str, GuidePage], query: str) -> Sequence[GuideChoice]:
-    return [
-        GuideChoice(hit.text, f"{pages[hit.topic].title} › {hit.heading}", line_link(hit))
-        for hit in search_guide(pages, query)
-    ]
+class GuideChooser(ModalScreen[str | None]):
+    """The overlay in which text, a link or a heading is found; the result is a link, or None.
+
+    Args:
+        title: what is chosen.
+        find_choices: returns the choices for what was typed.
+    """
+
+    BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "closes the list", id="guide_close")]
+
+    def __init__(self, title: str, find_choices: Callable[[str], Sequence[Choice]]) -> None:
+        super().__init__()
+        self._title, self._find_choices = title, find_choices
+
+    def compose(self) -> ComposeResult:
+        yield ChoiceList(
+            self._title,
+            "↑ ↓ choose   ↵ go there   type to filter   esc close",
+            "words to find",
+            self._find_choices,
+            nothing_found="nothing has all of these words",
+        )
+
+    def on_choice_list_chosen(self, event: ChoiceList.Chosen) -> None:
+        self.dismiss(event.value)
 
 
-def _filtered(choices: Sequence[GuideChoice], query: str) -> Sequence[GuideChoice]:
-    words = query.lower().split()
-    return [choice for choice in choices if all(word in choice.text.lower() for word in words)]
+def _choice(text: str, place: str, target: str) -> Choice:
+    """Return the choice of a link; the place, which may be empty, is its second line."""
+    prompt = Text(text, STYLES.text, no_wrap=True, overflow="ellipsis")
+    if place:
+        prompt.append(f"\n  {place}", STYLES.muted)
+    return Choice(prompt, target)

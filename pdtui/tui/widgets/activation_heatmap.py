@@ -17,8 +17,8 @@ from pdtui.core.units import format_unit, locate_unit
 from pdtui.driving.drive_snapshot import DriveSnapshot, StimulatedUnit
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
-from pdtui.tui.theme import HEAT_LEVELS
-from pdtui.tui.unit_owners import unit_owners
+from pdtui.tui.theme import HEAT_LEVELS, STYLES
+from pdtui.tui.widgets.unit_table import behaviors_of_units
 
 _LABEL = 4
 
@@ -30,11 +30,8 @@ class ActivationHeatmap(SnapshotWidget):
     than pixels, a pixel shows the strongest of its units.
     """
 
+    BORDER_TITLE = "hidden units"
     _scale = 1e-6
-
-    def on_mount(self) -> None:
-        """Set the title."""
-        self.border_title = "hidden units"
 
     def watch_facts(self) -> None:
         if self.facts is not None:
@@ -77,16 +74,15 @@ class ActivationHeatmap(SnapshotWidget):
         return np.where(np.isnan(strongest), -1, level)
 
     def _line(self, pixels: NDArray[np.int64], line: int, places: list[tuple[int, int]]) -> Strip:
-        heat = self.palette.heat
         starting = [str(layer) for layer, (top, rows) in enumerate(places) if rows and top // 2 == line]
         label = "/".join(starting).rjust(_LABEL - 1)[: _LABEL - 1] + " "
-        segments = [Segment(label, self.palette.muted)]
+        segments = [Segment(label, STYLES.muted)]
         pairs = pixels[0] * 1000 + pixels[1]
         cuts = [0, *(np.flatnonzero(pairs[1:] != pairs[:-1]) + 1).tolist(), len(pairs)]
         for a, b in pairwise(cuts):
             upper, lower = int(pixels[0, a]), int(pixels[1, a])
-            text = "▀" if lower >= 0 else "▀" if upper >= 0 else " "
-            style = _style(heat[upper] if upper >= 0 else None, heat[lower] if lower >= 0 else None)
+            text = "▀" if max(upper, lower) >= 0 else " "
+            style = _style(*(STYLES.heat[level] if level >= 0 else None for level in (upper, lower)))
             segments.append(Segment(text * (b - a), style))
         return Strip(segments, _LABEL + pixels.shape[1])
 
@@ -94,13 +90,13 @@ class ActivationHeatmap(SnapshotWidget):
         """Return the line that marks stimulated units under their columns, with their values."""
         assert self.facts is not None
         assert self.snapshot is not None
-        owner = unit_owners(self.map, self.snapshot.active, self.facts.layers)
-        units = sorted(self.snapshot.units, key=lambda view: view.unit)
+        names = behaviors_of_units(self.map, self.snapshot.active_behaviors, self.facts.layers)
+        units = sorted(self.snapshot.stimulated_units, key=lambda view: view.unit)
         marks = [(self._column(view, columns, places), view) for view in units]
         marks.sort(key=lambda mark: mark[0])
         row, hidden = ScreenRow(width), 0
         for index, (column, view) in enumerate(marks):
-            style = self.palette.behavior(self.row_of(owner.get(view.unit, "")))
+            style = STYLES.behavior(self.row_of(names.get(view.unit, "")))
             address = format_unit(view.unit, self.facts.layers)
             text = f"▲{address} {format_number(view.natural)}→{format_number(view.overwritten)} "
             at = width - row.left
@@ -113,7 +109,7 @@ class ActivationHeatmap(SnapshotWidget):
                 continue
             row.add(" " * (target - at), style).add(text, style)
         if hidden and row.left >= 4:
-            row.add(f"+{hidden}".rjust(row.left), self.palette.muted)
+            row.add(f"+{hidden}".rjust(row.left), STYLES.muted)
         return row.strip()
 
     def _column(self, view: StimulatedUnit, columns: int, places: list[tuple[int, int]]) -> int:

@@ -11,6 +11,7 @@ from textual.strip import Strip
 from pdtui.core.printable_text import make_printable
 from pdtui.tui.cell_text import ScreenRow, format_number, format_signed, key_name, wrap_text
 from pdtui.tui.snapshot_widget import SnapshotWidget
+from pdtui.tui.theme import STYLES
 
 if TYPE_CHECKING:
     from pdtui.core.step_record import ActiveBehavior
@@ -23,19 +24,19 @@ _BLOCKS = " ▏▎▍▌▋▊▉"
 class BehaviorList(SnapshotWidget):
     """Shows two lines per behavior if there is room, else one; latched behaviors are never hidden."""
 
-    def on_mount(self) -> None:
-        """Set the title."""
-        self.border_title = "behaviors"
+    BORDER_TITLE = "behaviors"
 
     def paint(self, width: int, height: int) -> list[Strip]:
-        active = {view.name: view for view in self.snapshot.active} if self.snapshot is not None else {}
+        active = (
+            {view.name: view for view in self.snapshot.active_behaviors} if self.snapshot is not None else {}
+        )
         behaviors = list(self.map.behaviors.values())
         if not behaviors:
-            return [ScreenRow(width).add("none: the map has no behaviors", self.palette.faint).strip()]
+            return [ScreenRow(width).add("none: the map has no behaviors", STYLES.faint).strip()]
         names = [make_printable(behavior.name) for behavior in behaviors]
         keys = [key_name(behavior.key) for behavior in behaviors]
-        key_width = max((cell_len(key) for key in keys), default=0) + 2
-        name_width = min(max((cell_len(name) for name in names), default=0), max(8, width // 3))
+        key_width = max(map(cell_len, keys)) + 2
+        name_width = min(max(map(cell_len, names)), max(8, width // 3))
         self._columns = (key_width, name_width)
         # Controllers' lines count even while none is latched, so that a key press does not change the layout.
         controllers = sum(behavior.pid is not None for behavior in behaviors)
@@ -48,29 +49,27 @@ class BehaviorList(SnapshotWidget):
         latched = [behavior.name in active for behavior in behaviors]
         shown = self._crop(entries, latched, width, height - 1 - len(gap))
         default = ScreenRow(width)
-        self._add_cap(default, self.map.default_key, self.palette.key)
-        default.add("  clears all stimulation", self.palette.good if active else self.palette.muted)
+        self._add_cap(default, self.map.default_key, STYLES.key)
+        default.add("  clears all stimulation", STYLES.good if active else STYLES.muted)
         return [*shown, *gap, default.strip()]
 
     def _entry(
         self, row: int, behavior: Behavior, active: ActiveBehavior | None, width: int, *, roomy: bool
     ) -> list[Strip]:
-        palette = self.palette
         name_width = self._columns[1]
-        color = palette.behavior(row)
+        color = STYLES.behavior(row)
         says = make_printable(behavior.says)
         line = ScreenRow(width)
         if active is None:
-            self._add_cap(line, behavior.key, palette.key)
-            line.add("  " + make_printable(behavior.name), color, name_width + 2).add("  ", palette.text)
-            line.add(self._kind(behavior) if roomy else says, palette.muted)
+            self._add_cap(line, behavior.key, STYLES.key)
+            line.add("  " + make_printable(behavior.name), color, name_width + 2).add("  ", STYLES.text)
+            line.add(self._kind(behavior) if roomy else says, STYLES.muted)
             lines = [line.strip()]
         else:
-            self._add_cap(line, behavior.key, palette.caps[row % len(palette.caps)])
+            self._add_cap(line, behavior.key, STYLES.caps[row % len(STYLES.caps)])
             line.add(" ▌", color)
-            line.add(make_printable(behavior.name), color + Style(bold=True), name_width).add(
-                "  ", palette.text
-            )
+            name = make_printable(behavior.name)
+            line.add(name, color + Style(bold=True), name_width).add("  ", STYLES.text)
             self._add_state(line, behavior, active, color)
             lines = [line.strip()]
             if active.target is not None:
@@ -78,14 +77,14 @@ class BehaviorList(SnapshotWidget):
         if roomy:
             indent = " " * (self._columns[0] + 2)
             sentence = wrap_text(says, width - len(indent), 1)[0]
-            style = palette.muted if active is None else palette.text
+            style = STYLES.muted if active is None else STYLES.text
             lines.insert(1, ScreenRow(width).add(indent + sentence, style).strip())
         return lines
 
     def _add_cap(self, line: ScreenRow, key: str, style: Style) -> None:
         """Add the key as a cap, padded to the width of the widest."""
         cap = f" {key_name(key)} "
-        line.add(cap, style).add(" " * (self._columns[0] - cell_len(cap)), self.palette.text)
+        line.add(cap, style).add(" " * (self._columns[0] - cell_len(cap)), STYLES.text)
 
     def _kind(self, behavior: Behavior) -> str:
         if behavior.pid is not None:
@@ -99,23 +98,22 @@ class BehaviorList(SnapshotWidget):
             line.add("latched", color)
         else:
             steps = max(1, round(behavior.period / dt))
-            line.add(_bar(active.remaining / steps, _BAR), color + Style(bgcolor=self.palette.key.bgcolor))
+            line.add(_bar(active.remaining / steps, _BAR), color + Style(bgcolor=STYLES.key.bgcolor))
             line.add(f" {active.remaining * dt:.1f} s", color)
         if abs(active.factor - 1.0) > 1e-9:
-            line.add(f"  × {format_number(active.factor)}", self.palette.accent)
+            line.add(f"  × {format_number(active.factor)}", STYLES.accent)
 
     def _control(self, behavior: Behavior, active: ActiveBehavior, width: int) -> Strip:
         """Return the line with value, target, error and magnitude c of a controller."""
-        palette = self.palette
         unit = self._unit_of(behavior)
-        row = ScreenRow(width).add(" " * (self._columns[0] + 2), palette.text)
+        row = ScreenRow(width).add(" " * (self._columns[0] + 2), STYLES.text)
         parts = (
             ("", f"{format_number(active.value or 0.0)} → {format_number(active.target or 0.0)} {unit}"),
             (" e ", format_signed(active.error or 0.0)),
             (" c ", format_signed(active.magnitude or 0.0)),
         )
         for label, value in parts:
-            row.add(label, palette.muted).add(value, palette.text)
+            row.add(label, STYLES.muted).add(value, STYLES.text)
         return row.strip()
 
     def _unit_of(self, behavior: Behavior) -> str:
@@ -136,7 +134,7 @@ class BehaviorList(SnapshotWidget):
                 chosen.append(index)
         strips = [strip for index in sorted(chosen) for strip in entries[index]]
         hidden = len(entries) - len(chosen)
-        more = ScreenRow(width).add(f"+{hidden} more: ? lists all", self.palette.muted)
+        more = ScreenRow(width).add(f"+{hidden} more: ? lists all", STYLES.muted)
         return [*strips, more.strip()]
 
 

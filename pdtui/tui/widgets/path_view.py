@@ -5,27 +5,67 @@ from __future__ import annotations
 from math import atan2, ceil, log2, pi
 
 import numpy as np
+from numpy.typing import NDArray
 from textual.strip import Strip
 
+from pdtui.core.attributes import Floats
 from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.robots.geometry import root_body, rotate
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import format_number
-from pdtui.tui.path_trail import PathTrail
-from pdtui.tui.perspective_camera import Floats, round_length_down
+from pdtui.tui.perspective_camera import round_length_down
 from pdtui.tui.snapshot_widget import SnapshotWidget
+from pdtui.tui.theme import STYLES
 
 _ARROWS = "→↗↑↖←↙↓↘"
 _LEAST_SIZE = 2.0
+MOST_POINTS = 5000
+_JUMP = 1.0
 _PAST, _NONE, _MARK, _LABEL, _FIRST_BEHAVIOR = range(5)
+
+
+class PathTrail:
+    """The points of the present path and of the one before it.
+
+    When a path outgrows `MOST_POINTS`, every second point is dropped, and from then on only every second,
+    fourth, … new point is kept, so that the shape remains however long the drive.
+    """
+
+    def __init__(self) -> None:
+        self.points: Floats = np.empty((0, 3))
+        self.past: Floats = np.empty((0, 3))
+        self._stride = 1
+        self._skip = 0
+
+    def extend(self, path: Floats, *, restarted: bool) -> None:
+        """Append rows (x, y, behavior), shape (n, 3), after starting a new path if `restarted`."""
+        if restarted and len(self.points):
+            self.past, self.points = self.points, np.empty((0, 3))
+            self._stride, self._skip = 1, 0
+        path = path[np.isfinite(path).all(axis=1)]
+        kept = path[self._skip :: self._stride]
+        self._skip = (self._skip - len(path)) % self._stride
+        self.points = np.concatenate([self.points, kept])
+        while len(self.points) > MOST_POINTS:
+            # Whether the last point has an odd or an even index, the next points keep the new stride.
+            self._skip += self._stride * (len(self.points) % 2)
+            self._stride *= 2
+            self.points = self.points[::2]
+
+    def line_segments(self, past: bool = False) -> tuple[Floats, Floats, NDArray[np.int16]]:
+        """Return starts (n, 2), ends (n, 2) and behaviors (n,) of the path's lines, without jumps."""
+        points = self.past if past else self.points
+        starts, ends = points[:-1], points[1:]
+        joined = np.hypot(*(ends[:, :2] - starts[:, :2]).T) <= _JUMP * self._stride
+        return starts[joined, :2], ends[joined, :2], ends[joined, 2].astype(np.int16)
 
 
 class PathView(SnapshotWidget):
     """Draws the whole present path, with +x to the right and +y up."""
 
+    BORDER_TITLE = "path"
+
     def on_mount(self) -> None:
-        """Set the title and start with no path."""
-        self.border_title = "path"
         self.trail = PathTrail()
         self._heading = 0.0
         self._here = np.zeros(2)
@@ -53,15 +93,14 @@ class PathView(SnapshotWidget):
         old_starts, old_ends, _ = self.trail.line_segments(past=True)
         canvas.draw_segments(place(old_starts), place(old_ends), _PAST)
         starts, ends, rows = self.trail.line_segments()
-        count = len(self.palette.behaviors)
+        count = len(STYLES.behaviors)
         inks = np.where(rows < 0, _NONE, _FIRST_BEHAVIOR + rows % count).astype(np.int16)
         canvas.draw_segments(place(starts), place(ends), inks)
         self._mark(canvas, place(points[0, :2]), "○")
         self._mark(canvas, place(self._here), _ARROWS[round(self._heading / (pi / 4)) % 8])
         self._draw_scale(canvas, zoom)
-        palette = self.palette
         return canvas.render_strips(
-            [palette.faint, palette.text, palette.accent, palette.muted, *palette.behaviors]
+            [STYLES.faint, STYLES.text, STYLES.accent, STYLES.muted, *STYLES.behaviors]
         )
 
     def _frame(self, canvas: BrailleCanvas, points: Floats) -> tuple[Floats, float]:

@@ -5,22 +5,28 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
+from pdtui.core.attributes import Floats
 from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.robots.geometry import capsule_ends, place_links, root_body, rotate
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.obstacle_drawing import draw_from_above, draw_from_side
-from pdtui.tui.perspective_camera import Floats, PerspectiveCamera, round_length_down
+from pdtui.tui.perspective_camera import PerspectiveCamera, round_length_down
 from pdtui.tui.snapshot_widget import SnapshotWidget
+from pdtui.tui.theme import STYLES
 
 View = Literal["side", "above"]
-_ELEVATION: dict[View, float] = {"side": 14.0, "above": 90.0}
+_SIDE_ELEVATION = 14.0
+"""Of the camera at the side, degrees."""
 _GROUND, _AXIS, _SHADOW, _HEADING, _LABEL, _OBSTACLE, _FIRST_SHADE = range(7)
+_INKS = (
+    *(STYLES.faint, STYLES.muted, STYLES.faint, STYLES.accent, STYLES.muted, STYLES.obstacle),
+    *STYLES.depth,
+)
 _FARTHEST = 0.55
 _AHEAD, _ASIDE = 16.0, 8.0
 """Length and width of the area seen from above with obstacles, in extents of the robot."""
@@ -39,6 +45,7 @@ class RobotView(SnapshotWidget):
     With obstacles around, the view from above comes first, reaches farther and shows more of what lies ahead.
     """
 
+    BORDER_TITLE = "robot · side"
     view: reactive[View] = reactive("side", init=False, repaint=False)
 
     _extent = 0.0
@@ -47,13 +54,8 @@ class RobotView(SnapshotWidget):
     _looked = False
 
     def watch_view(self) -> None:
-        """Draw from the chosen side."""
         self.border_title = f"robot · {self.view}"
         self.redraw()
-
-    def on_mount(self) -> None:
-        """Set the title."""
-        self.border_title = f"robot · {self.view}"
 
     def remember(self, snapshot: DriveSnapshot) -> None:
         if snapshot.obstacles is not None:
@@ -76,7 +78,7 @@ class RobotView(SnapshotWidget):
         ends = capsule_ends(self.facts.links, placed)
         if not np.isfinite(ends).all():
             canvas.draw_text(1, height // 2, "the robot's pose is not finite", _LABEL)
-            return canvas.render_strips(self._styles())
+            return canvas.render_strips(_INKS)
         root = self.snapshot.poses[root_body(self.facts.links)]
         camera = self._camera(canvas, root, ends)
         self._draw_ground(canvas, camera, root)
@@ -92,39 +94,20 @@ class RobotView(SnapshotWidget):
         x, y, z = (format_number(float(value)) for value in root[:3])
         place = f"x {x}  y {y}  z {z} m"
         canvas.draw_text(width - len(place), height - 1, place, _LABEL)
-        return canvas.render_strips(self._styles())
+        return canvas.render_strips(_INKS)
 
     def _loading(self, width: int, height: int) -> list[Strip]:
+        lines = (("loading the policy…", STYLES.title), ("this takes a few seconds", STYLES.muted))
         blank = [Strip.blank(width)] * max(0, height // 2 - 1)
-        palette = self.palette
-        lines = [
-            ("loading the policy…", palette.title),
-            ("this takes a few seconds", palette.muted),
-        ]
-        return [
-            *blank,
-            *(
-                ScreenRow(width).add(" " * max(0, (width - len(line)) // 2), style).add(line, style).strip()
-                for line, style in lines
-            ),
-        ]
-
-    def _styles(self) -> list[Style]:
-        palette = self.palette
-        return [
-            palette.faint,
-            palette.muted,
-            palette.faint,
-            palette.accent,
-            palette.muted,
-            palette.obstacle,
-            *palette.depth,
+        return blank + [
+            ScreenRow(width).add(" " * max(0, (width - len(line)) // 2), style).add(line, style).strip()
+            for line, style in lines
         ]
 
     def _camera(self, canvas: BrailleCanvas, root: Floats, ends: Floats) -> PerspectiveCamera:
         """Return a camera far enough away for the widest stretch that the robot has shown so far."""
         assert self.facts is not None
-        radii = np.array([_radius(link.size) for link in self.facts.links])
+        radii = np.array([min(link.size) for link in self.facts.links])
         stretch = np.linalg.norm(ends - root[:3], axis=-1).max(axis=-1) + radii
         self._extent = max(self._extent, float(stretch.max()))
         extent, centre = self._extent, (canvas.width / 2, canvas.height / 2)
@@ -139,9 +122,8 @@ class RobotView(SnapshotWidget):
             return PerspectiveCamera(middle, 90.0, extent, zoom, centre)
         zoom = min(canvas.width / (2.15 * extent), canvas.height / (1.5 * extent))
         middle = (float(root[0]), float(root[1]), 0.45 * extent)
-        return PerspectiveCamera(
-            middle, _ELEVATION["side"], extent, zoom, (canvas.width / 2, canvas.height * 0.47)
-        )
+        centre = canvas.width / 2, canvas.height * 0.47
+        return PerspectiveCamera(middle, _SIDE_ELEVATION, extent, zoom, centre)
 
     def _draw_ground(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
         """Draw a grid fixed to the world, whose lines pass by as the robot moves."""
@@ -190,7 +172,7 @@ class RobotView(SnapshotWidget):
         assert self.facts is not None
         dots, magnification, before = camera.project(ends)
         depth = camera.depth(ends.mean(axis=-2))
-        shades = len(self.palette.depth)
+        shades = len(STYLES.depth)
         shade = np.clip((0.5 - depth / self._extent * 0.8) * shades, 0, shades - 1).astype(int)
         for row in np.argsort(-depth, kind="stable"):
             if not before[row].all():
@@ -222,7 +204,3 @@ def _heading(root: Floats) -> Floats:
     ahead: Floats = rotate(root[3:], np.array([1.0, 0.0, 0.0]))[:2]
     length = float(np.linalg.norm(ahead))
     return ahead / length if length > 1e-6 else np.zeros(2)
-
-
-def _radius(size: tuple[float, ...]) -> float:
-    return min(size)

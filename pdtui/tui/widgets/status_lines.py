@@ -14,6 +14,7 @@ from pdtui.core.printable_text import make_printable
 from pdtui.sessions.episode_statistics import NO_STATISTICS
 from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
+from pdtui.tui.theme import STYLES
 
 _NAME = 40
 Part = tuple[str, Style]
@@ -26,9 +27,8 @@ class StatusLine(SnapshotWidget):
 
     def paint(self, width: int, height: int) -> list[Strip]:
         del height
-        palette = self.palette
         title = self.map.robot if self.facts is None else self.facts.title
-        row = ScreenRow(width).add(" pdtui ", palette.caps[1]).add(f" {make_printable(title)}", palette.title)
+        row = ScreenRow(width).add(" pdtui ", STYLES.caps[1]).add(f" {make_printable(title)}", STYLES.title)
         shown: list[tuple[int, Part]] = []
         left = row.left - 1
         for position, part in sorted(self._parts(), key=lambda item: item[0]):
@@ -36,7 +36,7 @@ class StatusLine(SnapshotWidget):
             if length <= left:
                 left -= length
                 shown.append((position, part))
-        row.add(" " * max(0, left), palette.text)
+        row.add(" " * max(0, left), STYLES.text)
         order = (4, 8, 7, 6, 5, 1, 2, 3, 0)
         for _, (text, style) in sorted(shown, key=lambda item: order.index(item[0])):
             row.add("  " + text, style)
@@ -44,45 +44,44 @@ class StatusLine(SnapshotWidget):
 
     def _parts(self) -> list[tuple[int, Part]]:
         """Return the parts of the line with their rank; 0 is the most important."""
-        palette = self.palette
         if self.facts is None:
             return [
-                (0, ("loading the policy…", palette.warn)),
-                (4, (make_printable(self.map.policy), palette.muted)),
+                (0, ("loading the policy…", STYLES.warn)),
+                (4, (make_printable(self.map.policy), STYLES.muted)),
             ]
         parts: list[tuple[int, Part]] = [
-            (4, (make_printable(PurePath(self.facts.policy).name), palette.muted)),
-            (6, (f"seed {self.facts.seed}", palette.muted)),
+            (4, (make_printable(PurePath(self.facts.policy).name), STYLES.muted)),
+            (6, (f"seed {self.facts.seed}", STYLES.muted)),
         ]
         snapshot = self.snapshot
         if snapshot is None:
             return parts
         parts += [
             (0, self._pace()),
-            (1, (f"step {snapshot.step}", palette.text)),
-            (2, (f"{snapshot.time:.1f} s", palette.text)),
-            (5, (f"involvement {snapshot.involvement}", palette.muted)),
-            (7, (f"episode {snapshot.episode}", palette.muted)),
+            (1, (f"step {snapshot.step}", STYLES.text)),
+            (2, (f"{snapshot.time:.1f} s", STYLES.text)),
+            (5, (f"involvement {snapshot.involvement}", STYLES.muted)),
+            (7, (f"episode {snapshot.episode}", STYLES.muted)),
         ]
         if self.facts.recording:
             name = _shorten(make_printable(PurePath(self.facts.recording).name), _NAME)
-            parts.append((3, (f"● {filesize.decimal(snapshot.recorded_bytes)}", palette.bad)))
-            parts.append((8, (name, palette.muted)))
+            parts.append((3, (f"● {filesize.decimal(snapshot.recorded_bytes)}", STYLES.bad)))
+            parts.append((8, (name, STYLES.muted)))
         return parts
 
     def _pace(self) -> Part:
-        snapshot, palette = self.snapshot, self.palette
+        snapshot = self.snapshot
         assert snapshot is not None
         if snapshot.finished:
-            return "■ over", palette.bad
+            return "■ over", STYLES.bad
         kind = "watching " if self.watching else ""
         asked = f"{snapshot.speed:g}×"
         if snapshot.paused:
-            return f"{kind}⏸ paused at {asked}", palette.warn
+            return f"{kind}⏸ paused at {asked}", STYLES.warn
         slow = snapshot.achieved_speed < 0.93 * snapshot.speed
         return (
             f"{kind}▶ {asked} ({format_number(snapshot.achieved_speed)})",
-            palette.warn if slow else palette.good,
+            STYLES.warn if slow else STYLES.good,
         )
 
 
@@ -93,27 +92,26 @@ class NoticeLine(SnapshotWidget):
     hints: reactive[str] = reactive("", init=False, repaint=False)
 
     def watch_notice(self) -> None:
-        """Show the notice."""
         self.redraw()
 
     def paint(self, width: int, height: int) -> list[Strip]:
         del height
-        palette, row, counters = self.palette, ScreenRow(width), self._counters()
+        row, counters = ScreenRow(width), self._counters()
         finished = self.snapshot.finished if self.snapshot is not None else ""
         if finished:
-            said, style = f" ■ the drive is over: {make_printable(finished)}   {self.hints} ", palette.alert
+            said, style = f" ■ the drive is over: {make_printable(finished)}   {self.hints} ", STYLES.alert
         elif self.notice:
-            row.add(" ▌ ", palette.warn)
-            said, style = make_printable(self.notice), palette.title
+            row.add(" ▌ ", STYLES.warn)
+            said, style = make_printable(self.notice), STYLES.title
         else:
-            row.add(" ▌ ", palette.faint)
-            said, style = self._summary(), palette.muted
+            row.add(" ▌ ", STYLES.faint)
+            said, style = self._summary(), STYLES.muted
         room = row.left - cell_len(counters) - 2
         urgent = bool(finished or self.notice)
         if counters and (not urgent or cell_len(said) <= room):
             said = said if urgent else fit_cells(said, room)
-            row.add(said, style).add(" " * (room - cell_len(said) + 1), palette.text)
-            row.add(counters, palette.text)
+            row.add(said, style).add(" " * (room - cell_len(said) + 1), STYLES.text)
+            row.add(counters, STYLES.text)
         else:
             row.add(said, style)
         return [row.strip()]
@@ -149,16 +147,15 @@ class KeyLine(SnapshotWidget):
     keys: reactive[tuple[tuple[str, str], ...]] = reactive((), init=False, repaint=False)
 
     def watch_keys(self) -> None:
-        """The keys were remapped."""
         self.redraw()
 
     def paint(self, width: int, height: int) -> list[Strip]:
         del height
-        row = ScreenRow(width).add(" ", self.palette.text)
+        row = ScreenRow(width).add(" ", STYLES.text)
         for key, says in self.keys:
             if cell_len(key) + cell_len(says) + 3 > row.left:
                 break
-            row.add(key, self.palette.accent).add(f" {says}  ", self.palette.muted)
+            row.add(key, STYLES.accent).add(f" {says}  ", STYLES.muted)
         return [row.strip()]
 
 

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.cells import cell_len
 from textual.strip import Strip
 
+from pdtui.core.errors import PolicyError
 from pdtui.core.printable_text import make_printable
-from pdtui.core.units import format_unit
+from pdtui.core.step_record import ActiveBehavior
+from pdtui.core.units import format_unit, parse_unit
+from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
-from pdtui.tui.unit_owners import unit_owners
+from pdtui.tui.theme import STYLES
 
 _NUMBER = 8
 _ADDRESS = 8
@@ -18,38 +23,50 @@ _ADDRESS = 8
 class UnitTable(SnapshotWidget):
     """Shows one unit per line, in the colour of the behavior that overwrites it."""
 
-    def on_mount(self) -> None:
-        """Set the title."""
-        self.border_title = "stimulated units"
+    BORDER_TITLE = "stimulated units"
 
     def paint(self, width: int, height: int) -> list[Strip]:
-        palette = self.palette
-        if self.facts is None or self.snapshot is None or not self.snapshot.units:
+        if self.facts is None or self.snapshot is None or not self.snapshot.stimulated_units:
             text = "none: no unit is overwritten" if self.snapshot is not None else ""
-            return [ScreenRow(width).add(text, palette.faint).strip()]
+            return [ScreenRow(width).add(text, STYLES.faint).strip()]
         head = (
             ScreenRow(width)
-            .add("unit", palette.muted, _ADDRESS)
-            .add("natural", palette.muted, _NUMBER, right=True)
+            .add("unit", STYLES.muted, _ADDRESS)
+            .add("natural", STYLES.muted, _NUMBER, right=True)
         )
-        head.add("    overwritten", palette.muted)
-        owner = unit_owners(self.map, self.snapshot.active, self.facts.layers)
+        head.add("    overwritten", STYLES.muted)
+        names = behaviors_of_units(self.map, self.snapshot.active_behaviors, self.facts.layers)
         strips = [head.strip()]
-        units = self.snapshot.units
+        units = self.snapshot.stimulated_units
         room = height - 1 if len(units) < height else height - 2
         for view in units[:room]:
-            name = owner.get(view.unit, "")
-            style = palette.behavior(self.row_of(name))
+            name = names.get(view.unit, "")
+            style = STYLES.behavior(self.row_of(name))
             row = (
                 ScreenRow(width)
                 .add(format_unit(view.unit, self.facts.layers), style, _ADDRESS)
-                .add(format_number(view.natural), palette.muted, _NUMBER, right=True)
-                .add("  → ", palette.faint)
-                .add(format_number(view.overwritten), palette.title, _NUMBER)
+                .add(format_number(view.natural), STYLES.muted, _NUMBER, right=True)
+                .add("  → ", STYLES.faint)
+                .add(format_number(view.overwritten), STYLES.title, _NUMBER)
             )
             if row.left > cell_len(make_printable(name)):
                 row.add(" " + make_printable(name), style)
             strips.append(row.strip())
         if len(units) > room:
-            strips.append(ScreenRow(width).add(f"+{len(units) - room} more", palette.faint).strip())
+            strips.append(ScreenRow(width).add(f"+{len(units) - room} more", STYLES.faint).strip())
         return strips
+
+
+def behaviors_of_units(
+    stimulation_map: StimulationMap, active: Sequence[ActiveBehavior], layers: Sequence[int]
+) -> dict[int, str]:
+    """Return, for each overwritten unit, the behavior that decides its value: the one latched last."""
+    names: dict[int, str] = {}
+    for view in active:
+        behavior = stimulation_map.behaviors.get(view.name)
+        for address in stimulation_map.units_of(behavior) if behavior is not None else ():
+            try:
+                names[parse_unit(address, layers)] = view.name
+            except PolicyError:
+                continue  # the drive refuses such a map with a message of its own
+    return names
