@@ -54,12 +54,7 @@ _MAX_LINKS, _MAX_UNITS, _MAX_TEXT = 10_000, 4_000_000, 1000
 
 
 def encode_drive_info(info: DriveInfo, created: str) -> dict[str, Any]:
-    """Return the properties of a drive: plain values, which the viewer shows, and structures as JSON.
-
-    Args:
-        info: the drive.
-        created: date and time at which it began, ISO 8601.
-    """
+    """Return the properties of a drive that began at `created` (ISO 8601); structures are kept as JSON."""
     return {
         "schema": SCHEMA,
         "created": created,
@@ -81,13 +76,10 @@ def encode_drive_info(info: DriveInfo, created: str) -> dict[str, Any]:
 
 
 def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, str]:
-    """Decode the properties that `encode_drive_info` returned, trusting none of them.
+    """Return a drive, and the date and time at which it began, trusting nothing in the file.
 
     Args:
         properties: a list of values for each name, as the file contains them.
-
-    Returns:
-        The drive, and the date and time at which it began.
 
     Raises:
         SessionError: a property is missing or invalid; the message names it.

@@ -67,11 +67,7 @@ def read_session_header(path: Path | str) -> SessionHeader:
 
 
 def decode_header(file: RrdContents, path: Path, steps: int) -> SessionHeader:
-    """Return the header of a session of which properties, events and endings were read.
-
-    Raises:
-        SessionError: a part is missing or invalid; the message does not name the file.
-    """
+    """Return the header of a session of which properties, events and endings were read."""
     info, created = decode_drive_info(file.properties(INFO))
     return SessionHeader(
         path=path,
@@ -86,11 +82,7 @@ def decode_header(file: RrdContents, path: Path, steps: int) -> SessionHeader:
 
 
 def count_steps(drive: EntityTable) -> int:
-    """Count control steps, checking that none is missing.
-
-    Raises:
-        SessionError: a control step is missing.
-    """
+    """Count control steps; one that is missing is a `SessionError`."""
     steps = drive.steps
     wrong = np.flatnonzero(steps != np.arange(len(steps)))
     if wrong.size:

@@ -32,8 +32,7 @@ class SessionCondition:
         steps: number of control steps before the first gap or the first damaged chunk.
         outcome: how the drive ended; empty if the file does not say.
         recording_id: identifier by which the viewer knows the recording.
-        whole: whether nothing is missing: every chunk, every control step, the outcome and the index at the
-            end.
+        whole: whether every chunk, every control step, the outcome and the index at the end are there.
     """
 
     info: DriveInfo

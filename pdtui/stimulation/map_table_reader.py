@@ -18,7 +18,7 @@ _MAX_WHOLE = 2**53
 
 
 class MapTableReader:
-    """Takes the fields out of one table of a map; a field that is left at the end is an error.
+    """Takes the fields out of one table of a map; a `MapError` names one that is missing, wrong or left over.
 
     Args:
         source: Name of the map in messages.
@@ -27,9 +27,6 @@ class MapTableReader:
         data: The table.
         header: Header of the table in the text; empty for the top level.
         number: Number of the table among those with this header.
-
-    Raises:
-        MapError: The data is no table.
     """
 
     def __init__(self, source: str, text: str, where: str, data: Any, header: str, number: int) -> None:
@@ -40,11 +37,7 @@ class MapTableReader:
         self._data = dict(data)
 
     def take(self, name: str, kind: type | tuple[type, ...], default: Any = ...) -> Any:
-        """Take a field of a type, or several.
-
-        Raises:
-            MapError: It has another type or size, or is missing and there is no default.
-        """
+        """Take a field of a type, or of one of several; without a default it must be there."""
         if name not in self._data:
             if default is ...:
                 raise self.error(name, "missing")
@@ -92,11 +85,7 @@ class MapTableReader:
         return {key: float(value) for key, value in data.items()}
 
     def done(self) -> None:
-        """Check that every field was taken.
-
-        Raises:
-            MapError: One is left.
-        """
+        """Check that every field was taken."""
         for name in self._data:
             raise self.error(name, "not a field of this table")
 

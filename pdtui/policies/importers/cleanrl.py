@@ -23,11 +23,7 @@ _FIRST = re.compile(r"(?:(0|actor)\.)?(?=(?:actor_mean|fc1)\.)")
 
 
 def import_cleanrl(tensors: Tensors) -> PartialPolicy | None:
-    """Return the actor of a CleanRL state dict; None if the tensors have other names.
-
-    Raises:
-        PolicyError: The shapes do not fit each other.
-    """
+    """Return the actor of a CleanRL state dict; None if the tensors have other names."""
     prefixes = {match[0] for name in tensors if (match := _FIRST.match(name))}
     prefix = min(prefixes, key=len, default="")
     named = {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}

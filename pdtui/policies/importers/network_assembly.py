@@ -16,8 +16,7 @@ def assemble_network(
     """Return the network of a policy, completed by the options and the world's spaces.
 
     Raises:
-        PolicyError: Something is still open, and the message says which option answers it; or the shapes do
-            not fit the world.
+        PolicyError: The shapes do not fit the world; or something is open, and the message names the option.
     """
     if len(found.layers) < 2:
         raise PolicyError(

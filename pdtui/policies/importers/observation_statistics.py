@@ -34,11 +34,7 @@ HOW_TO_CONVERT = (
 
 
 def read_statistics(path: Path, observations: int) -> ObservationStatistics:
-    """Read the statistics of observations of this length.
-
-    Raises:
-        PolicyError: The file cannot be read, is a pickle, or holds statistics of another shape.
-    """
+    """Read the statistics of observations of this length."""
     tensors = _tensors(path)
     if "mean" not in tensors or not {"var", "std"} & tensors.keys():
         raise PolicyError(

@@ -1,4 +1,7 @@
-"""A policy as far as its file states it; import options and the world's spaces complete it."""
+"""A policy as far as its file states it; import options and the world's spaces complete it.
+
+A `PolicyError` names tensors that are missing or do not fit each other.
+"""
 
 from __future__ import annotations
 
@@ -34,11 +37,9 @@ class LinearLayer:
 
 @dataclass(frozen=True)
 class ObservationStatistics:
-    """Running statistics by which observations are normalised.
+    """Mean and standard deviation, shape (observations,), by which observations are normalised.
 
-    Attributes:
-        mean, std: Mean and standard deviation, shape (observations,).
-        clip: Limit of the magnitude of normalised observations; 0 for none.
+    The magnitude of normalised observations is limited to `clip` unless that is 0.
     """
 
     mean: torch.Tensor
@@ -84,11 +85,7 @@ class PartialPolicy:
 
 
 def read_linear_layer(tensors: Tensors, prefix: str) -> LinearLayer:
-    """Return the layer of ``PREFIX.weight`` and ``PREFIX.bias``; a missing bias is zero.
-
-    Raises:
-        PolicyError: The weight is missing, or the shapes do not fit each other.
-    """
+    """Return the layer of ``PREFIX.weight`` and ``PREFIX.bias``; a missing bias is zero."""
     weight = tensors.get(f"{prefix}.weight")
     if weight is None or weight.ndim != 2 or 0 in weight.shape or max(weight.shape) > MAX_WIDTH:
         found = "nothing" if weight is None else f"shape {tuple(weight.shape)}"
@@ -102,22 +99,14 @@ def read_linear_layer(tensors: Tensors, prefix: str) -> LinearLayer:
 
 
 def read_layer_sequence(tensors: Tensors, prefix: str) -> tuple[LinearLayer, ...]:
-    """Return the layers ``PREFIX.0``, ``PREFIX.2``, … in the order of their numbers.
-
-    Raises:
-        PolicyError: As for `read_linear_layer` and `check_layer_chain`.
-    """
+    """Return the layers ``PREFIX.0``, ``PREFIX.2``, … in the order of their numbers."""
     numbers = re.compile(rf"{re.escape(prefix)}\.(\d{{1,6}})\.weight")
     found = sorted({int(match[1]) for name in tensors if (match := numbers.fullmatch(name))})
     return check_layer_chain([read_linear_layer(tensors, f"{prefix}.{number}") for number in found], prefix)
 
 
 def check_layer_chain(layers: Iterable[LinearLayer], where: str) -> tuple[LinearLayer, ...]:
-    """Return the layers, after checking that each takes what the one before puts out.
-
-    Raises:
-        PolicyError: Two successive layers do not fit each other.
-    """
+    """Return the layers, after checking that each takes what the one before puts out."""
     chain = tuple(layers)
     for number, (before, after) in enumerate(pairwise(chain)):
         if before.shape[0] != after.shape[1]:
@@ -129,11 +118,7 @@ def check_layer_chain(layers: Iterable[LinearLayer], where: str) -> tuple[Linear
 
 
 def join_mean_and_deviation(mean: LinearLayer, log_std: LinearLayer) -> LinearLayer:
-    """Return one head that puts out the mean, then the log standard deviation.
-
-    Raises:
-        PolicyError: The two layers have different shapes.
-    """
+    """Return one head that puts out the mean, then the log standard deviation."""
     if mean.shape != log_std.shape:
         raise PolicyError(f"heads of mean and log std: shapes {mean.shape} and {log_std.shape} differ")
     return LinearLayer(torch.cat([mean.weight, log_std.weight]), torch.cat([mean.bias, log_std.bias]))

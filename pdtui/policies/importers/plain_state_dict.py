@@ -26,9 +26,6 @@ def import_plain_state_dict(tensors: Tensors, source: str) -> PartialPolicy:
     """Return the only chain of linear layers, or the only one whose names say that it is the actor.
 
     Layers are taken in the order of the file, those of one container in the order of their numbers.
-
-    Raises:
-        PolicyError: There is no such chain, or more than one; the message lists what was found.
     """
     own = {name: tensor for name, tensor in tensors.items() if not _OTHER.search(name.lower())}
     named = {name: tensor for name, tensor in own.items() if _ACTOR.search(name.lower())}

@@ -26,9 +26,6 @@ def import_rllib(tensors: Tensors) -> PartialPolicy | None:
     """Return the policy in RLlib's weights; None if the tensors have other names.
 
     A policy and its target network have the same layers; the first in the file is the policy.
-
-    Raises:
-        PolicyError: The shapes do not fit each other.
     """
     for pattern, output, squash, log_std_range in (
         (_SAC, "gaussian pair", "tanh", (-5.0, 2.0)),

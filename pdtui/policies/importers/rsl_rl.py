@@ -20,11 +20,7 @@ _NORMALISERS = ("actor_obs_normalizer", "obs_normalizer", "obs_norm_state_dict")
 
 
 def import_rsl_rl(tensors: Tensors) -> PartialPolicy | None:
-    """Return the actor in rsl_rl's weights; None if the tensors have other names.
-
-    Raises:
-        PolicyError: The shapes do not fit each other.
-    """
+    """Return the actor in rsl_rl's weights; None if the tensors have other names."""
     named = _unwrapped(tensors)
     prefix = next((prefix for prefix in ("actor", "mlp") if f"{prefix}.0.weight" in named), None)
     log_std = _log_std(named)

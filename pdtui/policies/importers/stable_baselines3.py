@@ -43,12 +43,7 @@ def is_sb3(names: tuple[str, ...]) -> bool:
 def import_sb3(archive: ZipArchive, import_options: ImportOptions) -> PartialPolicy:
     """Return the policy of a Stable-Baselines3 archive.
 
-    Args:
-        archive: The archive.
-        import_options: Tell whether the user gave the statistics of VecNormalize, which the archive lacks.
-
-    Raises:
-        PolicyError: The policy is not an MlpPolicy of the algorithms above, or the file is damaged.
+    The options tell whether the user gave the statistics of VecNormalize, which the archive lacks.
     """
     source, data = archive.source, _data(archive)
     tensors = flatten_tensors(from_torch(archive.read("policy.pth"), f"{source}: policy.pth"))

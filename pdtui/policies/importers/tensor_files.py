@@ -68,11 +68,7 @@ _MAX_HEADER = 10_000
 
 
 def from_npz(archive: ZipArchive) -> Tensors:
-    """Return the arrays of an ``.npz`` in the order of the file; arrays of Python objects are refused.
-
-    Raises:
-        PolicyError: An entry is not an array of numbers, or its shape does not fit its size.
-    """
+    """Return the arrays of an ``.npz`` in the order of the file; arrays of Python objects are refused."""
     return {
         name.removesuffix(".npy"): torch.from_numpy(_array(archive.read(name), f"{archive.source}: '{name}'"))
         for name in archive.names
@@ -103,11 +99,7 @@ def _array(content: bytes, where: str) -> np.ndarray[Any, Any]:
 
 
 def from_safetensors(content: bytes, source: str) -> Tensors:
-    """Return the tensors of a safetensors file.
-
-    Raises:
-        PolicyError: The file is cut off or damaged.
-    """
+    """Return the tensors of a safetensors file."""
     try:
         tensors: Tensors = load_safetensors(content)
     except (SafetensorError, ValueError, KeyError) as error:
@@ -116,11 +108,7 @@ def from_safetensors(content: bytes, source: str) -> Tensors:
 
 
 def from_torch(content: bytes, source: str) -> dict[str, Any]:
-    """Return what a PyTorch archive holds: tensors inside containers, for `flatten_tensors`.
-
-    Raises:
-        PolicyError: The file is not such an archive, is compressed or damaged, or holds other objects.
-    """
+    """Return what a PyTorch archive holds: tensors inside containers, for `flatten_tensors`."""
     archive = ZipArchive(content, source)
     with zipfile.ZipFile(io.BytesIO(content)) as packed:
         if any(info.compress_type != zipfile.ZIP_STORED for info in packed.infolist()):
@@ -147,11 +135,7 @@ def _reason(error: Exception) -> str:
 
 
 def flatten_tensors(content: Any, prefix: str = "", depth: int = 0) -> Tensors:
-    """Return all tensors in nested containers by dotted names, floating-point ones as float32.
-
-    Raises:
-        PolicyError: A tensor claims more numbers than it stores.
-    """
+    """Return all tensors in nested containers by dotted names, floating-point ones as float32."""
     if isinstance(content, torch.Tensor):
         return {prefix: _checked(content, prefix)}
     if depth > _MAX_NESTING:

@@ -15,15 +15,7 @@ _SHOWN = 8
 
 
 class ZipArchive:
-    """The entries of a zip file.
-
-    Args:
-        content: The whole file.
-        source: Its name, for messages.
-
-    Raises:
-        PolicyError: The file is not a whole zip file, or would unpack to too many bytes.
-    """
+    """The entries of a zip file; one that is damaged or would unpack to too many bytes is a `PolicyError`."""
 
     def __init__(self, content: bytes, source: str) -> None:
         self.source = source
@@ -46,11 +38,7 @@ class ZipArchive:
             )
 
     def read(self, name: str) -> bytes:
-        """Unpack one entry, but no more bytes than the archive's directory states.
-
-        Raises:
-            PolicyError: The entry is missing, encrypted, damaged or larger than stated.
-        """
+        """Unpack one entry, but no more bytes than the archive's directory states."""
         if name not in self._entries:
             raise PolicyError(f"{self.source}: no entry '{name}'; there are {self.listing()}")
         size = self._entries[name].file_size
@@ -85,11 +73,7 @@ def shorten(names: tuple[str, ...] | list[str]) -> str:
 
 
 def read_bounded(path: Path) -> bytes:
-    """Return the content of a file.
-
-    Raises:
-        PolicyError: The file cannot be read, or is too large.
-    """
+    """Return the content of a file; one that cannot be read or is too large is a `PolicyError`."""
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:

@@ -42,14 +42,11 @@ class _Part(NamedTuple):
 
 
 class FastMlp:
-    """A network of stages that are called one after the other with one vector.
+    """Stages that are called one after the other with one vector; a `RuntimeError` says that they do not fit.
 
     Args:
         stages: Submodules in order, none of them with submodules of its own.
         observations: Length of the observation.
-
-    Raises:
-        RuntimeError: The stages do not fit each other.
     """
 
     def __init__(self, stages: list[nn.Module], observations: int) -> None:

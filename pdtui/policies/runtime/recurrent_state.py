@@ -16,11 +16,7 @@ PolicyState = tuple[NDArray[Any], ...]
 
 
 def flatten_state(state: Any) -> Iterator[torch.Tensor]:
-    """Yield the tensors of a recurrent state in order.
-
-    Raises:
-        PolicyError: The state holds something else.
-    """
+    """Yield the tensors of a recurrent state in order; anything else in it is a `PolicyError`."""
     if isinstance(state, torch.Tensor):
         yield state
     elif isinstance(state, tuple | list):
@@ -50,15 +46,7 @@ def state_to_arrays(state: Any) -> PolicyState:
 
 
 def check_state(template: Any, state: Any) -> None:
-    """Check that a state returned by the network can be fed to it again.
-
-    Args:
-        template: The initial state; None for a network without one.
-        state: The returned state.
-
-    Raises:
-        PolicyError: The shapes differ.
-    """
+    """Check that a state can be fed to the network again; `template` is its initial state, None for none."""
     if template is None:
         return
     expected = [tuple(tensor.shape) for tensor in flatten_state(template)]

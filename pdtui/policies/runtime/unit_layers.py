@@ -20,13 +20,7 @@ RECURRENT_TYPES: tuple[type[nn.Module], ...] = (nn.RNNBase, nn.RNNCellBase)
 def hidden_modules(module: nn.Module, hidden: Sequence[str] | None, owner: str) -> dict[nn.Module, str]:
     """Return the submodules whose outputs are units, with their names.
 
-    Args:
-        module: The network.
-        hidden: Names of the submodules; by default every activation function and every recurrent layer.
-        owner: Name of the policy, for messages.
-
-    Raises:
-        PolicyError: A name does not exist.
+    They are those named in `hidden`, by default every activation function and every recurrent layer.
     """
     modules = dict(module.named_modules())
     if hidden is None:
@@ -49,11 +43,7 @@ def _has_weights(module: nn.Module) -> bool:
 
 
 def output_tensor(output: Any) -> torch.Tensor:
-    """Return the tensor that the next layer reads: of a recurrent layer, the output h without its state.
-
-    Raises:
-        PolicyError: The output is not a tensor.
-    """
+    """Return the tensor that the next layer reads: of a recurrent layer, the output h without its state."""
     first = output[0] if isinstance(output, tuple) and output else output
     if not isinstance(first, torch.Tensor):
         raise PolicyError(f"a hidden submodule puts out {type(first).__name__}, expected a tensor")
@@ -63,15 +53,10 @@ def output_tensor(output: Any) -> torch.Tensor:
 def name_layers(
     module: nn.Module, chosen: dict[nn.Module, str], run: Callable[[], object]
 ) -> list[list[str]]:
-    """Return the names of the layers in the order in which the network calls them.
+    """Return the names of the chosen layers in the order in which the network, once it is run, calls them.
 
     A layer is named after the submodule whose output goes straight into its activation function (``conv1``),
     and also after the activation function itself.
-
-    Args:
-        module: The network.
-        chosen: The submodules whose outputs are units.
-        run: Runs the network once.
     """
     # Keeping references to the tensors prevents a new tensor from getting the identity of an old one.
     producers: list[tuple[torch.Tensor, str]] = []

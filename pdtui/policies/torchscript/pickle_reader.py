@@ -42,8 +42,7 @@ def read_pickle(content: bytes, storage: Storage, source: str) -> Any:
         source: Name of the file, for messages.
 
     Raises:
-        PolicyError: The pickle is damaged, or uses an opcode or calls a name that no TorchScript archive
-            needs.
+        PolicyError: The pickle is damaged, or needs more than a TorchScript archive does.
     """
     stack: list[Any] = []
     memo: dict[int, Any] = {}

@@ -28,15 +28,7 @@ _MOST_STATEMENTS = 20_000
 
 
 class TorchScriptProgram:
-    """The functions and methods of an archive, by their full names.
-
-    Args:
-        texts: Source code by the dotted name of its module.
-        constants: The archive's constants.
-
-    Raises:
-        PolicyError: A text is not TorchScript.
-    """
+    """The functions and methods in the source code of an archive (text by module), by their full names."""
 
     def __init__(self, texts: Mapping[str, str], constants: tuple[Any, ...]) -> None:
         self.functions: dict[str, ast.FunctionDef] = {}
@@ -64,11 +56,7 @@ class TorchScriptProgram:
                     self.fields.setdefault(kind, {})[part.target.id] = ast.literal_eval(part.value)
 
     def call(self, name: str, arguments: list[Any], keywords: dict[str, Any] | None = None) -> Any:
-        """Run a function of the archive.
-
-        Raises:
-            PolicyError: There is no such function, or it does something that pdtui refuses to do.
-        """
+        """Run a function of the archive."""
         function = self.functions.get(name)
         if function is None:
             raise PolicyError(f"its code has no '{name[:100]}'")
@@ -117,11 +105,7 @@ class ScriptedModule(nn.Module):
         return self._program.call(f"{self.kind}.{method}", [self, *arguments], keywords)
 
     def read(self, name: str) -> Any:
-        """Return an attribute of the submodule.
-
-        Raises:
-            PolicyError: There is none of that name.
-        """
+        """Return an attribute of the submodule."""
         for table in (self._plain, self._modules, self._parameters, self._buffers):
             if name in table:
                 return table[name]

@@ -69,9 +69,6 @@ def load_any_network(
     """Return the network of a file that pdtui or another program wrote, and its hash.
 
     The hash is the file's SHA-256, combined with the import options if any, since they make another policy.
-
-    Raises:
-        PolicyError: As for `load_policy`.
     """
     digest = hash_file(path)
     if is_own_format(path):

@@ -187,11 +187,7 @@ class PolicyNetwork(nn.Module):
 
 
 def check_tensors(expected: Mapping[str, torch.Tensor], found: Mapping[str, torch.Tensor]) -> None:
-    """Check that tensors have the expected names and shapes.
-
-    Raises:
-        PolicyError: A tensor is missing, superfluous, or of another shape.
-    """
+    """Check that tensors have the expected names and shapes; others are a `PolicyError`."""
     shapes, others = ({name: tuple(one.shape) for name, one in all.items()} for all in (expected, found))
     for name in sorted(shapes.keys() | others.keys()):
         if shapes.get(name) != others.get(name):

@@ -36,8 +36,7 @@ def read_record_batch(data: pa.Buffer) -> pa.RecordBatch:
     """Read an IPC stream that consists of a schema and one record batch.
 
     Raises:
-        pyarrow.ArrowException: the stream is damaged.
-        ValueError: the stream is too large, or is not of the kind that Rerun writes.
+        ValueError, pyarrow.ArrowException: the stream is damaged, too large, or not as Rerun writes it.
     """
     reader = pa.ipc.MessageReader.open_stream(data)
     try:
@@ -102,11 +101,7 @@ def _check_type(kind: pa.DataType, depth: int) -> None:
 
 
 def count_rows(metadata: memoryview) -> int:
-    """Return the number of rows of a record batch, from the metadata of its message.
-
-    Raises:
-        ValueError: the metadata are damaged or belong to another kind of message.
-    """
+    """Return the number of rows that the metadata of a record batch state; a `ValueError` if they are damaged."""
     try:
         (root,) = struct.unpack_from("<I", metadata, 0)
         kind, length = _field(metadata, root, _HEADER_TYPE), _field(metadata, _header(metadata), _LENGTH)

@@ -79,11 +79,7 @@ class ChunkStream:
         self.complete = True
 
     def require_store(self) -> StoreInfo:
-        """Return the store of the recording.
-
-        Raises:
-            SessionError: the file does not announce a recording.
-        """
+        """Return the store of the recording; a file that announces none is a `SessionError`."""
         if self.store is None:
             raise SessionError(f"{self._path}: contains no recording")
         return self.store
@@ -123,11 +119,6 @@ class ChunkStream:
 
 
 def _decode_message(file: BinaryIO, frame: MessageFrame, read: Callable[[memoryview], T]) -> T:
-    """Read and decode a message.
-
-    Raises:
-        SessionError: the message is damaged or too large.
-    """
     if frame.length > MAX_MESSAGE:
         raise SessionError(f"byte {frame.start}: expected a message of at most {MAX_MESSAGE >> 20} MiB")
     file.seek(frame.start)

@@ -17,17 +17,14 @@ Number = TypeVar("Number", bound=np.generic)
 
 
 class EntityTable:
-    """All rows of one entity, in the order of their control steps.
+    """All rows of one entity, in the order of their control steps; a `SessionError` says what is wrong with them.
 
     Args:
         entity: path of the entity.
-        batches: its rows, as the file has them.
+        batches: its rows, as the file has them; each row states its control step.
 
     Attributes:
         steps: the control step of each row, shape (rows,).
-
-    Raises:
-        SessionError: a row does not state its control step.
     """
 
     def __init__(self, entity: str, batches: Sequence[pa.RecordBatch]) -> None:
@@ -39,15 +36,9 @@ class EntityTable:
         self.steps: NDArray[np.int64] = unsorted[self._order]
 
     def read_lists(self, name: str, kind: type[Any], *, optional: bool = False) -> list[list[Any]]:
-        """Return one list per row; their lengths may differ.
+        """Return one list of values of this Python type per row; their lengths may differ.
 
-        Args:
-            name: name of the column.
-            kind: Python type of the values.
-            optional: whether a batch without the column stands for empty lists.
-
-        Raises:
-            SessionError: the column is missing or has another type.
+        A batch without the column stands for empty lists if it is `optional`.
         """
         rows: list[list[Any]] = []
         for batch in self._batches:
@@ -61,27 +52,14 @@ class EntityTable:
         return [rows[row] for row in self._order]
 
     def read_texts(self, name: str) -> list[str]:
-        """Return one text per row.
-
-        Raises:
-            SessionError: as `read_lists`; or a row has no text, or several.
-        """
+        """Return one text per row."""
         rows = self.read_lists(name, str)
         if any(len(row) != 1 for row in rows):
             raise SessionError(f"stream '{self._entity}/{name}': expected one text per row")
         return [row[0] for row in rows]
 
     def read_matrix(self, name: str, kind: type[Number], width: int | None = None) -> NDArray[Number]:
-        """Return equally many numbers per row, shape (rows, width).
-
-        Args:
-            name: name of the column.
-            kind: NumPy type of the numbers.
-            width: expected numbers per row; None takes the width of the first row.
-
-        Raises:
-            SessionError: the column is missing, or has another type or width.
-        """
+        """Return equally many numbers per row, shape (rows, width); as many as in the first row if width is None."""
         wanted = pa.from_numpy_dtype(np.dtype(kind))
         blocks = []
         for batch in self._batches:
@@ -102,11 +80,7 @@ class EntityTable:
         return gathered[self._order].astype(kind, copy=False)
 
     def read_numbers(self, name: str, kind: type[Number]) -> NDArray[Number]:
-        """Return one number per row, shape (rows,).
-
-        Raises:
-            SessionError: as `read_matrix`.
-        """
+        """Return one number per row, shape (rows,)."""
         return self.read_matrix(name, kind, 1)[:, 0]
 
     def _column(self, batch: pa.RecordBatch, name: str, *, optional: bool = False) -> pa.Array:

@@ -26,13 +26,7 @@ _KIND, _INDEX = b"rerun:kind", b"index"
 
 @dataclass(frozen=True)
 class StoreInfo:
-    """The store, in Rerun's terms, to which a message belongs: a recording or a blueprint.
-
-    Attributes:
-        is_recording: whether it is a recording rather than a blueprint.
-        recording_id: its identifier.
-        application_id: the name of the program that wrote it.
-    """
+    """The store, in Rerun's terms, of a message: a recording or a blueprint, and the program that wrote it."""
 
     is_recording: bool
     recording_id: str
@@ -43,10 +37,7 @@ class StoreInfo:
 class EntityChunk:
     """A batch of rows of one entity.
 
-    Attributes:
-        entity: path of the entity.
-        timelines: names of the columns that say when a row applies; empty if the rows apply at all times.
-        batch: the rows.
+    `timelines` are the columns that say when a row applies; there are none if the rows apply at all times.
     """
 
     entity: str
@@ -55,20 +46,12 @@ class EntityChunk:
 
 
 def decode_store_info(payload: memoryview) -> StoreInfo:
-    """Return the store that a message announces.
-
-    Raises:
-        ValueError: the message is damaged.
-    """
+    """Return the store that a message announces."""
     return _decode_store(bytes(bytes_field(read_fields(bytes_field(read_fields(payload), 2)), 2)))
 
 
 def decode_chunk(payload: memoryview) -> tuple[StoreInfo, EntityChunk]:
-    """Decode a message that contains rows.
-
-    Raises:
-        ValueError, pyarrow.ArrowException: the message is damaged, or would take too much memory.
-    """
+    """Decode a message that contains rows."""
     message = read_fields(payload)
     store = decode_store(message)
     if number_field(message, 4) != _ARROW_IPC:
@@ -82,11 +65,7 @@ def decode_chunk(payload: memoryview) -> tuple[StoreInfo, EntityChunk]:
 
 
 def decode_store(chunk_message: dict[int, Value]) -> StoreInfo:
-    """Return the store that a chunk belongs to.
-
-    Raises:
-        ValueError: the message is damaged.
-    """
+    """Return the store that a chunk belongs to."""
     return _decode_store(bytes(bytes_field(chunk_message, 1)))
 
 
@@ -102,12 +81,7 @@ def unpack_payload(
 ) -> pa.Buffer:
     """Return the rows of a chunk's message as an Arrow IPC stream.
 
-    Args:
-        message: the fields of the message.
-        decompress: decompresses an LZ4 block, given its bytes and the size that the message claims.
-
-    Raises:
-        ValueError, pyarrow.ArrowException: the message is damaged.
+    `decompress` is given the bytes of an LZ4 block and the size that the message claims.
     """
     packed, compression = bytes_field(message, 5), number_field(message, 2)
     if compression in _PLAIN:
@@ -118,11 +92,7 @@ def unpack_payload(
 
 
 def decompress_whole(packed: memoryview, size: int) -> pa.Buffer:
-    """Decompress an LZ4 block.
-
-    Raises:
-        ValueError, pyarrow.ArrowException: it is damaged or too large.
-    """
+    """Decompress an LZ4 block."""
     if size > min(MAX_MESSAGE, _LZ4_RATIO * len(packed)):
         raise ValueError(f"{len(packed)} bytes cannot unpack to {size}, or must not")
     return pa.decompress(packed, size, codec="lz4_raw")
@@ -140,13 +110,7 @@ _IPC_PREFIX = struct.Struct("<II")
 
 
 class ChunkHead(NamedTuple):
-    """What a chunk's message begins with.
-
-    Attributes:
-        store: the recording or blueprint that the chunk belongs to.
-        entity: path of its entity.
-        rows: number of its rows.
-    """
+    """What a chunk's message begins with: whose rows it holds and how many."""
 
     store: StoreInfo
     entity: str
@@ -154,15 +118,9 @@ class ChunkHead(NamedTuple):
 
 
 def read_chunk_head(file: BinaryIO, frame: MessageFrame, own: StoreInfo | None) -> ChunkHead | None:
-    """Read the head of a chunk.
+    """Read the head of a chunk; None if it cannot be told, so that the whole message has to be decoded.
 
-    Args:
-        file: an open recording.
-        frame: of the chunk's message.
-        own: the store of interest; the chunks of others are given without an entity.
-
-    Returns:
-        The head; None if it cannot be told, so that the whole message has to be decoded.
+    The chunks of stores other than `own` are given without an entity.
     """
     whole = frame.length <= _READ_WHOLE
     try:
@@ -185,11 +143,7 @@ def read_chunk_head(file: BinaryIO, frame: MessageFrame, own: StoreInfo | None) 
 
 
 def decompress_start(packed: memoryview, _size: int) -> pa.Buffer:
-    """Decompress the start of an LZ4 block up to the rows, which Arrow does only for whole blocks.
-
-    Raises:
-        ValueError, IndexError: it is damaged.
-    """
+    """Decompress the start of an LZ4 block up to the rows, which Arrow does only for whole blocks."""
     out = bytearray()
     place = 0
     needed = 0

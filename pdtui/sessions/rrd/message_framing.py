@@ -1,7 +1,8 @@
 """Find the messages of an .rrd file.
 
 A file begins with 12 bytes. Messages follow, each after a header of 16 bytes: its kind and its length. The
-last message is of kind 0 and is followed by 32 bytes that contain its position, length and checksum.
+last message is of kind 0 and is followed by 32 bytes that contain its position, length and checksum. A file
+that is torn or damaged is a `SessionError` that names the byte but not the file.
 """
 
 from __future__ import annotations
@@ -32,8 +33,7 @@ class MessageFrame(NamedTuple):
 
     Attributes:
         kind: `LAST`, `STORE`, `CHUNK`, or another kind, which a session does not need.
-        start: byte at which the payload begins.
-        length: size of the payload, bytes.
+        start, length: first byte and number of bytes of the payload.
     """
 
     kind: int
@@ -47,11 +47,7 @@ class MessageFrame(NamedTuple):
 
 
 def check_start(file: BinaryIO) -> None:
-    """Check that a file begins like a recording.
-
-    Raises:
-        SessionError: it does not. The message does not name the file.
-    """
+    """Check that a file begins like a recording."""
     start = file.read(_START.size)
     if start[:4] != _MAGIC:
         raise SessionError("expected a Rerun recording (.rrd), found another kind of file")
@@ -62,15 +58,9 @@ def check_start(file: BinaryIO) -> None:
 
 
 def read_message_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
-    """Yield the messages of a file in their order.
+    """Yield the messages of a file of this size in their order; its position may be changed in between.
 
-    Args:
-        file: an open recording; its position may be changed between messages.
-        size: size of the file, bytes.
-
-    Raises:
-        SessionError: the last message is cut off, or a length is wrong; the complete messages before it are
-            yielded first. The message names the byte, not the file.
+    If the last message is cut off or a length is wrong, the complete messages before it are yielded first.
     """
     place = _START.size
     while place < size:
@@ -91,11 +81,7 @@ def read_message_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
 
 
 def check_end(file: BinaryIO, last: MessageFrame) -> None:
-    """Check that the last message, an index of the others, has the checksum in the trailer.
-
-    Raises:
-        SessionError: the index or the trailer is damaged. The message does not name the file.
-    """
+    """Check that the last message, an index of the others, has the checksum in the trailer."""
     file.seek(last.start)
     digest, left = xxh32(seed=_SEED), last.length
     while left > 0:
@@ -111,11 +97,7 @@ def check_end(file: BinaryIO, last: MessageFrame) -> None:
 
 
 def undamaged_length(path: Path) -> int:
-    """Return the number of bytes up to which every message is complete; the file's size if all are.
-
-    Raises:
-        SessionError: the file cannot be read.
-    """
+    """Return the number of bytes up to which every message is complete; the file's size if all are."""
     try:
         with path.open("rb") as file:
             size = file.seek(0, 2)

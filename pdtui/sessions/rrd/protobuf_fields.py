@@ -1,4 +1,4 @@
-"""Read Protobuf's wire format, as far as the messages of an .rrd file need it."""
+"""Read Protobuf's wire format, as far as an .rrd file needs it; a `ValueError` says what is damaged."""
 
 from __future__ import annotations
 
@@ -10,12 +10,8 @@ Value = int | memoryview
 def read_fields(message: memoryview, *, cut: bool = False) -> dict[int, Value]:
     """Return the fields of a message by their numbers; of a repeated field, the last.
 
-    Args:
-        message: its bytes. Numbers are decoded; every other field is returned as its bytes.
-        cut: whether only the start of the message is there, so that the last field may be incomplete.
-
-    Raises:
-        ValueError: the bytes are not such a message.
+    Numbers are decoded; every other field is returned as its bytes. If only the start of the message is there
+    (`cut`), the last field may be incomplete.
     """
     found: dict[int, Value] = {}
     place = 0
@@ -39,11 +35,7 @@ def read_fields(message: memoryview, *, cut: bool = False) -> dict[int, Value]:
 
 
 def number_field(found: dict[int, Value], field: int) -> int:
-    """Return a numeric field; 0 if it is missing, which is the default of the format.
-
-    Raises:
-        ValueError: the field has another type.
-    """
+    """Return a numeric field; 0 if it is missing, which is the default of the format."""
     value = found.get(field, 0)
     if not isinstance(value, int):
         raise ValueError(f"field {field} is not a number")
@@ -51,11 +43,7 @@ def number_field(found: dict[int, Value], field: int) -> int:
 
 
 def bytes_field(found: dict[int, Value], field: int) -> memoryview:
-    """Return the bytes of a field that is a text, a message or bytes; empty if it is missing.
-
-    Raises:
-        ValueError: the field has another type.
-    """
+    """Return the bytes of a field that is a text, a message or bytes; empty if it is missing."""
     value = found.get(field, memoryview(b""))
     if isinstance(value, int):
         raise ValueError(f"field {field} is a number")
@@ -63,11 +51,7 @@ def bytes_field(found: dict[int, Value], field: int) -> memoryview:
 
 
 def text_field(found: dict[int, Value], field: int) -> str:
-    """Return a text field.
-
-    Raises:
-        ValueError: the field has another type.
-    """
+    """Return a text field; empty if it is missing."""
     return str(bytes_field(found, field), "utf-8")
 
 

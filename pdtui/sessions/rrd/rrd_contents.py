@@ -30,14 +30,12 @@ class RrdContents:
         entities: the entities whose rows are kept, besides all properties; the rows of the others are
             counted but not decoded. By default every message is decoded and checked, and all rows are kept
             except those that only the viewer draws.
-        only: columns of the drive to keep; all if empty.
-        skip: columns of the drive to leave out.
+        only, skip: columns of the drive to keep, all if empty, and columns to leave out.
         torn: whether to stop at the first message that cannot be read instead of raising an error.
 
     Attributes:
         recording_id: the identifier of the recording.
-        complete: whether every message could be read.
-        finished: whether the file also ends with the index of its chunks, as a finished recording does.
+        finished: whether the file ends with the index of its chunks, as a finished recording does.
         skipped_rows: number of rows by entity that were counted but not decoded.
 
     Raises:

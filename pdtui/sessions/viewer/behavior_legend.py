@@ -16,9 +16,7 @@ IDLE = (150, 150, 150)
 class BehaviorLegend:
     """Assigns colors to behaviors in the order of the map; unknown behaviors get the colors after those.
 
-    Args:
-        info: the drive. A map text that cannot be parsed, for example from another version, is no error
-            because it only determines colors here.
+    A map text that cannot be parsed, for example from another version, is no error: only colors depend on it.
     """
 
     def __init__(self, info: DriveInfo) -> None:

@@ -20,12 +20,7 @@ _HEIGHT = 1.2
 
 
 class ObstacleWriter:
-    """Writes the obstacles of a world at its first step; they stay until the next world begins.
-
-    Args:
-        send: writes a batch of rows.
-        log_static: writes data that apply at all times.
-    """
+    """Writes the obstacles of a world at its first step; they stay until the next world begins."""
 
     def __init__(self, send: SendRows, log_static: LogStatic) -> None:
         self._send, self._log_static = send, log_static

@@ -17,11 +17,7 @@ _TORSO = (90, 122, 158)
 
 
 class RobotShapes:
-    """The links of a robot as capsules, spheres and boxes.
-
-    Args:
-        links: the links.
-    """
+    """The links of a robot as capsules, spheres and boxes."""
 
     def __init__(self, links: Sequence[Link]) -> None:
         # A sphere is drawn as a capsule of length zero.
@@ -52,11 +48,7 @@ class RobotShapes:
         return parts
 
     def columns(self, poses: Floats) -> list[ComponentColumn]:
-        """Return where the shapes are.
-
-        Args:
-            poses: poses of the bodies in n steps, shape (n, B, 7).
-        """
+        """Return where the shapes are, from the poses of the bodies in n steps, shape (n, B, 7)."""
         columns = []
         if self._round:
             placed = place_links(self._round, poses)

@@ -34,13 +34,7 @@ after the activations, and a replay recomputes them."""
 
 
 class ViewerDataWriter:
-    """Collects control steps and writes what the viewer draws.
-
-    Args:
-        info: the drive.
-        send: writes a batch of rows.
-        log_static: writes data that apply at all times.
-    """
+    """Collects control steps and writes what the viewer draws: rows, and data that apply at all times."""
 
     def __init__(self, info: DriveInfo, send: SendRows, log_static: LogStatic) -> None:
         self._send, self._log_static = send, log_static

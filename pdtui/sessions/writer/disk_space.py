@@ -26,11 +26,7 @@ _LEAST_STEP_BYTES = 2000
 
 
 def free_space(path: Path) -> int:
-    """Return by how many bytes a file can grow: the free space of its disk, within the limit on file sizes.
-
-    Raises:
-        OSError: the file does not exist.
-    """
+    """Return by how many bytes a file can grow: the free space, within the limit on the size of files."""
     disk = os.statvfs(path)
     free = disk.f_bavail * disk.f_frsize
     limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -82,9 +78,7 @@ class DiskReserve:
     def needed(self, steps: int, chunks: int) -> int:
         """Return the space for the rows on their way, the heat map, the outcome and the index, bytes.
 
-        Args:
-            steps: number of control steps so far, from which the size of a step is estimated.
-            chunks: number of chunks written so far.
+        The size of a step is estimated from the control steps, and that of the index from the chunks so far.
         """
         step = max(self._least, 2 * self._path.stat().st_size // max(steps, self._rows))
         return self._fixed + _FOOTER_OF_CHUNK * chunks + step * self._rows

@@ -27,11 +27,7 @@ _ARROW_TYPES = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.
 
 
 def open_recording(path: Path, info: DriveInfo, recording_id: str | None = None) -> rr.RecordingStream:
-    """Open a recording that is written to a file, with a blueprint; an existing file is overwritten.
-
-    Raises:
-        SessionError: the file cannot be written.
-    """
+    """Open a recording that is written to a file, with a blueprint; an existing file is overwritten."""
     with name_file_in_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         recording = rr.RecordingStream(APP, recording_id=recording_id)
@@ -53,11 +49,7 @@ def send_property(recording: rr.RecordingStream, name: str, values: Mapping[str,
 
 
 def flush_recording(recording: rr.RecordingStream, path: Path) -> None:
-    """Wait until everything was handed to the operating system.
-
-    Raises:
-        RuntimeError: the file cannot be written.
-    """
+    """Wait until everything was handed to the operating system; a `RuntimeError` says that it cannot be."""
     # If the writing thread ends during a flush, the flush never returns.
     deadline = time.monotonic() + _PATIENCE_SECONDS
     while True:

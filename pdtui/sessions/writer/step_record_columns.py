@@ -73,11 +73,9 @@ def to_half(activations: NDArray[np.float32]) -> NDArray[np.float16]:
 
 
 def event_columns(events: Sequence[Event], first: int) -> list[ComponentColumn]:
-    """Return columns with one row per event.
+    """Return columns with one row per event, in the order in which they were applied.
 
-    Args:
-        events: the events, in the order in which they were applied.
-        first: number of the first of them in the session.
+    `first` is the number of the first of them in the session.
     """
     numbers = np.arange(first, first + len(events), dtype=np.int64)
     return [
