@@ -17,16 +17,7 @@ MAX_ROWS = 1 << 20
 _MAX_COLUMNS = 1000
 _MAX_DEPTH = 6
 _SCHEMA, _BATCH = "schema", "record batch"
-_SIZED = (
-    pa.types.is_boolean,
-    pa.types.is_integer,
-    pa.types.is_floating,
-    pa.types.is_temporal,
-    pa.types.is_string,
-    pa.types.is_large_string,
-    pa.types.is_binary,
-    pa.types.is_large_binary,
-)
+_SIZED = "boolean integer floating temporal string large_string binary large_binary"
 _HEADER_TYPE, _HEADER = 1, 2  # fields of a message
 _LENGTH, _COMPRESSION = 0, 3  # fields of a record batch
 _RECORD_BATCH = 3  # type of a header
@@ -89,9 +80,8 @@ def _check_type(kind: pa.DataType, depth: int) -> None:
             inner = [one for one in inner if not types.is_null(one)]
     else:
         inner = []
-        sized = any(test(kind) for test in _SIZED) or (
-            types.is_fixed_size_binary(kind) and kind.byte_width > 0
-        )
+        sized = any(getattr(types, f"is_{name}")(kind) for name in _SIZED.split())
+        sized = sized or (types.is_fixed_size_binary(kind) and kind.byte_width > 0)
     if not sized:
         raise ValueError(f"a column of type {str(kind)[:80]} is not expected in a recording")
     if inner and not depth:
@@ -101,7 +91,7 @@ def _check_type(kind: pa.DataType, depth: int) -> None:
 
 
 def count_rows(metadata: memoryview) -> int:
-    """Return the number of rows that the metadata of a record batch state; a `ValueError` if they are damaged."""
+    """Return the number of rows that the metadata of a record batch state, a `ValueError` if damaged."""
     try:
         (root,) = struct.unpack_from("<I", metadata, 0)
         kind, length = _field(metadata, root, _HEADER_TYPE), _field(metadata, _header(metadata), _LENGTH)

@@ -12,24 +12,10 @@ import pyarrow as pa
 
 from pdtui.core.errors import SessionError
 from pdtui.core.untrusted_file import open_regular_file
-from pdtui.sessions.rrd.message_decoder import (
-    MAX_MESSAGE,
-    EntityChunk,
-    StoreInfo,
-    decode_chunk,
-    decode_store_info,
-    read_chunk_head,
-)
-from pdtui.sessions.rrd.message_framing import (
-    CHUNK,
-    LAST,
-    RESCUE,
-    STORE,
-    MessageFrame,
-    check_end,
-    check_start,
-    read_message_frames,
-)
+from pdtui.sessions.rrd import message_decoder as decoder
+from pdtui.sessions.rrd import message_framing as framing
+from pdtui.sessions.rrd.message_decoder import EntityChunk, StoreInfo
+from pdtui.sessions.rrd.message_framing import RESCUE, MessageFrame
 from pdtui.sessions.session_schema import APP
 
 T = TypeVar("T")
@@ -47,7 +33,6 @@ class ChunkStream:
 
     Attributes:
         store: the store of the recording, once the message that announces it was read.
-        complete: whether every message was read.
         finished: whether the index at the end of the file was read, too.
         skipped_rows: number of rows by entity in the chunks that were not decoded.
     """
@@ -56,7 +41,7 @@ class ChunkStream:
         self._path, self._needed = path, needed
         self._stores: list[StoreInfo] = []
         self.store: StoreInfo | None = None
-        self.complete = self.finished = False
+        self.finished = False
         self.skipped_rows: Counter[str] = Counter()
 
     def __iter__(self) -> Iterator[EntityChunk]:
@@ -76,7 +61,6 @@ class ChunkStream:
         except SessionError as error:
             raise SessionError(f"{self._path}: {error}") from error
         self.require_store()
-        self.complete = True
 
     def require_store(self) -> StoreInfo:
         """Return the store of the recording; a file that announces none is a `SessionError`."""
@@ -85,20 +69,20 @@ class ChunkStream:
         return self.store
 
     def _chunks(self, file: BinaryIO) -> Iterator[EntityChunk]:
-        check_start(file)
-        for frame in read_message_frames(file, os.fstat(file.fileno()).st_size):
-            if frame.kind == LAST:
-                check_end(file, frame)
+        framing.check_start(file)
+        for frame in framing.read_message_frames(file, os.fstat(file.fileno()).st_size):
+            if frame.kind == framing.LAST:
+                framing.check_end(file, frame)
                 self.finished = True
-            elif frame.kind == STORE:
-                self._add_store(_decode_message(file, frame, decode_store_info))
-            elif frame.kind == CHUNK and (chunk := self._read_chunk(file, frame)) is not None:
+            elif frame.kind == framing.STORE:
+                self._add_store(_decode_message(file, frame, decoder.decode_store_info))
+            elif frame.kind == framing.CHUNK and (chunk := self._read_chunk(file, frame)) is not None:
                 yield chunk
 
     def _read_chunk(self, file: BinaryIO, frame: MessageFrame) -> EntityChunk | None:
-        head = None if self._needed is None else read_chunk_head(file, frame, self.store)
+        head = None if self._needed is None else decoder.read_chunk_head(file, frame, self.store)
         if head is None or self._needed is None or (head.store == self.store and self._needed(head.entity)):
-            store, chunk = _decode_message(file, frame, decode_chunk)
+            store, chunk = _decode_message(file, frame, decoder.decode_chunk)
         else:
             store, chunk = head.store, None
             self.skipped_rows[head.entity] += head.rows
@@ -119,8 +103,10 @@ class ChunkStream:
 
 
 def _decode_message(file: BinaryIO, frame: MessageFrame, read: Callable[[memoryview], T]) -> T:
-    if frame.length > MAX_MESSAGE:
-        raise SessionError(f"byte {frame.start}: expected a message of at most {MAX_MESSAGE >> 20} MiB")
+    if frame.length > decoder.MAX_MESSAGE:
+        raise SessionError(
+            f"byte {frame.start}: expected a message of at most {decoder.MAX_MESSAGE >> 20} MiB"
+        )
     file.seek(frame.start)
     payload = file.read(frame.length)
     if len(payload) < frame.length:

@@ -17,7 +17,7 @@ Number = TypeVar("Number", bound=np.generic)
 
 
 class EntityTable:
-    """All rows of one entity, in the order of their control steps; a `SessionError` says what is wrong with them.
+    """All rows of one entity, in the order of their control steps; wrong ones are a `SessionError`.
 
     Args:
         entity: path of the entity.
@@ -59,7 +59,7 @@ class EntityTable:
         return [row[0] for row in rows]
 
     def read_matrix(self, name: str, kind: type[Number], width: int | None = None) -> NDArray[Number]:
-        """Return equally many numbers per row, shape (rows, width); as many as in the first row if width is None."""
+        """Return equally many numbers per row, shape (rows, width); by default as many as in the first."""
         wanted = pa.from_numpy_dtype(np.dtype(kind))
         blocks = []
         for batch in self._batches:
@@ -71,10 +71,8 @@ class EntityTable:
             values = lists.flatten()
             even = len(lists) == len(column) and bool((lengths == width).all())
             if values.type != wanted or values.null_count or not even:
-                expected = f"{width} × {wanted} per row"
-                raise SessionError(
-                    f"stream '{self._entity}/{name}': expected {expected}, found {column.type}"
-                )
+                expected = f"expected {width} × {wanted} per row"
+                raise SessionError(f"stream '{self._entity}/{name}': {expected}, found {column.type}")
             blocks.append(values.to_numpy(zero_copy_only=False).reshape(len(column), width or 0))
         gathered = np.concatenate(blocks) if blocks else np.empty((0, width or 0), kind)
         return gathered[self._order].astype(kind, copy=False)

@@ -1,10 +1,12 @@
-"""Decode the messages of an .rrd file, without Rerun's own library: damaged messages make it abort."""
+"""Decode the messages of an .rrd file, without Rerun's own library: damaged messages make it abort.
+
+The head of a chunk's message tells whose rows it holds and how many, without the rows themselves. Damaged
+messages are a `ValueError` or an `ArrowException`.
+"""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import BinaryIO, NamedTuple
 
@@ -16,88 +18,10 @@ from pdtui.sessions.rrd.protobuf_fields import Value, bytes_field, number_field,
 
 MAX_MESSAGE = 256 << 20
 """Largest size of a message, bytes, compressed or not. A batch of 1000 steps of 4096 units takes 16 MB."""
-
-_LZ4_RATIO = 255  # the largest factor by which an LZ4 block can grow
+_ENTITY_PATH, _KIND, _INDEX = b"rerun:entity_path", b"rerun:kind", b"index"
 _PLAIN, _LZ4 = (0, 1), 2
+_LZ4_RATIO = 255  # the largest factor by which an LZ4 block can grow
 _ARROW_IPC = 1
-ENTITY_PATH = b"rerun:entity_path"
-_KIND, _INDEX = b"rerun:kind", b"index"
-
-
-@dataclass(frozen=True)
-class StoreInfo:
-    """The store, in Rerun's terms, of a message: a recording or a blueprint, and the program that wrote it."""
-
-    is_recording: bool
-    recording_id: str
-    application_id: str
-
-
-@dataclass(frozen=True)
-class EntityChunk:
-    """A batch of rows of one entity.
-
-    `timelines` are the columns that say when a row applies; there are none if the rows apply at all times.
-    """
-
-    entity: str
-    timelines: tuple[str, ...]
-    batch: pa.RecordBatch
-
-
-def decode_store_info(payload: memoryview) -> StoreInfo:
-    """Return the store that a message announces."""
-    return _decode_store(bytes(bytes_field(read_fields(bytes_field(read_fields(payload), 2)), 2)))
-
-
-def decode_chunk(payload: memoryview) -> tuple[StoreInfo, EntityChunk]:
-    """Decode a message that contains rows."""
-    message = read_fields(payload)
-    store = decode_store(message)
-    if number_field(message, 4) != _ARROW_IPC:
-        raise ValueError("expected rows in Arrow's format")
-    batch = read_record_batch(unpack_payload(message, decompress_whole))
-    metadata = batch.schema.metadata or {}
-    if ENTITY_PATH not in metadata:
-        raise ValueError("the rows name no entity")
-    timelines = tuple(field.name for field in batch.schema if (field.metadata or {}).get(_KIND) == _INDEX)
-    return store, EntityChunk(metadata[ENTITY_PATH].decode(), timelines, batch)
-
-
-def decode_store(chunk_message: dict[int, Value]) -> StoreInfo:
-    """Return the store that a chunk belongs to."""
-    return _decode_store(bytes(bytes_field(chunk_message, 1)))
-
-
-@lru_cache(maxsize=32)
-def _decode_store(store: bytes) -> StoreInfo:
-    found = read_fields(memoryview(store))
-    application = text_field(read_fields(bytes_field(found, 3)), 1)
-    return StoreInfo(number_field(found, 1) == 1, text_field(found, 2), application)
-
-
-def unpack_payload(
-    message: dict[int, Value], decompress: Callable[[memoryview, int], pa.Buffer]
-) -> pa.Buffer:
-    """Return the rows of a chunk's message as an Arrow IPC stream.
-
-    `decompress` is given the bytes of an LZ4 block and the size that the message claims.
-    """
-    packed, compression = bytes_field(message, 5), number_field(message, 2)
-    if compression in _PLAIN:
-        return pa.py_buffer(bytes(packed))
-    if compression != _LZ4:
-        raise ValueError(f"unknown compression {compression}")
-    return decompress(packed, number_field(message, 3))
-
-
-def decompress_whole(packed: memoryview, size: int) -> pa.Buffer:
-    """Decompress an LZ4 block."""
-    if size > min(MAX_MESSAGE, _LZ4_RATIO * len(packed)):
-        raise ValueError(f"{len(packed)} bytes cannot unpack to {size}, or must not")
-    return pa.decompress(packed, size, codec="lz4_raw")
-
-
 _HEAD_BYTES = 4096
 """How much of a long message is read. What precedes the rows takes 1 to 2.5 kB in a session."""
 _READ_WHOLE = 4 * _HEAD_BYTES
@@ -109,12 +33,71 @@ _SHORTEST_MATCH = 4
 _IPC_PREFIX = struct.Struct("<II")
 
 
+class StoreInfo(NamedTuple):
+    """The store, in Rerun's terms, of a message: a recording or a blueprint, and what program wrote it."""
+
+    is_recording: bool
+    recording_id: str
+    application_id: str
+
+
+class EntityChunk(NamedTuple):
+    """Rows of one entity; `timelines` are columns that say when a row applies: none if it always does."""
+
+    entity: str
+    timelines: tuple[str, ...]
+    batch: pa.RecordBatch
+
+
 class ChunkHead(NamedTuple):
     """What a chunk's message begins with: whose rows it holds and how many."""
 
     store: StoreInfo
     entity: str
     rows: int
+
+
+def decode_store_info(payload: memoryview) -> StoreInfo:
+    """Return the store that a message announces."""
+    return _decode_store(read_fields(bytes_field(read_fields(payload), 2)), 2)
+
+
+def decode_chunk(payload: memoryview) -> tuple[StoreInfo, EntityChunk]:
+    """Decode a message that contains rows."""
+    message = read_fields(payload)
+    if number_field(message, 4) != _ARROW_IPC:
+        raise ValueError("expected rows in Arrow's format")
+    batch = read_record_batch(_unpack_payload(message))
+    metadata = batch.schema.metadata or {}
+    if _ENTITY_PATH not in metadata:
+        raise ValueError("the rows name no entity")
+    timelines = tuple(field.name for field in batch.schema if (field.metadata or {}).get(_KIND) == _INDEX)
+    return _decode_store(message), EntityChunk(metadata[_ENTITY_PATH].decode(), timelines, batch)
+
+
+def _decode_store(message: dict[int, Value], field: int = 1) -> StoreInfo:
+    return _decode_store_bytes(bytes(bytes_field(message, field)))
+
+
+@lru_cache(maxsize=32)
+def _decode_store_bytes(store: bytes) -> StoreInfo:
+    found = read_fields(memoryview(store))
+    application = text_field(read_fields(bytes_field(found, 3)), 1)
+    return StoreInfo(number_field(found, 1) == 1, text_field(found, 2), application)
+
+
+def _unpack_payload(message: dict[int, Value], *, whole: bool = True) -> pa.Buffer:
+    """Return the rows of a chunk's message, or only what precedes them, as an Arrow IPC stream."""
+    packed, compression, size = bytes_field(message, 5), number_field(message, 2), number_field(message, 3)
+    if compression in _PLAIN:
+        return pa.py_buffer(bytes(packed))
+    if compression != _LZ4:
+        raise ValueError(f"unknown compression {compression}")
+    if not whole:
+        return decompress_start(packed)
+    if size > min(MAX_MESSAGE, _LZ4_RATIO * len(packed)):
+        raise ValueError(f"{len(packed)} bytes cannot unpack to {size}, or must not")
+    return pa.decompress(packed, size, codec="lz4_raw")
 
 
 def read_chunk_head(file: BinaryIO, frame: MessageFrame, own: StoreInfo | None) -> ChunkHead | None:
@@ -126,14 +109,14 @@ def read_chunk_head(file: BinaryIO, frame: MessageFrame, own: StoreInfo | None) 
     try:
         file.seek(frame.start)
         message = read_fields(memoryview(file.read(frame.length if whole else _HEAD_BYTES)), cut=not whole)
-        store = decode_store(message)
+        store = _decode_store(message)
         if store != own:
             return ChunkHead(store, "", 0)
-        data = unpack_payload(message, decompress_whole if whole else decompress_start)
+        data = _unpack_payload(message, whole=whole)
         schema = pa.ipc.MessageReader.open_stream(data).read_next_message()
         if schema.type != "schema":
             return None
-        entity = (pa.ipc.read_schema(schema).metadata or {})[ENTITY_PATH].decode()
+        entity = (pa.ipc.read_schema(schema).metadata or {})[_ENTITY_PATH].decode()
         begin, end = (_metadata_end(data, messages) for messages in (1, 2))
         if end > len(data):
             return None
@@ -142,7 +125,7 @@ def read_chunk_head(file: BinaryIO, frame: MessageFrame, own: StoreInfo | None) 
         return None
 
 
-def decompress_start(packed: memoryview, _size: int) -> pa.Buffer:
+def decompress_start(packed: memoryview) -> pa.Buffer:
     """Decompress the start of an LZ4 block up to the rows, which Arrow does only for whole blocks."""
     out = bytearray()
     place = 0

@@ -66,8 +66,7 @@ class RrdContents:
             if not torn or stream.store is None:
                 raise
         self.recording_id = stream.require_store().recording_id
-        self.complete, self.finished = stream.complete, stream.finished
-        self.skipped_rows = stream.skipped_rows
+        self.finished, self.skipped_rows = stream.finished, stream.skipped_rows
 
     def properties(self, name: str) -> dict[str, list[Any]]:
         """Return the values of a group of properties by name; empty if the file does not have the group."""

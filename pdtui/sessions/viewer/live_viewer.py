@@ -5,17 +5,14 @@ from __future__ import annotations
 import atexit
 import queue
 import threading
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, cast
+from collections.abc import Callable
 
 import rerun as rr
 
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_schema import APP
-from pdtui.sessions.viewer.session_blueprint import BEGUN, DriveContent, session_blueprint
+from pdtui.sessions.viewer.session_blueprint import session_blueprint
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
-from pdtui.sessions.writer.arrow_columns import ComponentColumn, time_columns
-from pdtui.sessions.writer.rerun_recording import send_property
 
 _CLOSE_SECONDS = 2.0
 """How long the end of a drive waits for the viewer, s."""
@@ -33,56 +30,37 @@ class LiveViewer:
     """
 
     def __init__(self, address: ViewerAddress, info: DriveInfo, recording_id: str) -> None:
-        self._info = info
         self._recording = rr.RecordingStream(APP, recording_id=recording_id)
-        self._work: queue.Queue[Callable[[], None] | None] = queue.Queue(_WAITING)
+        self._work: queue.Queue[Callable[[rr.RecordingStream], object] | None] = queue.Queue(_WAITING)
         self._lost = False
         self._thread = threading.Thread(target=self._send_all, name="live view", daemon=True)
         url = f"rerun+http://{address}/proxy"
-        self._put(lambda: self._recording.set_sinks(rr.GrpcSink(url)))
+        self.send(lambda recording: recording.set_sinks(rr.GrpcSink(url)))
         # At once, because the viewer may still show the previous drive, laid out for another robot.
-        self.lay_out(BEGUN)
+        self.send(lambda recording: recording.send_blueprint(session_blueprint(info), make_active=True))
         self._thread.start()
 
-    def send(self, entity: str, steps: Sequence[int], columns: list[ComponentColumn]) -> None:
-        """Send a batch of rows."""
-        times, ready = time_columns(steps, self._info.dt), cast("list[rr.ComponentColumn]", columns)
-        self._put(lambda: rr.send_columns(entity, times, ready, recording=self._recording))
-
-    def log_static(self, entity: str, archetype: Any) -> None:
-        """Send data that apply at all times."""
-        self._put(lambda: rr.log(entity, archetype, static=True, recording=self._recording))
-
-    def send_property(self, name: str, values: Mapping[str, Any]) -> None:
-        """Send a group of properties."""
-        self._put(lambda: send_property(self._recording, name, values))
-
-    def lay_out(self, content: DriveContent) -> None:
-        """Lay the drive out again."""
-        self._put(
-            lambda: self._recording.send_blueprint(session_blueprint(self._info, content), make_active=True)
-        )
+    def send(self, write: Callable[[rr.RecordingStream], object] | None) -> None:
+        """Send what a function writes to a recording; None ends the transmission."""
+        if self._lost:
+            return
+        try:
+            self._work.put_nowait(write)
+        except queue.Full:
+            self._lost = True
 
     def close(self) -> None:
         """Send what is waiting, if the viewer still accepts it, and disconnect."""
-        self._put(None)
+        self.send(None)
         self._thread.join(_CLOSE_SECONDS)
         if self._thread.is_alive():
             # The viewer stopped with its connection open, and the library would wait for it at exit.
             atexit.unregister(rr.rerun_shutdown)
 
-    def _put(self, task: Callable[[], None] | None) -> None:
-        if self._lost:
-            return
-        try:
-            self._work.put_nowait(task)
-        except queue.Full:
-            self._lost = True
-
     def _send_all(self) -> None:
         try:
-            while (task := self._work.get()) is not None:
-                task()
+            while (write := self._work.get()) is not None:
+                write(self._recording)
             self._recording.disconnect()
         except (OSError, RuntimeError):
             self._lost = True

@@ -11,24 +11,8 @@ import rerun.blueprint as rrb
 from rerun.blueprint.encodings import ComponentSourceKind, TextLogColumnKind, VisualizerComponentMapping
 
 from pdtui.core.attributes import Attribute
+from pdtui.sessions import session_schema as schema
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.session_schema import (
-    BEHAVIORS,
-    DRIVE,
-    ENDINGS,
-    EVENTS,
-    HEAT_MAP,
-    MAGNITUDES,
-    OBSTACLES,
-    OBSTACLES_ABOVE,
-    PATH,
-    REWARD_COST_ACTION,
-    ROBOT,
-    STEP,
-    TARGETS,
-    TIME,
-    UNITS,
-)
 from pdtui.sessions.viewer.behavior_legend import BehaviorLegend
 
 _CURVES = (
@@ -80,16 +64,16 @@ def session_blueprint(info: DriveInfo, content: DriveContent = BEGUN) -> rrb.Blu
     present = [(share, column) for share, column in columns if column is not None]
     return rrb.Blueprint(
         rrb.Horizontal(*(column for _, column in present), column_shares=[share for share, _ in present]),
-        rrb.TimePanel(timeline=TIME, state="collapsed"),
+        rrb.TimePanel(timeline=schema.TIME, state="collapsed"),
         collapse_panels=True,
     )
 
 
 def _lay_out_robot(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
     keys = rrb.TextLogView(
-        contents=[EVENTS, ENDINGS],
+        contents=[schema.EVENTS, schema.ENDINGS],
         name="Keys and events",
-        columns=rrb.TextLogColumns(timeline_columns=[STEP], text_log_columns=[TextLogColumnKind.Body]),
+        columns=rrb.TextLogColumns(timeline_columns=[schema.STEP], text_log_columns=[TextLogColumnKind.Body]),
     )
     if not info.links:
         return rrb.Vertical(keys)
@@ -97,25 +81,25 @@ def _lay_out_robot(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
         rrb.VisibleTimeRange(
             timeline, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative()
         )
-        for timeline in (TIME, STEP)
+        for timeline in (schema.TIME, schema.STEP)
     ]
     robot = rrb.Spatial3DView(
-        contents=[ROBOT, PATH, OBSTACLES],
+        contents=[schema.ROBOT, schema.PATH, schema.OBSTACLES],
         name=f"Robot {info.robot}, policy {info.policy}; its path in the colors of the behaviors",
         # Only the path is shown over time; robot and obstacles are shown at the current time.
         overrides={
-            PATH: [rr.LineStrips3D.from_fields(radii=0.02).visualizer(), rrb.VisibleTimeRanges(trails)]
+            schema.PATH: [rr.LineStrips3D.from_fields(radii=0.02).visualizer(), rrb.VisibleTimeRanges(trails)]
         },
         eye_controls=rrb.EyeControls3D(
-            position=(2.5, -2.5, 1.7), look_target=(0.0, 0.0, 0.5), tracking_entity=ROBOT
+            position=(2.5, -2.5, 1.7), look_target=(0.0, 0.0, 0.5), tracking_entity=schema.ROBOT
         ),
         line_grid=True,
     )
     above = rrb.Spatial2DView(
-        contents=[OBSTACLES_ABOVE, PATH],
+        contents=[schema.OBSTACLES_ABOVE, schema.PATH],
         name="Path from above",
         overrides={
-            PATH: [
+            schema.PATH: [
                 rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(1.5)).visualizer(),
                 rrb.VisibleTimeRanges(trails),
             ]
@@ -139,17 +123,17 @@ def _bounds(content: DriveContent) -> rrb.VisualBounds2D | None:
 def _lay_out_stimulation(content: DriveContent) -> rrb.Vertical | None:
     rows: list[tuple[int, rrb.View]] = []
     if content.begun or content.magnitudes:
-        rows.append((2, rrb.StateTimelineView(origin=BEHAVIORS, name="Behaviors", time_view=_time())))
+        rows.append((2, rrb.StateTimelineView(origin=schema.BEHAVIORS, name="Behaviors", time_view=_time())))
     if content.begun or content.units:
         which = "Four units per behavior" if content.units_left_out else "Stimulated units"
         name = f"{which}: overwritten (bright), natural (dark)"
-        rows.append((5, _plot(name, f"{UNITS}/**", named=0 < content.units <= _MOST_NAMED // 2)))
+        rows.append((5, _plot(name, f"{schema.UNITS}/**", named=0 < content.units <= _MOST_NAMED // 2)))
     if content.begun or content.magnitudes:
         name = "Magnitudes: c of a controller, otherwise the factor on the map's magnitudes"
-        rows.append((3, _plot(name, f"{MAGNITUDES}/**", named=content.magnitudes <= _MOST_NAMED)))
+        rows.append((3, _plot(name, f"{schema.MAGNITUDES}/**", named=content.magnitudes <= _MOST_NAMED)))
     if content.heat_map:
         heat = rrb.TensorView(
-            origin=HEAT_MAP,
+            origin=schema.HEAT_MAP,
             name="All activations over the session: negative blue, zero gray, positive yellow",
             scalar_mapping=rrb.TensorScalarMapping(colormap="CyanToYellow"),
             view_fit="fill",
@@ -168,7 +152,7 @@ def _lay_out_measurements(info: DriveInfo, content: DriveContent) -> rrb.Vertica
         columns = [column for column, one in enumerate(info.attributes) if one.unit == unit]
         shown = [info.attributes[column] for column in columns]
         targets = [
-            f"{TARGETS}/{rr.escape_entity_path_part(name)}"
+            f"{schema.TARGETS}/{rr.escape_entity_path_part(name)}"
             for name, attribute in target_attributes.items()
             if (content.targets is None or name in content.targets)
             and attribute in [one.name for one in shown]
@@ -178,12 +162,12 @@ def _lay_out_measurements(info: DriveInfo, content: DriveContent) -> rrb.Vertica
             for one, color, column in zip(shown, cycle(_CURVES), columns, strict=False)
         ]
         named = 1 < len(curves) + len(targets) <= _MOST_NAMED - 2
-        plots.append(_plot(_title(shown), DRIVE, *targets, curves=curves, named=named))
+        plots.append(_plot(_title(shown), schema.DRIVE, *targets, curves=curves, named=named))
     gains = [
-        _curve(name, REWARD_COST_ACTION, color, column)
+        _curve(name, schema.REWARD_COST_ACTION, color, column)
         for column, (name, color) in enumerate(zip(("reward", "cost"), _CURVES, strict=False))
     ]
-    plots.append(_plot("Reward and cost of a control step", DRIVE, curves=gains, named=True))
+    plots.append(_plot("Reward and cost of a control step", schema.DRIVE, curves=gains, named=True))
     return rrb.Vertical(*plots)
 
 
@@ -203,7 +187,7 @@ def _plot(
     return rrb.TimeSeriesView(
         contents=list(contents),
         name=name,
-        overrides={DRIVE: list(curves)} if curves else None,
+        overrides={schema.DRIVE: list(curves)} if curves else None,
         axis_x=_time(),
         plot_legend=rrb.PlotLegend(corner="LeftTop", visible=named),
     )

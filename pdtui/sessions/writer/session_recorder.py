@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, cast
@@ -75,6 +75,7 @@ class SessionRecorder:
         viewer: ViewerAddress | None = None,
     ) -> None:
         self.path, self.info = Path(path), info
+        self._errors_named = partial(name_file_in_errors, self.path)
         self._rows_per_write = max(1, rows_per_write)
         self._rows: list[StepRecord] = []
         self._viewer_rows = max(view_rows if viewer is None else _LIVE_ROWS, 2 * self._rows_per_write)
@@ -156,13 +157,10 @@ class SessionRecorder:
 
     def _send_blueprint(self) -> None:
         """Replace the blueprint by one for what was recorded."""
-        content = self._viewer_data.content()
-        with self._errors_named():
-            # Active: otherwise a viewer that shows another session would reuse the layout of that one.
-            self._recording.send_blueprint(session_blueprint(self.info, content), make_active=True)
+        blueprint = session_blueprint(self.info, self._viewer_data.content())
+        # Active: otherwise a viewer that shows another session would reuse the layout of that one.
+        self._write(lambda recording: recording.send_blueprint(blueprint, make_active=True))
         self._flush_rows()
-        if self._live is not None:
-            self._live.lay_out(content)
 
     def __enter__(self) -> Self:
         return self
@@ -215,23 +213,29 @@ class SessionRecorder:
 
     def _send(self, entity: str, steps: Sequence[int], columns: list[ComponentColumn]) -> None:
         self._chunks += 1
-        with self._errors_named():
-            times, ready = time_columns(steps, self.info.dt), cast("list[rr.ComponentColumn]", columns)
-            rr.send_columns(entity, times, ready, recording=self._recording, strict=True)
-        if self._live is not None:
-            self._live.send(entity, steps, columns)
+        times, ready = time_columns(steps, self.info.dt), cast("list[rr.ComponentColumn]", columns)
+        self._write(
+            lambda recording: rr.send_columns(
+                entity, times, ready, recording=recording, strict=recording is self._recording
+            )
+        )
 
     def _log_static(self, entity: str, archetype: Any) -> None:
-        with self._errors_named():
-            rr.log(entity, archetype, static=True, recording=self._recording, strict=True)
-        if self._live is not None:
-            self._live.log_static(entity, archetype)
+        self._write(
+            lambda recording: rr.log(
+                entity, archetype, static=True, recording=recording, strict=recording is self._recording
+            )
+        )
 
     def _property(self, name: str, values: dict[str, Any]) -> None:
+        self._write(lambda recording: send_property(recording, name, values))
+
+    def _write(self, write: Callable[[rr.RecordingStream], object]) -> None:
+        """Write to the recording, and to that of a viewer, whose errors are not the session's."""
         with self._errors_named():
-            send_property(self._recording, name, values)
+            write(self._recording)
         if self._live is not None:
-            self._live.send_property(name, values)
+            self._live.send(write)
 
     def _flush_rows(self, *, wait: bool = True) -> None:
         """Hand everything to the operating system, so that it outlives this process."""
@@ -244,6 +248,3 @@ class SessionRecorder:
         except SessionError:
             self._failed = True
             raise
-
-    def _errors_named(self) -> AbstractContextManager[None]:
-        return name_file_in_errors(self.path)
