@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import copy
+from copy import deepcopy
+from dataclasses import dataclass, replace
 
 from pdtui.core.attributes import Attribute, Floats, column_of
 from pdtui.core.errors import KeystrokeError
@@ -12,20 +13,19 @@ from pdtui.stimulation.pid_magnitude import PidMagnitude
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 
-class _Latched:
-    def __init__(
-        self, behavior: Behavior, weights: dict[int, float], base: dict[int, float], steps: int | None
-    ) -> None:
-        self.behavior, self.weights, self.base, self.remaining = behavior, weights, base, steps
-        self.factor = 1.0
-        self.controller: PidMagnitude | None = None
-        self.column = 0
+@dataclass
+class _LatchedBehavior:
+    behavior: Behavior
+    weights: dict[int, float]
+    base: dict[int, float]
+    column: int  # of the attribute that the controller holds
+    remaining: int | None  # control steps
+    factor: float = 1.0
+    controller: PidMagnitude | None = None
 
-    def copy(self) -> _Latched:
+    def copy(self) -> _LatchedBehavior:
         """Copy what changes; behavior and weights never do."""
-        other = copy.copy(self)
-        other.controller = copy.deepcopy(self.controller)
-        return other
+        return replace(self, controller=deepcopy(self.controller))
 
 
 class Latch:
@@ -50,40 +50,32 @@ class Latch:
         dt: float,
     ) -> None:
         self._map, self._attributes, self._dt = stimulation_map, attributes, dt
-        self._weights = {
-            name: {parse_unit(unit, layers): v for unit, v in stimulation_map.units_of(behavior).items()}
-            for name, behavior in stimulation_map.behaviors.items()
-        }
-        self._bases = {
-            name: {parse_unit(unit, layers): v for unit, v in behavior.base.items()}
-            for name, behavior in stimulation_map.behaviors.items()
-        }
-        self._columns = {
-            name: column_of(
-                behavior.pid.attribute, attributes, f"{stimulation_map.source}: behavior '{name}'"
+        self._behaviors: dict[str, _LatchedBehavior] = {}
+        for name, behavior in stimulation_map.behaviors.items():
+            weights, base = (
+                {parse_unit(unit, layers): value for unit, value in outputs.items()}
+                for outputs in (stimulation_map.units_of(behavior), behavior.base)
             )
-            for name, behavior in stimulation_map.behaviors.items()
-            if behavior.pid is not None
-        }
-        self._latched: list[_Latched] = []
+            owner = f"{stimulation_map.source}: behavior '{name}'"
+            column = 0 if behavior.pid is None else column_of(behavior.pid.attribute, attributes, owner)
+            steps = None if behavior.period is None else max(1, round(behavior.period / dt))
+            self._behaviors[name] = _LatchedBehavior(behavior, weights, base, column, steps)
+        self._latched: list[_LatchedBehavior] = []
         self.commands: dict[str, float] = {}
         """The policy's commands that behaviors set in this control step; updated by `stimulate`."""
 
     @property
     def active(self) -> tuple[ActiveBehavior, ...]:
         """The latched behaviors, in the order in which they were latched."""
-        views = []
-        for latched in self._latched:
-            pid = latched.controller
-            views.append(
-                ActiveBehavior(
-                    latched.behavior.name,
-                    latched.remaining,
-                    latched.factor,
-                    *((pid.target, pid.value, pid.error, pid.magnitude) if pid else ()),
-                )
+        return tuple(
+            ActiveBehavior(
+                one.behavior.name,
+                one.remaining,
+                one.factor,
+                *((pid.target, pid.value, pid.error, pid.magnitude) if (pid := one.controller) else ()),
             )
-        return tuple(views)
+            for one in self._latched
+        )
 
     def latch_behavior(self, name: str, attributes: Floats) -> None:
         """Latch a behavior and end those that may not run beside it. A latched behavior starts again.
@@ -93,7 +85,10 @@ class Latch:
         Raises:
             KeystrokeError: the map has no such behavior.
         """
-        behavior = self._behavior(name)
+        if name not in self._behaviors:
+            known = ", ".join(self._behaviors)
+            raise KeystrokeError(f"{self._map.source}: no behavior '{name}'; there are {known}")
+        behavior = self._behaviors[name].behavior
         was_on = any(latched.behavior.name == name for latched in self._latched)
         self._latched = [
             latched
@@ -103,10 +98,8 @@ class Latch:
         ]
         if was_on and behavior.pid is not None:
             return
-        steps = None if behavior.period is None else max(1, round(behavior.period / self._dt))
-        latched = _Latched(behavior, self._weights[name], self._bases[name], steps)
+        latched = self._behaviors[name].copy()
         if behavior.pid is not None:
-            latched.column = self._columns[name]
             wraps = self._attributes[latched.column].wraps
             latched.controller = PidMagnitude(behavior.pid, wraps, self._dt)
             latched.controller.start(float(attributes[latched.column]))
@@ -151,8 +144,7 @@ class Latch:
             factor = latched.factor
             if latched.controller is not None:
                 factor *= latched.controller.update(float(attributes[latched.column]))
-            asked = latched.behavior.commands.items()
-            self.commands |= {name: weight * factor for name, weight in asked}
+            self.commands |= {name: weight * factor for name, weight in latched.behavior.commands.items()}
             values |= latched.base
             for unit, weight in latched.weights.items():
                 values[unit] = latched.base.get(unit, 0.0) + weight * factor
@@ -165,21 +157,15 @@ class Latch:
                 latched.remaining -= 1
         self._latched = [latched for latched in self._latched if latched.remaining != 0]
 
-    def copy_state(self) -> list[_Latched]:
+    def copy_state(self) -> list[_LatchedBehavior]:
         """Return a copy of the state for `restore_state`."""
         return [latched.copy() for latched in self._latched]
 
-    def restore_state(self, state: list[_Latched]) -> None:
+    def restore_state(self, state: list[_LatchedBehavior]) -> None:
         """Restore a state that `copy_state` returned."""
         self._latched = [latched.copy() for latched in state]
 
-    def _behavior(self, name: str) -> Behavior:
-        if name not in self._map.behaviors:
-            known = ", ".join(self._map.behaviors)
-            raise KeystrokeError(f"{self._map.source}: no behavior '{name}'; there are {known}")
-        return self._map.behaviors[name]
-
-    def _find(self, name: str) -> _Latched:
+    def _find(self, name: str) -> _LatchedBehavior:
         for latched in self._latched:
             if latched.behavior.name == name:
                 return latched

@@ -13,7 +13,7 @@ from pdtui.core.key_table import RESERVED_KEYS
 from pdtui.core.units import ADDRESS
 from pdtui.core.untrusted_file import read_bounded_file
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions
-from pdtui.stimulation.map_table_reader import NUMBER, MapTableReader
+from pdtui.stimulation.map_table_reader import MapTableReader
 from pdtui.stimulation.stimulation_map import (
     SCHEMA,
     Behavior,
@@ -118,18 +118,11 @@ def _primitive(table: MapTableReader) -> MotorPrimitive:
     unit = table.text("unit")
     if not ADDRESS.fullmatch(unit):
         raise table.error("unit", f"expected layer:index, such as 0:12, found '{unit}'")
-    discrepancy, value = table.take("discrepancy", NUMBER, None), table.take("value", NUMBER, None)
-    primitive = MotorPrimitive(
-        name=table.text("name"),
-        attribute=table.text("attribute"),
-        unit=unit,
-        rho=float(table.take("rho", NUMBER)),
-        discrepancy=None if discrepancy is None else float(discrepancy),
-        value=None if value is None else float(value),
-        measured=_measured(table),
-    )
-    if not -1.0 <= primitive.rho <= 1.0:
-        raise table.error("rho", f"expected a number from −1 to 1, found {primitive.rho}")
+    name, attribute, rho = table.text("name"), table.text("attribute"), table.number("rho")
+    discrepancy, value = table.number("discrepancy", None), table.number("value", None)
+    if not -1.0 <= rho <= 1.0:
+        raise table.error("rho", f"expected a number from −1 to 1, found {rho}")
+    primitive = MotorPrimitive(name, attribute, unit, rho, discrepancy, value, _measured(table))
     table.done()
     return primitive
 
@@ -138,7 +131,7 @@ def _measured(parent: MapTableReader) -> MeasuredEffect | None:
     table = parent.table("measured", None)
     if table is None:
         return None
-    effect, low, high = (float(table.take(name, NUMBER)) for name in ("effect", "low", "high"))
+    effect, low, high = map(table.number, ("effect", "low", "high"))
     measured = MeasuredEffect(effect, low, high, table.take("falls", int, None), table.take("of", int, None))
     table.done()
     return measured
@@ -156,7 +149,7 @@ def _behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive]) -> B
     commands = table.numbers("commands", {})
     if not magnitudes and not commands:
         raise table.error("magnitudes", "expected at least one unit")
-    period = table.take("period", NUMBER, None)
+    period = table.number("period", None)
     if period is not None and period <= 0:
         raise table.error("period", f"expected more than 0 s, found {period}")
     together = table.take("together", list, [])
@@ -178,7 +171,7 @@ def _behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive]) -> B
         if not ADDRESS.fullmatch(key):
             raise table.error("base", f"'{key}': expected layer:index, such as 0:12")
     if pid_table is not None:
-        gains = {name: float(pid_table.take(name, NUMBER)) for name in ("kp", "ki", "kd", "limit", "step")}
+        gains = {name: pid_table.number(name) for name in ("kp", "ki", "kd", "limit", "step")}
         pid = PidGains(attribute=pid_table.text("attribute"), **gains)
         if pid.limit <= 0:
             raise pid_table.error("limit", f"expected more than 0, found {pid.limit}")
@@ -189,7 +182,7 @@ def _behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive]) -> B
         says=table.text("says", ""),
         magnitudes=magnitudes,
         base=base,
-        period=None if period is None else float(period),
+        period=period,
         together=tuple(together),
         mode=mode,
         aim=aim,

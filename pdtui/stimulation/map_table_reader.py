@@ -51,6 +51,11 @@ class MapTableReader:
             raise self.error(name, f"expected at most {MAX_ENTRIES} entries, found {len(value)}")
         return value
 
+    def number(self, name: str, default: Any = ...) -> Any:
+        """Take a field that is a finite number, as a float."""
+        value = self.take(name, NUMBER, default)
+        return value if value is default else float(value)
+
     def text(self, name: str, default: Any = ...) -> str:
         """Take a field of printable text."""
         value: str = self.take(name, str, default)

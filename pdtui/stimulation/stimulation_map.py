@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pdtui.core.attributes import BehaviorAim
-from pdtui.core.errors import MapError
+from pdtui.core.errors import MapError, PolicyError
 from pdtui.core.units import parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 
@@ -142,11 +142,8 @@ class StimulationMap:
         """Return a behavior's outputs v by unit address; ``v = c ρ`` for a primitive (section 3.3)."""
         outputs: dict[str, float] = {}
         for name, magnitude in behavior.magnitudes.items():
-            if name in self.primitives:
-                primitive = self.primitives[name]
-                outputs[primitive.unit] = magnitude * primitive.rho
-            else:
-                outputs[name] = magnitude
+            primitive = self.primitives.get(name)
+            outputs[primitive.unit if primitive else name] = magnitude * (primitive.rho if primitive else 1.0)
         return outputs
 
     def behavior_of_key(self, key: str) -> Behavior | None:
@@ -160,8 +157,6 @@ class StimulationMap:
             MapError: The map is for another robot, for another policy and not forced, or names a unit that
                 does not exist. A map without behaviors need not name the policy's hash.
         """
-        from pdtui.core.errors import PolicyError
-
         if self.robot != robot:
             raise MapError(f"{self.source}: made for robot '{self.robot}', not for '{robot}'")
         said = self.policy_hash or self.behaviors
