@@ -15,14 +15,13 @@ _Floats = NDArray[np.float32]
 Decoder = Callable[[torch.Tensor, np.random.Generator | None], _Floats]
 
 
-def mean_action(output: torch.Tensor, rng: np.random.Generator | None) -> NDArray[np.float32]:
+def mean_action(output: torch.Tensor, _rng: np.random.Generator | None) -> _Floats:
     """Take the network's output as the action."""
-    del rng
-    action: NDArray[np.float32] = output.reshape(-1).numpy().astype(np.float32)
+    action: _Floats = output.reshape(-1).numpy().astype(np.float32)
     return action
 
 
-def categorical(output: torch.Tensor, rng: np.random.Generator | None) -> NDArray[np.float32]:
+def categorical(output: torch.Tensor, rng: np.random.Generator | None) -> _Floats:
     """Take the network's output as logits of discrete actions; the action is an index, shape (1,).
 
     Without a generator, the most likely action is taken, the first among equals; with one, it is drawn from

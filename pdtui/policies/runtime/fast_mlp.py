@@ -16,19 +16,9 @@ from numpy.typing import NDArray
 from torch import nn
 
 from pdtui.core.units import Stimulation
+from pdtui.policies.weights.policy_network import ACTIVATIONS
 
-ACTIVATION_TYPES: tuple[type[nn.Module], ...] = (
-    nn.Tanh,
-    nn.ReLU,
-    nn.ELU,
-    nn.GELU,
-    nn.SiLU,
-    nn.LeakyReLU,
-    nn.SELU,
-    nn.Sigmoid,
-    nn.Softplus,
-)
-
+ACTIVATION_TYPES = tuple(ACTIVATIONS.values())
 _TRIALS = 8
 """Observations on which the fast pass is compared with the module."""
 

@@ -21,6 +21,24 @@ from pdtui.policies.runtime.recurrent_state import PolicyState
 from pdtui.policies.runtime.unit_layers import UnitHooks, hidden_modules, name_layers
 
 
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let PyTorch compute with one thread inside the block, then with as many as before.
+
+    For networks of the size of a policy, more threads only cost time, and they change the order of sums, so
+    that runs would not repeat bit for bit.
+    """
+    threads = torch.get_num_threads()
+    if threads == 1:
+        yield
+        return
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
 class PolicyStep(NamedTuple):
     """Result of one control step of a policy.
 
@@ -82,7 +100,7 @@ class Policy:
         self._state = self._initial
         self._hooks = UnitHooks()
         plain = hidden is None and initial_state is None and not batched and len(self.shape) == 1
-        with one_thread():
+        with _one_thread():
             self._fast_mlp = fast_mlp_of(self.module, self.shape[0]) if plain else None
             if self._fast_mlp is not None:
                 self.layers = LayerWidths(self._fast_mlp.layers, [])
@@ -118,18 +136,12 @@ class Policy:
         Raises:
             PolicyError: The state is another network's.
         """
-        if self._initial is None and not state:
-            return
-        expected = [
-            tuple(tensor.shape)
-            for tensor in recurrent_state.flatten_state(() if self._initial is None else self._initial)
-        ]
-        found = [array.shape for array in state]
+        expected, found = recurrent_state.state_shapes(self._initial), [array.shape for array in state]
         if expected != found:
             raise PolicyError(f"{self.name}: expected a recurrent state of shapes {expected}, got {found}")
-        self._state = recurrent_state.rebuild_state(
-            self._initial, (torch.from_numpy(array.copy()) for array in state)
-        )
+        if state:
+            tensors = (torch.from_numpy(array.copy()) for array in state)
+            self._state = recurrent_state.rebuild_state(self._initial, tensors)
 
     def _watch_units(self, hidden: Sequence[str] | None) -> list[list[str]]:
         chosen = hidden_modules(self.module, hidden, self.name)
@@ -188,7 +200,7 @@ class Policy:
             raise PolicyError(
                 f"{self.name}: expected an observation of shape {self.shape}, got {observation.shape}"
             )
-        with one_thread():
+        with _one_thread():
             if self._fast_mlp is not None:
                 output, activations, found = self._fast_mlp.run(observation, stimulation)
             else:
@@ -204,21 +216,3 @@ class Policy:
                 f"the policy has {describe_layers(self.layers)}"
             ) from None
         return PolicyStep(action, activations, natural)
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Let PyTorch compute with one thread inside the block, then with as many as before.
-
-    For networks of the size of a policy, more threads only cost time, and they change the order of sums, so
-    that runs would not repeat bit for bit.
-    """
-    threads = torch.get_num_threads()
-    if threads == 1:
-        yield
-        return
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)

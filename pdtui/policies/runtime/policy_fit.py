@@ -7,7 +7,6 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium import spaces
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.runtime.policy import Policy
@@ -26,20 +25,16 @@ def check_fit(policy: Policy, world: gymnasium.Env[Any, Any], name: str) -> None
     """
     observed = world.observation_space.shape or ()
     taken = policy.shape
-    needed = _action_shape(world.action_space)
-    given: tuple[int, ...] | None = None
+    needed = world.action_space.shape or (1,)  # one number for a Discrete space
+    gives = ""
     if taken == observed:
         state = policy.snapshot()
         given = policy.act(np.zeros(observed, np.float32)).action.shape
         policy.restore(state)
-    if taken != observed or (given is not None and math.prod(given) != math.prod(needed)):
-        gives = "" if given is None else f" and gives actions of shape {given}"
-        raise PolicyError(
-            f"policy '{policy.name}' takes observations of shape {taken}{gives}; robot '{name}' has "
-            f"observations of shape {observed} and actions of shape {needed}"
-        )
-
-
-def _action_shape(space: spaces.Space[Any]) -> tuple[int, ...]:
-    """Return the shape of the vector that a policy gives: one number for a Discrete space."""
-    return space.shape or (1,)
+        if math.prod(given) == math.prod(needed):
+            return
+        gives = f" and gives actions of shape {given}"
+    raise PolicyError(
+        f"policy '{policy.name}' takes observations of shape {taken}{gives}; robot '{name}' has "
+        f"observations of shape {observed} and actions of shape {needed}"
+    )

@@ -45,11 +45,13 @@ def state_to_arrays(state: Any) -> PolicyState:
     return tuple(np.array(tensor.detach().numpy()) for tensor in flatten_state(state))
 
 
+def state_shapes(state: Any) -> list[tuple[int, ...]]:
+    """Return the shapes of the tensors of a recurrent state; none for None."""
+    return [] if state is None else [tuple(tensor.shape) for tensor in flatten_state(state)]
+
+
 def check_state(template: Any, state: Any) -> None:
     """Check that a state can be fed to the network again; `template` is its initial state, None for none."""
-    if template is None:
-        return
-    expected = [tuple(tensor.shape) for tensor in flatten_state(template)]
-    found = [tuple(tensor.shape) for tensor in flatten_state(state)]
+    expected, found = state_shapes(template), state_shapes(state)
     if expected != found:
         raise PolicyError(f"recurrent state: expected shapes {expected}, the network gave {found}")

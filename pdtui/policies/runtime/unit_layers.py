@@ -1,4 +1,4 @@
-"""The hidden layers of a network: the submodules whose outputs are units, and their names."""
+"""The hidden layers of a network: their names, and hooks that read and overwrite what they put out."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from pdtui.core.errors import PolicyError
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.fast_mlp import ACTIVATION_TYPES
 
-RECURRENT_TYPES: tuple[type[nn.Module], ...] = (nn.RNNBase, nn.RNNCellBase)
-
 
 def hidden_modules(module: nn.Module, hidden: Sequence[str] | None, owner: str) -> dict[nn.Module, str]:
     """Return the submodules whose outputs are units, with their names.
@@ -25,24 +23,23 @@ def hidden_modules(module: nn.Module, hidden: Sequence[str] | None, owner: str) 
     modules = dict(module.named_modules())
     if hidden is None:
         return {one: name for name, one in modules.items() if _puts_out_units(one)}
-    missing = [name for name in hidden if name not in modules]
-    if missing:
-        known = ", ".join(name for name in modules if name)
-        raise PolicyError(f"{owner}: no submodule '{missing[0]}'; there are {known}")
+    for name in hidden:
+        if name not in modules:
+            known = ", ".join(filter(None, modules))
+            raise PolicyError(f"{owner}: no submodule '{name}'; there are {known}")
     return {modules[name]: name for name in hidden}
 
 
 def _puts_out_units(module: nn.Module) -> bool:
-    return isinstance(module, (*ACTIVATION_TYPES, *RECURRENT_TYPES)) or getattr(
-        module, "is_activation", False
-    )
+    known = isinstance(module, (*ACTIVATION_TYPES, nn.RNNBase, nn.RNNCellBase))
+    return known or getattr(module, "is_activation", False)
 
 
 def _has_weights(module: nn.Module) -> bool:
     return next(module.parameters(recurse=False), None) is not None
 
 
-def output_tensor(output: Any) -> torch.Tensor:
+def _output_tensor(output: Any) -> torch.Tensor:
     """Return the tensor that the next layer reads: of a recurrent layer, the output h without its state."""
     first = output[0] if isinstance(output, tuple) and output else output
     if not isinstance(first, torch.Tensor):
@@ -123,7 +120,7 @@ class UnitHooks:
 
         A copy is overwritten, since other layers or the recurrent state may share the memory.
         """
-        own = output_tensor(output)
+        own = _output_tensor(output)
         low, high = self._offset, self._offset + own.numel()
         self._offset = high
         pending = [(unit - low, value) for unit, value in self._pending if low <= unit < high]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 from pdtui.core.errors import PolicyError
@@ -39,11 +39,8 @@ class ImportOptions:
 
     def or_else(self, others: ImportOptions) -> ImportOptions:
         """Return these options, completed by the others where these are empty."""
-        return ImportOptions(
-            self.activation or others.activation,
-            self.squash or others.squash,
-            self.normaliser or others.normaliser,
-        )
+        pairs = zip(astuple(self), astuple(others), strict=True)
+        return ImportOptions(*(own or other for own, other in pairs))
 
 
 NO_OPTIONS = ImportOptions()
@@ -106,18 +103,12 @@ class WorldSpaces:
         Raises:
             PolicyError: The policy does not fit; the message states both shapes.
         """
-        if (observations, actions, discrete_actions) == (
-            self.observations,
-            self.actions,
-            self.discrete_actions,
-        ):
-            return
-        raise PolicyError(
-            f"{source}: expected {_words(self.observations, self.actions, self.discrete_actions)}, as "
-            f"{self.owner} has; the policy has {_words(observations, actions, discrete_actions)}"
-        )
+        expected = _describe_spaces(self.observations, self.actions, self.discrete_actions)
+        found = _describe_spaces(observations, actions, discrete_actions)
+        if expected != found:
+            raise PolicyError(f"{source}: expected {expected}, as {self.owner} has; the policy has {found}")
 
 
-def _words(observations: int, actions: int, discrete_actions: int) -> str:
+def _describe_spaces(observations: int, actions: int, discrete_actions: int) -> str:
     acts = f"{discrete_actions} discrete actions" if discrete_actions else f"actions of shape ({actions},)"
     return f"observations of shape ({observations},) and {acts}"

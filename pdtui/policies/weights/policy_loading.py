@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers import import_network
-from pdtui.policies.runtime.action_decoders import categorical, decoder_for
+from pdtui.policies.runtime.action_decoders import categorical, decoder_for, mean_action
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.torchscript import is_torchscript, read_torchscript
 from pdtui.policies.weights.file_search import find_beside
@@ -78,12 +79,8 @@ def load_any_network(
     statistics = _find_statistics(path, import_options, folders)
     network = import_network(path, import_options, spaces, normaliser=statistics)
     if import_options != NO_OPTIONS:
-        parts = (
-            digest,
-            import_options.activation,
-            import_options.squash,
-            hash_file(statistics) if statistics else "",
-        )
+        statistics_digest = hash_file(statistics) if statistics else ""
+        parts = (digest, import_options.activation, import_options.squash, statistics_digest)
         digest = sha256("\n".join(parts).encode()).hexdigest()
     return network, digest
 
@@ -147,23 +144,17 @@ def load_torchscript_policy(
         raise PolicyError(f"{path}: TorchScript says no shapes; expected the robot that it is for")
     if import_options != NO_OPTIONS:
         raise PolicyError(f"{path}: TorchScript states its whole computation; expected no import options")
-    module, digest = read_torchscript(path), hash_file(path)
-    shape = spaces.shape or (spaces.observations,)
-    problems: list[str] = []
+    shape, outputs = spaces.shape or (spaces.observations,), spaces.discrete_actions or spaces.actions
+    decode = categorical if spaces.discrete_actions else mean_action
+    build = partial(Policy, read_torchscript(path), shape, name=path.stem, sha256=hash_file(path))
+    problem = ""
     for batched in (False, True):
         try:
-            policy = Policy(module, shape, batched=batched, name=path.stem, sha256=digest)
+            found = build(batched=batched).act(np.zeros(shape)).action.size
         except PolicyError as error:
-            problems.append(str(error))
+            problem = str(error)
             continue
-        found = policy.act(np.zeros(shape)).action.size
-        if found != (spaces.discrete_actions or spaces.actions):
-            problems.append(
-                f"{path}: expected {spaces.discrete_actions or spaces.actions} outputs for '{spaces.owner}', "
-                f"the network gives {found}"
-            )
-        elif spaces.discrete_actions:
-            return Policy(module, shape, batched=batched, decode=categorical, name=path.stem, sha256=digest)
-        else:
-            return policy
-    raise PolicyError(problems[-1])
+        if found == outputs:
+            return build(batched=batched, decode=decode)
+        problem = f"{path}: expected {outputs} outputs for '{spaces.owner}', the network gives {found}"
+    raise PolicyError(problem)
