@@ -11,7 +11,8 @@ Example::
 
 A failing test names the first step that differs, and how far each attribute is off. On the machine and with
 the versions that recorded the session, every bit must be the same. Elsewhere, the attributes have to agree
-for the first seconds (see `pdtui.driving.replay.TOLERANCE`), unless ``strict=True`` demands the same bits.
+in the first control steps (see `pdtui.driving.replay.TOLERANCE`), unless ``strict=True`` demands the same
+bits.
 """
 
 from __future__ import annotations

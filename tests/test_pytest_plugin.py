@@ -32,7 +32,7 @@ def suite(pytester: pytest.Pytester, map_path: Path, weights: Path) -> pytest.Py
     (pytester.path / "my_policy.safetensors").write_bytes(weights.read_bytes())
     document = inspect.getdoc(pytest_plugin)
     assert document is not None
-    example = document.partition("Example::\n\n")[2].partition("\n\nA test fails")[0]
+    example = document.partition("Example::\n\n")[2].partition("\n\nA failing test")[0]
     (pytester.path / "test_walk.py").write_text(textwrap.dedent(example))
     return pytester
 
