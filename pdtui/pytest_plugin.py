@@ -18,7 +18,7 @@ bits.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -32,8 +32,15 @@ if TYPE_CHECKING:
 _SHOWN = 8
 
 
-class SessionCheck(Protocol):
-    """Type of the fixture `pdtui_session`."""
+class SessionCheck:
+    """Type of the fixture `pdtui_session`.
+
+    Args:
+        folders: where the relative paths of sessions and weights are looked for.
+    """
+
+    def __init__(self, *folders: Path) -> None:
+        self._folders = folders
 
     def __call__(
         self,
@@ -43,7 +50,21 @@ class SessionCheck(Protocol):
         robot: Robot | None = None,
         strict: bool = False,
         **tolerance: float,
-    ) -> ReplayResult: ...
+    ) -> ReplayResult:
+        # Imported here, so that only tests that replay a drive load torch and a simulator.
+        from pdtui.api import replay
+        from pdtui.core.errors import PdtuiError
+
+        path = _find(session, self._folders)
+        if isinstance(policy, str | Path):
+            policy = _find(policy, self._folders)
+        try:
+            result = replay(path, robot=robot, policy=policy, strict=strict, force=True, **tolerance)
+        except PdtuiError as error:
+            pytest.fail(f"{path}: cannot be replayed: {error}", pytrace=False)
+        if not result.passed:
+            pytest.fail(_report(path, result), pytrace=False)
+        return result
 
 
 @pytest.fixture
@@ -60,32 +81,7 @@ def pdtui_session(request: pytest.FixtureRequest) -> SessionCheck:
 
     It returns the `ReplayResult` of a drive that repeats.
     """
-    folders = (request.path.parent, request.config.rootpath)
-
-    def check(
-        session: str | Path,
-        *,
-        policy: str | Path | nn.Module | Policy | None = None,
-        robot: Robot | None = None,
-        strict: bool = False,
-        **tolerance: float,
-    ) -> ReplayResult:
-        # Imported here, so that only tests that replay a drive load torch and a simulator.
-        from pdtui.api import replay
-        from pdtui.core.errors import PdtuiError
-
-        path = _find(session, folders)
-        if isinstance(policy, str | Path):
-            policy = _find(policy, folders)
-        try:
-            result = replay(path, robot=robot, policy=policy, strict=strict, force=True, **tolerance)
-        except PdtuiError as error:
-            pytest.fail(f"{path}: cannot be replayed: {error}", pytrace=False)
-        if not result.passed:
-            pytest.fail(_report(path, result), pytrace=False)
-        return result
-
-    return check
+    return SessionCheck(request.path.parent, request.config.rootpath)
 
 
 def _find(name: str | Path, folders: tuple[Path, ...]) -> Path:

@@ -11,8 +11,8 @@ from pdtui import __version__
 from pdtui.cli.command_group import LazyCommandGroup
 
 COMMANDS = {
-    "drive": ("pdtui.cli.drive_commands:drive", "Drive a robot with the keys of its map."),
-    "replay": ("pdtui.cli.drive_commands:replay", "Repeat a session and compare every step."),
+    "drive": ("pdtui.cli.drive_command:drive", "Drive a robot with the keys of its map."),
+    "replay": ("pdtui.cli.replay_command:replay", "Repeat a session and compare every step."),
     "guide": ("pdtui.cli.guide_command:guide", "Read the guide."),
     "sessions": ("pdtui.cli.sessions_command:sessions", "List, inspect, verify, repair and export sessions."),
     "evaluate": ("pdtui.cli.evaluate_command:evaluate", "Measure what the behaviors of a map do."),
@@ -36,6 +36,6 @@ def main(ctx: click.Context) -> None:
     Without a command, choose a robot and a map and drive.
     """
     if ctx.invoked_subcommand is None:
-        from pdtui.cli.drive_commands import pick_and_drive
+        from pdtui.cli.drive_command import pick_and_drive
 
         pick_and_drive()

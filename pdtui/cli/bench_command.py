@@ -7,8 +7,17 @@ from typing import Any
 
 import click
 
-from pdtui.cli.shared_options import drive_config, json_option, map_option, progress_bar_or_none, show_result
-from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept
+from pdtui.cli.shared_options import (
+    drive_config,
+    integer_option,
+    json_option,
+    map_option,
+    own_policy_option,
+    progress_bar,
+    record_activations_option,
+    show_result,
+)
+from pdtui.sessions.session_schema import ActivationsKept
 
 
 @click.group()
@@ -22,9 +31,7 @@ def bench() -> None:
 @bench.command("loop")
 @click.argument("robot")
 @map_option
-@click.option(
-    "--steps", type=click.IntRange(100), default=5000, show_default=True, help="Control steps per round."
-)
+@integer_option("--steps", least=100, default=5000, help="Number of control steps per round.")
 @json_option
 def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bool) -> None:
     """Measure control steps per second: bare, with policy, stimulated, recorded."""
@@ -32,31 +39,23 @@ def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bo
     from pdtui.benchmarks.loop_benchmark import bench_loop
 
     config = drive_config(robot, map_name, "")
-    with progress_bar_or_none("measuring", quiet=as_json) as advance:
+    with progress_bar("measuring", quiet=as_json) as advance:
         result = bench_loop(config, steps=steps, progress=advance)
     show_result(asdict(result), as_json, lambda: loop_table(result))
 
 
 @bench.command("dissect")
 @click.argument("robot", default="ant")
-@click.option("--policy", default="", metavar="FILE", help="Weights to record; default: the shipped policy.")
-@click.option(
-    "--episodes", type=click.IntRange(1, 100), default=5, show_default=True, help="Episodes to record."
+@own_policy_option
+@integer_option("--episodes", most=100, default=5, help="Number of episodes to record.")
+@integer_option("--steps", least=64, default=1000, help="Number of control steps per episode.")
+@integer_option("--units", default=512, help="Number of units to match.")
+@integer_option("--attributes", default=20, help="Number of attributes to match.")
+@integer_option("--rounds", default=7, help="Number of rounds to measure.")
+@integer_option(
+    "--memory-units", default=100_000, help="Number of units of the episode whose memory is measured."
 )
-@click.option("--steps", type=click.IntRange(64), default=1000, show_default=True, help="Steps per episode.")
-@click.option("--units", type=click.IntRange(1), default=512, show_default=True, help="Units to match.")
-@click.option(
-    "--attributes", type=click.IntRange(1), default=20, show_default=True, help="Attributes to match."
-)
-@click.option("--rounds", type=click.IntRange(1), default=7, show_default=True, help="Rounds to measure.")
-@click.option(
-    "--memory-units",
-    type=click.IntRange(1),
-    default=100_000,
-    show_default=True,
-    help="Units of the episode whose memory is measured.",
-)
-@click.option("--probes", type=click.IntRange(2), default=240, show_default=True, help="Roll-outs per round.")
+@integer_option("--probes", least=2, default=240, help="Number of roll-outs per round.")
 @json_option
 def bench_dissect_command(robot: str, policy: str, as_json: bool, **sizes: Any) -> None:
     """Measure matching against a loop over librosa, and probing on two workers."""
@@ -64,7 +63,7 @@ def bench_dissect_command(robot: str, policy: str, as_json: bool, **sizes: Any) 
     from pdtui.benchmarks.benchmark_tables import dissect_table
     from pdtui.benchmarks.dissection_benchmark import bench_dissection
 
-    with progress_bar_or_none("measuring", quiet=as_json) as advance:
+    with progress_bar("measuring", quiet=as_json) as advance:
         result = bench_dissection(robot, policy or robot, DissectionBenchmarkSettings(**sizes), advance)
     show_result(asdict(result), as_json, lambda: dissect_table(result))
 
@@ -72,7 +71,7 @@ def bench_dissect_command(robot: str, policy: str, as_json: bool, **sizes: Any) 
 @bench.command("record")
 @click.argument("robot")
 @map_option
-@click.option("--steps", type=click.IntRange(100), default=6000, show_default=True, help="Steps per drive.")
+@integer_option("--steps", least=100, default=6000, help="Number of control steps per drive.")
 @json_option
 def bench_record_command(robot: str, map_name: str | None, steps: int, as_json: bool) -> None:
     """Measure the CPU time and disk space of recording at 50 Hz."""
@@ -80,7 +79,7 @@ def bench_record_command(robot: str, map_name: str | None, steps: int, as_json: 
     from pdtui.benchmarks.recording_benchmark import bench_record
 
     config = drive_config(robot, map_name, "")
-    with progress_bar_or_none("measuring", quiet=as_json) as advance:
+    with progress_bar("measuring", quiet=as_json) as advance:
         result = bench_record(config, steps=steps, progress=advance)
     show_result(asdict(result), as_json, lambda: record_table(result))
 
@@ -88,21 +87,13 @@ def bench_record_command(robot: str, map_name: str | None, steps: int, as_json: 
 @bench.command("memory")
 @click.argument("robot")
 @map_option
-@click.option(
+@integer_option(
     "--steps",
-    type=click.IntRange(100),
+    least=100,
     default=180_000,
-    show_default=True,
-    help="Control steps to drive; an hour at 50 Hz has 180,000.",
+    help="Number of control steps to drive; an hour at 50 Hz has 180,000.",
 )
-@click.option(
-    "--record-activations",
-    "activations",
-    type=click.Choice(ACTIVATIONS_KEPT),
-    default="all",
-    show_default=True,
-    help="How activations are recorded.",
-)
+@record_activations_option
 @json_option
 def bench_memory_command(
     robot: str, map_name: str | None, steps: int, activations: ActivationsKept, as_json: bool
@@ -112,7 +103,7 @@ def bench_memory_command(
     from pdtui.benchmarks.recording_benchmark import bench_memory
 
     config = drive_config(robot, map_name, "", activations=activations)
-    with progress_bar_or_none("driving", quiet=as_json) as advance:
+    with progress_bar("driving", quiet=as_json) as advance:
         result = bench_memory(config, steps=steps, progress=advance)
     show_result(asdict(result), as_json, lambda: memory_table(result))
 
@@ -121,7 +112,12 @@ def bench_memory_command(
 @click.argument("robot")
 @map_option
 @click.option(
-    "--seconds", type=click.FloatRange(1.0), default=15.0, show_default=True, help="Time to measure, s."
+    "--seconds",
+    type=click.FloatRange(1.0),
+    default=15.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="How long to measure.",
 )
 @json_option
 def bench_screen_command(robot: str, map_name: str | None, seconds: float, as_json: bool) -> None:

@@ -6,15 +6,19 @@ from pathlib import Path
 
 import click
 
-from pdtui.cli.shared_options import import_option_flags
+from pdtui.cli.shared_options import FILE_PATH, import_option_flags
 from pdtui.policies.weights.import_options import ImportOptions, WorldSpaces
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="The file to write.")
+@click.argument("file", type=FILE_PATH)
 @click.option(
-    "--robot", help="The robot that the policy drives. It gives the bounds of actions if FILE lacks them."
+    "-o", "--output", type=FILE_PATH, required=True, metavar="FILE.safetensors", help="File to write."
+)
+@click.option(
+    "--robot",
+    metavar="ROBOT",
+    help="Robot that the policy drives; it gives the bounds of actions if FILE lacks them.",
 )
 @import_option_flags
 def convert(file: Path, output: Path, robot: str | None, import_options: ImportOptions) -> None:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from pdtui.cli.shared_options import (
+    FILE_PATH,
     import_option_flags,
+    integer_option,
     json_option,
+    minutes_option,
     overwrite_option,
     own_policy_option,
-    progress_bar_or_none,
+    preset_option,
+    progress_bar,
     search_seed_option,
     show_result,
     workers_option,
 )
-from pdtui.policies.weights.import_options import ImportOptions
 
 
 @click.command()
@@ -29,13 +33,7 @@ from pdtui.policies.weights.import_options import ImportOptions
 )
 @own_policy_option
 @import_option_flags
-@click.option(
-    "--preset",
-    type=click.Choice(["paper", "authors"]),
-    default="paper",
-    show_default=True,
-    help="Match units as the paper describes it, or as its authors' code does.",
-)
+@preset_option
 @click.option(
     "--set",
     "preset_changes",
@@ -44,18 +42,14 @@ from pdtui.policies.weights.import_options import ImportOptions
     help="Change a setting of the preset, such as window=hann or length=32. An unknown name lists them all. "
     "May be repeated.",
 )
-@click.option(
-    "--episodes",
-    type=click.IntRange(1, 1000),
-    default=5,
-    show_default=True,
-    help="Episodes in which units and attributes are monitored.",
+@integer_option(
+    "--episodes", most=1000, default=5, help="Number of episodes in which units and attributes are monitored."
 )
 @search_seed_option
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=FILE_PATH,
     metavar="FILE.toml",
     help="File of the map; default: maps/ROBOT-dissected.toml.",
 )
@@ -64,46 +58,32 @@ from pdtui.policies.weights.import_options import ImportOptions
 )
 @click.option(
     "--report",
-    type=click.Path(path_type=Path),
+    type=FILE_PATH,
     metavar="FILE.rrd",
     help="File of the report for the Rerun viewer; default: the map's name with .rrd.",
 )
-@click.option(
-    "--figures", type=click.Path(path_type=Path), metavar="FOLDER", help="Also draw figures as PNG files."
-)
+@click.option("--figures", type=FILE_PATH, metavar="FOLDER", help="Also draw figures as PNG files.")
 @overwrite_option
 @click.option(
     "--start-from",
     metavar="MAP",
     help="Also begin the searches from the behaviors of this map, given by name or file.",
 )
-@click.option(
-    "--budget",
-    type=click.FloatRange(0, min_open=True),
-    metavar="MINUTES",
-    help="End the searches after this time with the best found so far. Every unit is screened even if that "
-    "takes longer.",
-)
+@minutes_option("--budget", note=" Every unit is screened even if that takes longer.")
 @workers_option
 @json_option
 def dissect(
     robot: str | None,
     env: str | None,
     policy: str,
-    import_options: ImportOptions,
-    preset: str,
-    preset_changes: tuple[str, ...],
-    episodes: int,
-    seed: int,
     output: Path | None,
     quick: bool,
     report: Path | None,
     figures: Path | None,
     overwrite: bool,
     budget: float | None,
-    start_from: str | None,
-    workers: int,
     as_json: bool,
+    **settings: Any,
 ) -> None:
     """Find the units of ROBOT's policy that move something, and write a map and a report.
 
@@ -123,7 +103,7 @@ def dissect(
     output = output or Path("maps") / f"{file_stem(name)}-dissected.toml"
     outputs = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite)
     outputs.check()
-    with progress_bar_or_none("dissecting", quiet=as_json) as advance:
+    with progress_bar("dissecting", quiet=as_json) as advance:
 
         def show_progress(stage: str, done: int, total: int) -> None:
             if advance is not None:
@@ -132,16 +112,10 @@ def dissect(
         config = DissectionConfig(
             name,
             policy or name,
-            import_options=import_options,
-            preset=preset,
-            preset_changes=preset_changes,
             settings=QUICK_DISSECTION if quick else DissectionSettings(),
-            episodes=episodes,
-            seed=seed,
-            start_from=start_from,
             budget_minutes=budget,
-            workers=workers,
             progress=show_progress,
+            **settings,
         )
         result = dissect_into_map(config, output, overwrite=overwrite, draw=outputs.draw)
     show_result(result.as_dict(), as_json, result.table)

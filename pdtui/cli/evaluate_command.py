@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pdtui.cli.shared_options import (
+    FILE_PATH,
     SeedList,
     drive_config,
     force_option,
+    import_option_flags,
     json_option,
     map_option,
+    map_policy_option,
     overwrite_option,
-    policy_options,
-    progress_bar_or_none,
+    progress_bar,
     show_result,
     start_option,
     workers_option,
@@ -58,19 +60,14 @@ def experiment_options(command: click.Command) -> click.Command:
 @click.argument("robot")
 @click.argument("others", nargs=-1, metavar="[MAP.toml]...")
 @map_option
-@policy_options
+@map_policy_option
+@import_option_flags
 @force_option
 @click.option(
-    "--seeds",
-    type=SeedList(),
-    default="100-119",
-    show_default=True,
-    help="A seed, or a range of seeds.",
+    "--seeds", type=SeedList(), default="100-119", show_default=True, help="A seed, or a range of seeds."
 )
 @click.option(
-    "--target",
-    metavar="ATTRIBUTE",
-    help="Measure how precisely targets of this attribute are held.",
+    "--target", metavar="ATTRIBUTE", help="Measure how precisely targets of this attribute are held."
 )
 @click.option("--policy-only", is_flag=True, help="Measure the policy alone, one episode per seed.")
 @start_option
@@ -88,7 +85,7 @@ def experiment_options(command: click.Command) -> click.Command:
     "-o",
     "--output",
     "pictures",
-    type=click.Path(path_type=Path),
+    type=FILE_PATH,
     multiple=True,
     metavar="FILE.png|.rrd",
     help="Draw the result of the experiment; may be repeated.",
@@ -151,14 +148,14 @@ def evaluate(
         from pdtui.evaluation.target_tracking import evaluate_tracking
         from pdtui.evaluation.tracking_tables import tracking_table
 
-        with progress_bar_or_none("holding targets", quiet=as_json) as advance:
+        with progress_bar("holding targets", quiet=as_json) as advance:
             tracking = evaluate_tracking(config, target, seeds, workers=workers, progress=advance)
         show_result(asdict(tracking), as_json, lambda: tracking_table(tracking))
     elif policy_only:
         from pdtui.evaluation.evaluation_tables import policy_table
         from pdtui.evaluation.policy_evaluation import evaluate_policy
 
-        with progress_bar_or_none("evaluating", quiet=as_json) as advance:
+        with progress_bar("evaluating", quiet=as_json) as advance:
             alone = evaluate_policy(config, seeds, progress=advance)
         show_result(asdict(alone), as_json, lambda: policy_table(alone))
     else:
@@ -170,7 +167,7 @@ def _evaluate_behaviors(config: DriveConfig, seeds: range, workers: int, update:
     from pdtui.evaluation.evaluation_tables import behavior_tables
     from pdtui.stimulation.map_writer import replace_effects, rewrite_map
 
-    with progress_bar_or_none("evaluating", quiet=as_json) as advance:
+    with progress_bar("evaluating", quiet=as_json) as advance:
         result = evaluate_map(config, seeds, workers=workers, progress=advance)
     if update:
         path = Path(config.stimulation_map.source)
@@ -204,7 +201,7 @@ def _run_experiment(name: str, as_json: bool, **request: Any) -> None:
     from pdtui.paper.experiment import ExperimentRequest
 
     experiment = EXPERIMENTS[name]
-    with progress_bar_or_none(experiment.progress_label, quiet=as_json) as advance:
+    with progress_bar(experiment.progress_label, quiet=as_json) as advance:
         report = experiment.run(ExperimentRequest(**request, progress=advance))
     show_result(report.data, as_json, lambda: report.table)
     if report.pictures and not as_json:

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from pdtui.cli.shared_options import import_option_flags, overwrite_option, progress_bar_or_none
+from pdtui.cli.shared_options import (
+    FILE_PATH,
+    import_option_flags,
+    integer_option,
+    overwrite_option,
+    own_policy_option,
+    preset_option,
+    progress_bar,
+)
 from pdtui.core.printable_text import make_printable
-from pdtui.policies.weights.import_options import ImportOptions
 
 
 @click.group()
@@ -18,7 +26,7 @@ def figure() -> None:
 
 @figure.command("episode")
 @click.argument("robot")
-@click.option("--policy", default="", metavar="FILE", help="Weights; default: the robot's shipped policy.")
+@own_policy_option
 @import_option_flags
 @click.option(
     "--attribute", "attributes", multiple=True, metavar="NAME", help="Attribute to draw; may be repeated."
@@ -30,18 +38,16 @@ def figure() -> None:
     metavar="LAYER:INDEX",
     help="Unit to draw with it, one per --attribute; default: its best match.",
 )
+@preset_option
+@integer_option("--seed", least=0, most=2**31 - 1, default=1000, help="Seed of the episode.")
 @click.option(
-    "--preset",
-    type=click.Choice(["paper", "authors"]),
-    default="paper",
+    "--from",
+    "start",
+    type=click.FloatRange(0),
+    default=0.0,
     show_default=True,
-    help="Settings of the matching.",
-)
-@click.option(
-    "--seed", type=click.IntRange(0, 2**31 - 1), default=1000, show_default=True, help="Seed of the episode."
-)
-@click.option(
-    "--from", "start", type=click.FloatRange(0), default=0.0, metavar="SECONDS", help="Where to start."
+    metavar="SECONDS",
+    help="Time in the episode at which the figure begins.",
 )
 @click.option(
     "--seconds",
@@ -49,29 +55,12 @@ def figure() -> None:
     default=10.0,
     show_default=True,
     metavar="SECONDS",
-    help="How much to draw.",
+    help="Length of time to draw.",
 )
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    required=True,
-    metavar="FILE.png",
-    help="File to write.",
-)
+@click.option("-o", "--output", type=FILE_PATH, required=True, metavar="FILE.png", help="File to write.")
 @overwrite_option
 def episode(
-    robot: str,
-    policy: str,
-    import_options: ImportOptions,
-    attributes: tuple[str, ...],
-    units: tuple[str, ...],
-    preset: str,
-    seed: int,
-    start: float,
-    seconds: float,
-    output: Path,
-    overwrite: bool,
+    robot: str, policy: str, start: float, seconds: float, output: Path, overwrite: bool, **selection: Any
 ) -> None:
     """Draw attributes and their matching units over one episode.
 
@@ -85,17 +74,8 @@ def episode(
     check_figure(output, overwrite)
     from pdtui.pictures.matched_curves import draw_matched_curves, match_episode
 
-    with progress_bar_or_none("rolling out") as advance:
-        curves = match_episode(
-            robot,
-            policy or robot,
-            attributes=attributes,
-            units=units,
-            import_options=import_options,
-            preset=preset,
-            seed=seed,
-            progress=advance,
-        )
+    with progress_bar("rolling out") as advance:
+        curves = match_episode(robot, policy or robot, progress=advance, **selection)
     draw_matched_curves(output, curves, start=start, seconds=seconds)
     for pair in curves.pairs:
         click.echo(

@@ -134,7 +134,7 @@ def deviation_table(deviations: Sequence[AttributeDeviation]) -> Table:
 
 def compare_table(result: SessionComparison) -> Any:
     """Return the first step that differs, and how far the attributes are apart from there on."""
-    parts: list[Any] = [_cell(compare_line(result))]
+    parts: list[Any] = [_cell(_compare_line(result))]
     if result.first_event:
         parts.append(_cell(result.first_event))
     if result.deviations:
@@ -144,7 +144,7 @@ def compare_table(result: SessionComparison) -> Any:
     return Group(*parts)
 
 
-def compare_line(result: SessionComparison) -> str:
+def _compare_line(result: SessionComparison) -> str:
     lengths = result.lengths
     tail = "" if lengths[0] == lengths[1] else f"; they have {lengths[0]} and {lengths[1]} steps"
     if result.first_difference is None:

@@ -10,11 +10,12 @@ from typing import Any
 
 import click
 
+from pdtui.cli.replay_command import replay_options
 from pdtui.cli.shared_options import (
-    criteria_options,
+    FILE_PATH,
     json_option,
     overwrite_option,
-    progress_bar_or_none,
+    progress_bar,
     show_result,
 )
 from pdtui.core.atomic_file import write_file
@@ -23,7 +24,7 @@ from pdtui.core.printable_text import make_printable, to_json
 
 BROKEN, DIFFERS = 1, 3
 """Exit codes."""
-_file_argument = click.argument("file", type=click.Path(path_type=Path))
+_file_argument = click.argument("file", type=FILE_PATH)
 
 
 @click.group()
@@ -32,7 +33,7 @@ def sessions() -> None:
 
 
 @sessions.command("list")
-@click.argument("folder", type=click.Path(path_type=Path), default="sessions")
+@click.argument("folder", type=FILE_PATH, default="sessions")
 @json_option
 def list_command(folder: Path, as_json: bool) -> None:
     """List the sessions under FOLDER, and say what is wrong with broken ones."""
@@ -98,17 +99,16 @@ def show(file: Path, as_json: bool) -> None:
 
 
 @sessions.command()
-@click.argument("files", type=click.Path(path_type=Path), nargs=-1, required=True)
-@click.option("--policy", default="", metavar="FILE", help="Weights of the sessions, if they have moved.")
-@criteria_options
+@click.argument("files", type=FILE_PATH, nargs=-1, required=True)
+@replay_options
 @json_option
-def verify(files: tuple[Path, ...], policy: str, criteria: dict[str, Any], as_json: bool) -> None:
+def verify(files: tuple[Path, ...], options: dict[str, Any], as_json: bool) -> None:
     """Check that FILES are whole and that their drives repeat.
 
     Exit codes: 0 if all do; 1 if a file is broken, not whole or cannot be replayed; 3 if a drive does not
     repeat.
     """
-    found = [_verify_file(file, policy, criteria, as_json) for file in files]
+    found = [_verify_file(file, options, as_json) for file in files]
     if as_json:
         click.echo(to_json({"sessions": found}))
     if any(row["repeats"] is False for row in found):
@@ -117,15 +117,15 @@ def verify(files: tuple[Path, ...], policy: str, criteria: dict[str, Any], as_js
         sys.exit(BROKEN)
 
 
-def _verify_file(file: Path, policy: str, criteria: dict[str, Any], as_json: bool) -> dict[str, Any]:
+def _verify_file(file: Path, options: dict[str, Any], as_json: bool) -> dict[str, Any]:
     from pdtui.driving.replay import replay_session
     from pdtui.sessions.session_repair import examine_session
 
     row: dict[str, Any] = {"path": str(file), "whole": False, "repeats": None}
     try:
         row["whole"] = examine_session(file).whole
-        with progress_bar_or_none("replaying", quiet=as_json) as advance:
-            result = replay_session(file, policy=policy, progress=advance, **criteria)
+        with progress_bar("replaying", quiet=as_json) as advance:
+            result = replay_session(file, progress=advance, **options)
         row |= {"repeats": result.passed, "identical": result.identical, **asdict(result)}
         lines = [result.verdict if row["whole"] else f"not whole: `pdtui sessions repair`; {result.verdict}"]
         if not result.identical:
@@ -142,8 +142,10 @@ def _verify_file(file: Path, policy: str, criteria: dict[str, Any], as_json: boo
 
 @sessions.command()
 @_file_argument
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="New file; default: *.repaired.rrd.")
-@click.option("--in-place", is_flag=True, help="Replace FILE.")
+@click.option(
+    "-o", "--output", type=FILE_PATH, metavar="FILE.rrd", help="New file; default: FILE.repaired.rrd."
+)
+@click.option("--in-place", is_flag=True, help="Replace FILE itself.")
 def repair(file: Path, output: Path | None, in_place: bool) -> None:
     """Cut off the damaged end of FILE, so that it opens and replays up to there."""
     from pdtui.sessions.session_repair import examine_session, repair_session
@@ -163,9 +165,15 @@ def repair(file: Path, output: Path | None, in_place: bool) -> None:
 
 @sessions.command()
 @_file_argument
-@click.option("--stream", help="Stream to export; without --stream and --keys, list the streams.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="The .parquet or .csv file to write.")
-@click.option("--keys", type=click.Path(path_type=Path), help="Write the keystrokes to this text file.")
+@click.option(
+    "--stream",
+    metavar="NAME",
+    help="Stream to export. Without --stream and --keys, the streams are listed.",
+)
+@click.option(
+    "-o", "--output", type=FILE_PATH, metavar="FILE.parquet|.csv", help="File to write the stream into."
+)
+@click.option("--keys", type=FILE_PATH, metavar="FILE", help="Text file to write the keystrokes into.")
 @overwrite_option
 def export(file: Path, stream: str | None, output: Path | None, keys: Path | None, overwrite: bool) -> None:
     """Export a stream of FILE as a table, or its keystrokes as text.
@@ -200,8 +208,8 @@ def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
 
 
 @sessions.command()
-@click.argument("a", type=click.Path(path_type=Path))
-@click.argument("b", type=click.Path(path_type=Path))
+@click.argument("a", type=FILE_PATH)
+@click.argument("b", type=FILE_PATH)
 @json_option
 def compare(a: Path, b: Path, as_json: bool) -> None:
     """Compare sessions A and B step by step.
@@ -220,7 +228,7 @@ def compare(a: Path, b: Path, as_json: bool) -> None:
 
 @sessions.command("open")
 @_file_argument
-@click.option("--web", is_flag=True, help="Show it in the browser.")
+@click.option("--web", is_flag=True, help="Open it in the browser instead of the viewer's own window.")
 def open_command(file: Path, web: bool) -> None:
     """Open FILE in the Rerun viewer, which listens on 127.0.0.1 only."""
     from pdtui.sessions.session_header import read_session_header

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,10 +15,13 @@ import click
 from pdtui.core.errors import MapError
 from pdtui.core.printable_text import make_printable, to_json
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, NO_OPTIONS, SQUASH_NAMES, ImportOptions
+from pdtui.sessions.session_schema import ACTIVATIONS_KEPT
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
     from pdtui.stimulation.stimulation_map import StimulationMap
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 class SeedList(click.ParamType[range]):
@@ -34,21 +38,61 @@ class SeedList(click.ParamType[range]):
         return range(int(match[1]), int(match[2] or match[1]) + 1)
 
 
+FILE_PATH = click.Path(path_type=Path)
+
+
+def integer_option(
+    name: str, *, help: str, default: int | None = None, least: int = 1, most: int | None = None
+) -> Decorator:
+    """Return an option for a whole number."""
+    shown = default is not None
+    kind = click.IntRange(least, most)
+    return click.option(name, type=kind, default=default, show_default=shown, metavar="N", help=help)
+
+
+def policy_option(instead_of: str) -> Decorator:
+    """Return ``--policy``, whose default is described by a phrase."""
+    return click.option(
+        "--policy",
+        default="",
+        metavar="FILE",
+        help=f"Weights file, or name of a shipped policy; default: {instead_of}.",
+    )
+
+
 map_option = click.option(
     "--map", "map_name", metavar="MAP", help="Name or file of the map; default: the robot's map."
 )
 force_option = click.option(
     "--force", is_flag=True, help="Use the map even if it was made for another policy."
 )
-own_policy_option = click.option(
-    "--policy", default="", help="Weights file or shipped policy; default: the robot's policy."
-)
-search_seed_option = click.option(
-    "--seed",
-    type=click.IntRange(1000, 2**31 - 1),  # evaluations use the seeds below
-    default=1000,
+map_policy_option = policy_option("the map's policy")
+own_policy_option = policy_option("the robot's policy")
+preset_option = click.option(
+    "--preset",
+    type=click.Choice(["paper", "authors"]),
+    default="paper",
     show_default=True,
-    help="Seed of every random choice.",
+    help="Match units as the paper describes it, or as its authors' code does.",
+)
+# Evaluations use the seeds below 1000.
+search_seed_option = integer_option(
+    "--seed", least=1000, most=2**31 - 1, default=1000, help="Seed of every random choice."
+)
+start_option = click.option(
+    "--start",
+    default="",
+    metavar="STATE",
+    help="State in which episodes start, for a robot that has several.",
+)
+record_activations_option = click.option(
+    "--record-activations",
+    "activations",
+    type=click.Choice(ACTIVATIONS_KEPT),
+    default="all",
+    show_default=True,
+    help="How to record activations: in full, as float16, or only as the overview image. "
+    "A replay computes them again.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 overwrite_option = click.option("--overwrite", is_flag=True, help="Replace existing files.")
@@ -56,80 +100,47 @@ workers_option = click.option(
     "--workers",
     type=click.IntRange(1, 256),
     default=lambda: os.cpu_count() or 1,
-    help="Worker processes; default: one per core.",
+    metavar="N",
+    help="Number of worker processes; default: one per core.",
 )
+
+
+def minutes_option(name: str, default: float | None = None, note: str = "") -> Decorator:
+    """Return an option for the time that a search may take."""
+    return click.option(
+        name,
+        type=click.FloatRange(0, min_open=True),
+        default=default,
+        show_default=default is not None,
+        metavar="MINUTES",
+        help=f"End the search after this time with the best found so far.{note}",
+    )
 
 
 def import_option_flags(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add ``--activation``, ``--squash`` and ``--normaliser``; the command gets them as `import_options`."""
 
+    @click.option(
+        "--activation",
+        type=click.Choice(ACTIVATION_NAMES),
+        help="Activation function of the hidden layers, if the policy's file does not state it.",
+    )
+    @click.option(
+        "--squash",
+        type=click.Choice(SQUASH_NAMES),
+        help="How outputs become actions, if the policy's file does not state it.",
+    )
+    @click.option(
+        "--normaliser", default="", metavar="FILE", help="File with the observation statistics, or 'none'."
+    )
     @wraps(command)
-    def choosing(
+    def with_import_options(
         *args: Any, activation: str | None, squash: str | None, normaliser: str, **others: Any
     ) -> Any:
-        return command(
-            *args, import_options=ImportOptions(activation or "", squash or "", normaliser), **others
-        )
+        options = ImportOptions(activation or "", squash or "", normaliser)
+        return command(*args, import_options=options, **others)
 
-    for option in (
-        click.option(
-            "--normaliser",
-            default="",
-            metavar="FILE",
-            help="File with the observation statistics, or 'none'.",
-        ),
-        click.option(
-            "--squash",
-            type=click.Choice(SQUASH_NAMES),
-            help="How outputs become actions, if the policy's file does not say.",
-        ),
-        click.option(
-            "--activation",
-            type=click.Choice(ACTIVATION_NAMES),
-            help="Activation function of the hidden layers, if the policy's file does not say.",
-        ),
-    ):
-        choosing = option(choosing)
-    return choosing
-
-
-def policy_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--policy`` and the options of `import_option_flags`."""
-    return click.option("--policy", default="", metavar="FILE", help="Weights to use instead of the map's.")(
-        import_option_flags(command)
-    )
-
-
-def criteria_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--tolerance`` and ``--strict``; the command gets them as `criteria`."""
-
-    @wraps(command)
-    def judged(*args: Any, tolerance: float | None, strict: bool, **others: Any) -> Any:
-        criteria: dict[str, Any] = {"strict": strict}
-        if tolerance is not None:
-            criteria["tolerance"] = tolerance
-        return command(*args, criteria=criteria, **others)
-
-    for option in (
-        click.option("--strict", is_flag=True, help="Accept only identical bits, on any machine."),
-        click.option(
-            "--tolerance",
-            type=click.FloatRange(0),
-            metavar="SPREADS",
-            help="On another machine or with other versions, accept attributes that differ by at most this "
-            "many of their standard deviations in the first 5 control steps.  [default: 5e-06]",
-        ),
-    ):
-        judged = option(judged)
-    return judged
-
-
-start_option = click.option(
-    "--start",
-    default="",
-    metavar="STATE",
-    help="State in which episodes start, for a robot that has several.",
-)
+    return with_import_options
 
 
 def drive_config(
@@ -203,12 +214,27 @@ def show_result(data: dict[str, Any] | list[dict[str, Any]], as_json: bool, tabl
     Console(markup=False, emoji=False).print(table())
 
 
-def progress_bar_or_none(
-    label: str, quiet: bool = False
-) -> AbstractContextManager[Callable[..., None] | None]:
-    """Return a context manager for a progress bar on standard error, or for None where `quiet`."""
-    if quiet:
-        return nullcontext(None)
-    from pdtui.cli.progress_bar import progress_bar
+@contextmanager
+def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[..., None] | None]:
+    """Show a progress bar with the remaining time on standard error, unless `quiet`.
 
-    return progress_bar(label)
+    Yields:
+        The function ``advance(done, total, note="")`` that updates the bar; None where `quiet`.
+    """
+    if quiet:
+        yield None
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    text, bar, _, remaining = Progress.get_default_columns()
+    columns = (text, bar, MofNCompleteColumn(), TimeElapsedColumn(), remaining)
+    with Progress(*columns, TextColumn("{task.fields[note]}"), console=Console(stderr=True)) as progress:
+        task = progress.add_task(label, total=None, note="")
+
+        def advance(done: int, total: int, note: str = "") -> None:
+            fields = {"note": escape(note)} if note else {}
+            progress.update(task, completed=done, total=total, **fields)  # type: ignore[arg-type]
+
+        yield advance

@@ -6,23 +6,28 @@ from pathlib import Path
 
 import click
 
-from pdtui.cli.shared_options import progress_bar_or_none
+from pdtui.cli.shared_options import FILE_PATH, integer_option, progress_bar
 
 
 @click.command()
 @click.argument("robot")
+@integer_option("--seed", least=0, most=2**31 - 1, default=0, help="Seed of every random choice.")
+@integer_option(
+    "--steps", help="Number of control steps, over all worlds; default: that of the robot's recipe."
+)
 @click.option(
-    "--seed",
-    type=click.IntRange(0, 2**31 - 1),
-    default=0,
+    "--algorithm",
+    type=click.Choice(["ppo", "sac"]),
+    default="ppo",
     show_default=True,
-    help="Seed of every random choice.",
+    help="Proximal policy optimization, or soft actor-critic.",
 )
 @click.option(
-    "--steps", type=click.IntRange(1), help="Control steps, over all worlds; default: the robot's recipe."
+    "--learning-rate",
+    type=click.FloatRange(0, min_open=True),
+    metavar="RATE",
+    help="Learning rate at the start; default: that of the robot's recipe.",
 )
-@click.option("--algorithm", type=click.Choice(["ppo", "sac"]), default="ppo", show_default=True)
-@click.option("--learning-rate", type=click.FloatRange(0, min_open=True), help="Learning rate at the start.")
 @click.option(
     "--forward",
     type=click.Choice(["either", "x"]),
@@ -30,7 +35,8 @@ from pdtui.cli.shared_options import progress_bar_or_none
 )
 @click.option(
     "--folder",
-    type=click.Path(path_type=Path),
+    type=FILE_PATH,
+    metavar="FOLDER",
     help="Folder of the checkpoints; default: runs/ROBOT-ALGORITHM-SEED.",
 )
 def train(
@@ -48,7 +54,7 @@ def train(
     """
     from pdtui.training.train_policy import train_policy
 
-    with progress_bar_or_none("training") as advance:
+    with progress_bar("training") as advance:
         path = train_policy(
             robot,
             algorithm,

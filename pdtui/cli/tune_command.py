@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 from pdtui.cli.shared_options import (
     SeedList,
     drive_config,
     force_option,
+    import_option_flags,
+    integer_option,
     json_option,
-    policy_options,
-    progress_bar_or_none,
+    map_policy_option,
+    minutes_option,
+    progress_bar,
     show_result,
     workers_option,
 )
@@ -21,37 +26,21 @@ from pdtui.policies.weights.import_options import ImportOptions
 @click.command()
 @click.argument("map_name", metavar="MAP")
 @click.argument("behaviors", nargs=-1, metavar="[BEHAVIOR]...")
-@click.option("--all", "every", is_flag=True, help="Tune all behaviors of mode pid.")
-@policy_options
+@click.option("--all", "every", is_flag=True, help="Tune every behavior of mode pid.")
+@map_policy_option
+@import_option_flags
 @force_option
 @click.option(
     "--seeds",
     type=SeedList(),
     default="200-209",
     show_default=True,
-    help="Seeds; the first half is for the search, the second for judging its result.",
+    help="Range of seeds; the first half is for the search, the second for judging its result.",
 )
-@click.option(
-    "--points",
-    type=click.IntRange(1),
-    default=48,
-    show_default=True,
-    help="Gains to try first, spread over the range.",
-)
-@click.option(
-    "--refinements",
-    type=click.IntRange(0),
-    default=24,
-    show_default=True,
-    help="Gains to try near the best.",
-)
-@click.option(
-    "--minutes",
-    type=click.FloatRange(0, min_open=True),
-    metavar="MINUTES",
-    help="Stop the search after this time and keep the best so far.",
-)
-@click.option("--dry-run", is_flag=True, help="Do not change the map.")
+@integer_option("--points", default=48, help="Number of gains to try first, spread over their range.")
+@integer_option("--refinements", least=0, default=24, help="Number of gains to try near the best ones.")
+@minutes_option("--minutes")
+@click.option("--dry-run", is_flag=True, help="Tune, but do not change the map.")
 @workers_option
 @json_option
 def tune(
@@ -62,12 +51,10 @@ def tune(
     import_options: ImportOptions,
     force: bool,
     seeds: range,
-    points: int,
-    refinements: int,
-    minutes: float | None,
     dry_run: bool,
     workers: int,
     as_json: bool,
+    **settings: Any,
 ) -> None:
     """Tune the PID gains of BEHAVIORs by their step responses, and write them into MAP.
 
@@ -79,19 +66,18 @@ def tune(
     if force and not dry_run:
         raise MapError("--force needs --dry-run: the map would get gains tuned for another policy")
     from pdtui.evaluation.tracking_tables import tuned_table
-    from pdtui.search.gain_tuning import TuningSettings
-    from pdtui.search.gain_tuning import tune_gains as search
+    from pdtui.search.gain_tuning import TuningSettings, tune_gains
     from pdtui.stimulation.map_library import find_map
     from pdtui.stimulation.map_writer import replace_gains, rewrite_map
 
     path = find_map(map_name)
-    order = drive_config(str(path), None, policy, import_options, force=force)
-    with progress_bar_or_none("tuning", quiet=as_json) as advance:
-        results = search(
-            order,
+    config = drive_config(str(path), None, policy, import_options, force=force)
+    with progress_bar("tuning", quiet=as_json) as advance:
+        results = tune_gains(
+            config,
             behaviors,
             seeds,
-            settings=TuningSettings(points, refinements, minutes),
+            settings=TuningSettings(**settings),
             workers=workers,
             progress=advance,
         )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from types import FrameType
 
 import numpy as np
 
@@ -20,6 +22,8 @@ from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.keystrokes import interpret_keys
 from pdtui.sessions.writer.session_recorder import SessionRecorder
+
+ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,26 @@ def run_episode(
         yield record
         if record.ended:
             return
+
+
+@contextmanager
+def catch_ending_signals() -> Iterator[Callable[[], str]]:
+    """Yield a function that says which signal has come; it returns an empty string while none has.
+
+    By default, SIGTERM and SIGHUP would leave a recording without its end. The handlers are restored at the
+    end. Only a program's main thread can do this.
+    """
+    came: list[str] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        came.append(f"ended by {signal.Signals(number).name}")
+
+    before = {number: signal.signal(number, note) for number in ENDING_SIGNALS}
+    try:
+        yield lambda: came[0] if came else ""
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextmanager

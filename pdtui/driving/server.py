@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import signal
 import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
@@ -19,11 +21,11 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts
 from pdtui.driving.keystrokes import interpret_keys
 from pdtui.driving.loop_builder import build_loop
-from pdtui.driving.message_sender import MessageSender
 from pdtui.driving.pacer import Pacer
 from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
+SendMessage = Callable[[object], Future[None]]
 _IDLE = 0.05
 PACED_ROWS_PER_WRITE = 4
 
@@ -36,12 +38,14 @@ class DriveServer:
 
     Args:
         connection: the pipe; requests are read from it.
-        sender: sends messages through it.
+        send: sends a message through it after those before it, from another thread.
         config: the drive.
     """
 
-    def __init__(self, connection: Connection, sender: MessageSender, config: DriveConfig) -> None:
-        self._connection, self._sender, self._config = connection, sender, config
+    def __init__(
+        self, connection: Connection, send: Callable[[object], Future[None]], config: DriveConfig
+    ) -> None:
+        self._connection, self._send, self._config = connection, send, config
         self._loop: ControlLoop = build_loop(config)
         self._builder = SnapshotBuilder(self._loop)
         self._recorder: SessionRecorder | None = None
@@ -59,10 +63,10 @@ class DriveServer:
         self.failed = False
         self._scripted_events = group_events_by_step(config.scripted_events or ())
 
-    def facts(self) -> None:
+    def send_facts(self) -> None:
         """Send the facts that the screen needs once."""
         loop = self._loop
-        self._sender.send(
+        self._sent = self._send(
             DriveFacts(
                 title=loop.robot.title,
                 policy=loop.policy.name,
@@ -80,7 +84,7 @@ class DriveServer:
         try:
             while not self._closing:
                 self._serve()
-                if self._snapshot_requested and self._sender.idle:
+                if self._snapshot_requested and self._sent.done():
                     self._send_snapshot()
         except Exception as error:
             if not isinstance(error, PdtuiError):
@@ -173,7 +177,7 @@ class DriveServer:
             finished=self._finished,
         )
         self._snapshot_requested = False
-        self._sender.send(snapshot)
+        self._sent = self._send(snapshot)
 
     def _close_recording(self) -> None:
         if self._recorder is not None:
@@ -183,7 +187,13 @@ class DriveServer:
 def serve_drive(connection: Connection, config: DriveConfig) -> None:
     """Run the process of a drive; what ends it is sent as a line of text or an exception."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the screen handles ctrl+c
-    sender = MessageSender(connection)
+    # Sending a message that is larger than the pipe's buffer takes until the screen has taken the rest, and a
+    # stopped screen never does. Messages to a screen that has gone away are dropped.
+    sender = ThreadPoolExecutor(max_workers=1)
+
+    def send(message: object) -> Future[None]:
+        return sender.submit(connection.send, message)
+
     server: DriveServer | None = None
     early: list[str] = []
 
@@ -196,17 +206,17 @@ def serve_drive(connection: Connection, config: DriveConfig) -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, stop)
     try:
-        server = DriveServer(connection, sender, config)
+        server = DriveServer(connection, send, config)
         for reason in early:
             server.stop(reason)
-        server.facts()
+        server.send_facts()
         server.run()
         outcome = server.outcome()
-        sender.send(PdtuiError(outcome) if server.failed else outcome)
+        send(PdtuiError(outcome) if server.failed else outcome)
     except PdtuiError as error:
-        sender.send(error)
+        send(error)
     except Exception as error:
         # The screen would hide a traceback.
         said = format_error_in_one_line(error) if server is None else server.outcome()
-        sender.send(PdtuiError(f"the simulation failed: {said}"))
-    sender.flush()
+        send(PdtuiError(f"the simulation failed: {said}"))
+    sender.shutdown()

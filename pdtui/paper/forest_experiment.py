@@ -70,9 +70,17 @@ EXPERIMENT = Experiment(
     run_forest_experiment,
     (
         click.Option(
-            ["--steps"], type=click.IntRange(1), help="Longest episode, in control steps.  [default: 2400]"
+            ["--steps"],
+            type=click.IntRange(1),
+            metavar="N",
+            help="Longest episode, in control steps.  [default: 2400]",
         ),
-        click.Option(["--repeats"], type=click.IntRange(1), help="Number of groups of seeds.  [default: 5]"),
+        click.Option(
+            ["--repeats"],
+            type=click.IntRange(1),
+            metavar="N",
+            help="Number of groups of seeds.  [default: 5]",
+        ),
         click.Option(
             ["--condition", "conditions"],
             multiple=True,

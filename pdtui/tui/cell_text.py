@@ -1,4 +1,4 @@
-"""Text that fits into terminal cells: padding, wrapping, short numbers and key names."""
+"""Text that fits into terminal cells: padding, short numbers and key names."""
 
 from __future__ import annotations
 
@@ -32,18 +32,6 @@ def fit_cells(text: str, width: int) -> str:
     if cell_len(text) <= width:
         return text + " " * (width - cell_len(text))
     return set_cell_size(set_cell_size(text, width - 1).rstrip() + "…", width)
-
-
-def wrap_text(text: str, width: int, lines: int) -> list[str]:
-    """Wrap a sentence into at most `lines` lines; the last is cut with an ellipsis."""
-    rows = [""]
-    for word in text.split():
-        longer = f"{rows[-1]} {word}" if rows[-1] else word
-        if cell_len(longer) <= width or not rows[-1] or len(rows) == lines:
-            rows[-1] = longer
-        else:
-            rows.append(word)
-    return [fit_cells(row, width).rstrip() for row in rows]
 
 
 def format_number(value: float) -> str:

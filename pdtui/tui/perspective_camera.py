@@ -38,11 +38,8 @@ class PerspectiveCamera:
         Magnification is relative to the target. Points that do not lie in front must not be drawn.
         """
         relative = points - np.array(self.target)
-        s, c = sin(radians(self.elevation)), cos(radians(self.elevation))
-        up = relative[..., 2] * c + relative[..., 1] * s
-        away = relative[..., 1] * c - relative[..., 2] * s
-        distance = _DISTANCE * self.extent
-        depth = 1.0 + away / distance
+        up = relative[..., 2] * cos(radians(self.elevation)) + relative[..., 1] * sin(radians(self.elevation))
+        depth = 1.0 + self.depth(points) / (_DISTANCE * self.extent)
         before = depth > _NEAREST
         magnification = 1.0 / np.where(before, depth, 1.0)
         dots = np.stack(
@@ -57,8 +54,8 @@ class PerspectiveCamera:
     def depth(self, points: Floats) -> Floats:
         """Return how far points (..., 3) lie behind the target along the line of sight, m."""
         relative = points - np.array(self.target)
-        s, c = sin(radians(self.elevation)), cos(radians(self.elevation))
-        away: Floats = relative[..., 1] * c - relative[..., 2] * s
+        elevation = radians(self.elevation)
+        away: Floats = relative[..., 1] * cos(elevation) - relative[..., 2] * sin(elevation)
         return away
 
 

@@ -16,7 +16,7 @@ from pdtui.core.errors import PdtuiError
 from pdtui.driving import server
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.ending_signals import ENDING_SIGNALS, catch_ending_signals
+from pdtui.driving.headless_drive import ENDING_SIGNALS, catch_ending_signals
 from pdtui.driving.loop_builder import build_loop
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_repair import examine_session

@@ -8,7 +8,7 @@ from rich import filesize
 
 from pdtui.core.printable_text import make_printable
 from pdtui.core.step_record import ActiveBehavior
-from pdtui.tui.cell_text import fit_cells, format_number, format_signed, wrap_text
+from pdtui.tui.cell_text import fit_cells, format_number, format_signed
 from pdtui.tui.perspective_camera import PerspectiveCamera, round_length_down
 from pdtui.tui.widgets.activation_heatmap import UnitGrid, layer_rows
 from pdtui.tui.widgets.attribute_table import AttributeHistory, draw_sparklines
@@ -179,10 +179,6 @@ def test_foreign_text_is_made_harmless() -> None:
 def test_text_is_fitted_by_cells() -> None:
     assert fit_cells("abc", 5) == "abc  "
     assert fit_cells("abcdef", 4) == "abc…"
+    assert fit_cells("turns on the spot", 9) == "turns on…"
     assert fit_cells("漢字漢字", 5) == "漢字…"
     assert fit_cells("abc", 0) == ""
-
-
-def test_sentences_wrap_at_spaces() -> None:
-    assert wrap_text("turns on the spot", 9, 3) == ["turns on", "the spot"]
-    assert wrap_text("turns on the spot", 9, 1) == ["turns on…"]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import click
 
-from pdtui.guide.reference.escaped_markdown import escape_markdown
+from pdtui.guide.reference import escape_markdown
 
 _HEAD = """\
 # Commands

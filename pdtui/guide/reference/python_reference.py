@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from pdtui.guide.reference.escaped_markdown import escape_markdown
+from pdtui.guide.reference import escape_markdown
 
 _HEAD = """\
 # Python

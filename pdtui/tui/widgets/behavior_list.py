@@ -9,7 +9,7 @@ from rich.style import Style
 from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
-from pdtui.tui.cell_text import ScreenRow, format_number, format_signed, key_name, wrap_text
+from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number, format_signed, key_name
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
@@ -76,7 +76,7 @@ class BehaviorList(SnapshotWidget):
                 lines.append(self._control(behavior, active, width))
         if roomy:
             indent = " " * (self._columns[0] + 2)
-            sentence = wrap_text(says, width - len(indent), 1)[0]
+            sentence = fit_cells(" ".join(says.split()), width - len(indent)).rstrip()
             style = STYLES.muted if active is None else STYLES.text
             lines.insert(1, ScreenRow(width).add(indent + sentence, style).strip())
         return lines
