@@ -34,20 +34,19 @@ class Attribute:
 
 
 def column_of(name: str, attributes: Sequence[Attribute], owner: str) -> int:
-    """Column of an attribute; `owner` is named where there is none.
+    """Return the column of an attribute.
 
     Raises:
-        RobotError: there is no such attribute.
+        RobotError: there is no such attribute; the message names the `owner`.
     """
-    for column, attribute in enumerate(attributes):
-        if attribute.name == name:
-            return column
-    known = ", ".join(attribute.name for attribute in attributes)
-    raise RobotError(f"{owner}: no attribute '{name}'; there are {known}")
+    names = [attribute.name for attribute in attributes]
+    if name not in names:
+        raise RobotError(f"{owner}: no attribute '{name}'; there are {', '.join(names)}")
+    return names.index(name)
 
 
 def unwrap_angles(values: Floats, attributes: Sequence[Attribute]) -> Floats:
-    """A copy of values by control step, shape (T, J), in which angles do not jump at ±π."""
+    """Return a copy of values by control step, shape (T, J), in which angles do not jump at ±π."""
     smooth = values.copy()
     for column, attribute in enumerate(attributes):
         if attribute.wraps:
@@ -63,10 +62,10 @@ class BehaviorAim:
     """What a behavior is meant to do, which `pdtui evaluate` measures.
 
     Attributes:
-        attribute: its name.
-        direction: ``increase`` and ``decrease`` want the attribute itself above and below 0 (a drift to +y, a
-            turn to the left); ``raise`` and ``lower`` want it above and below what it is without the behavior
-            (a height, a joint's angle); ``stop`` wants it near 0.
+        attribute: name of the attribute that it changes.
+        direction: ``increase`` and ``decrease`` mean an attribute above and below 0 (a drift to +y, a turn to
+            the left); ``raise`` and ``lower`` mean above and below its value without the behavior (a height,
+            a joint's angle); ``stop`` means near 0.
     """
 
     attribute: str

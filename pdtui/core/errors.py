@@ -13,7 +13,7 @@ class PdtuiError(Exception):
 
 
 class RobotError(PdtuiError):
-    """A robot is unknown, not installed, or does not support what was asked of it."""
+    """A robot is unknown, is not installed, or does not support what was requested."""
 
 
 class SimulationDiverged(RobotError):  # noqa: N818 - it names an event

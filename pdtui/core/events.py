@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pdtui.core.key_table import EVENT_WORDINGS, EventKind
+from pdtui.core.key_table import EVENT_WORDINGS, JUMPS, EventKind
 
 
 @dataclass(frozen=True)
@@ -31,12 +31,12 @@ class Event:
     @property
     def jumps(self) -> bool:
         """Whether the event puts the robot into a different state."""
-        return EVENT_WORDINGS[self.kind].jumps
+        return self.kind in JUMPS
 
 
 def describe_event(event: Event) -> str:
     """Say what an event does: the wording of the screen, the session's log and ``pdtui sessions``."""
-    return EVENT_WORDINGS[event.kind].sentence.format(name=event.name, value=event.value)
+    return EVENT_WORDINGS[event.kind].format(name=event.name, value=event.value)
 
 
 def group_events_by_step(events: Iterable[Event]) -> dict[int, list[Event]]:

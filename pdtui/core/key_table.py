@@ -12,27 +12,17 @@ from typing import Literal
 EventKind = Literal["behavior", "default", "target", "factor", "reset", "rewind"]
 
 
-@dataclass(frozen=True)
-class EventWording:
-    """How the events of one kind are described.
-
-    Attributes:
-        sentence: may contain ``{name}`` and ``{value}`` of the event.
-        jumps: whether the robot is put into another state, so that paths end there and the screen says so.
-    """
-
-    sentence: str
-    jumps: bool = False
-
-
-EVENT_WORDINGS: dict[EventKind, EventWording] = {
-    "behavior": EventWording("behavior '{name}' latched"),
-    "default": EventWording("all behaviors cleared"),
-    "target": EventWording("target of '{name}' set to {value:.4g}"),
-    "factor": EventWording("magnitudes of '{name}' set to {value:.4g} times the map's"),
-    "reset": EventWording("next episode started", jumps=True),
-    "rewind": EventWording("rewound to step {value:.0f}", jumps=True),
+EVENT_WORDINGS: dict[EventKind, str] = {
+    "behavior": "behavior '{name}' latched",
+    "default": "all behaviors cleared",
+    "target": "target of '{name}' set to {value:.4g}",
+    "factor": "magnitudes of '{name}' set to {value:.4g} times the map's",
+    "reset": "next episode started",
+    "rewind": "rewound to step {value:.0f}",
 }
+"""What each kind of event does, in words that may contain ``{name}`` and ``{value}`` of the event."""
+JUMPS = ("reset", "rewind")
+"""Events that put the robot into another state, so that paths end there and the screen says so."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Plain data about robots: their shapes, their whole state and the commands that their policies follow."""
+"""Plain data about robots: their shapes, their whole states and the commands that their policies follow."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ NO_OBSTACLES: Floats = np.empty((0, 3))
 
 @dataclass(frozen=True)
 class CommandRange:
-    """What a policy was trained to be asked for by one command.
+    """The range of one command on which a policy was trained.
 
     Attributes:
-        attribute: the one that is to become the command.
-        low, high: in the attribute's unit.
+        attribute: name of the attribute that is to follow the command.
+        low, high: ends of the range, in the attribute's unit.
     """
 
     attribute: str
@@ -33,11 +33,11 @@ class Link:
 
     Attributes:
         name: name for the viewer.
-        body: row of `Robot.read_poses` that carries the shape.
-        shape: a capsule's axis is its local z.
+        body: row of `Robot.read_poses` with the pose of the body.
+        shape: kind of shape; the axis of a capsule is its local z axis.
         size: (radius, half length) of a capsule, (radius,) of a sphere, half extents of a box; m.
-        position: place in the body's frame, m.
-        quaternion: orientation in the body's frame, w x y z.
+        position: position in the body's frame, m.
+        quaternion: orientation in the body's frame, (w, x, y, z).
     """
 
     name: str
@@ -50,14 +50,14 @@ class Link:
 
 @dataclass(frozen=True)
 class RobotState:
-    """The whole state of a robot: restoring it makes the future bit-identical.
+    """The whole state of a robot: a robot that is restored to it continues bit for bit as before.
 
     Attributes:
-        robot: name of the robot that made it.
-        state: the simulator's state vector.
-        extras: what the robot's own Python side remembers.
+        robot: name of the robot.
+        state: state vector of the simulator.
+        extras: state that the robot's own Python code keeps.
         rng: state of the robot's random generator.
-        memory: what the Python side of a wrapped environment remembers, plain data; None where there is none.
+        memory: state that the Python code of a wrapped environment keeps, as plain data; None if it has none.
     """
 
     robot: str

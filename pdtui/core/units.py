@@ -13,7 +13,7 @@ ADDRESS = re.compile(r"([\w.]{1,200}):(\d{1,9})")
 """``layer:index``, the layer by its number or its name."""
 
 MAX_LISTED = 6
-"""Largest number of units that a text names one by one."""
+"""Largest number of units that a text lists one by one."""
 
 _NAME = re.compile(r"[\w.]{1,200}")
 
@@ -23,11 +23,11 @@ class LayerWidths(tuple[int, ...]):
 
     Args:
         widths: units of each layer.
-        names: of each layer, the one to show first. A name that two layers share names neither, and one that
-            reads as a number would be taken for the layer's.
+        names: names of each layer, the one to show first. A name that two layers share, or that reads as a
+            number, is ambiguous and is left out.
 
     Attributes:
-        names: those that are left; empty for a layer that is known by its number alone.
+        names: the names that are left; empty for a layer that is known by its number alone.
     """
 
     names: tuple[tuple[str, ...], ...]
@@ -35,33 +35,22 @@ class LayerWidths(tuple[int, ...]):
     def __new__(cls, widths: Iterable[int], names: Sequence[Sequence[str]] = ()) -> LayerWidths:
         layers = super().__new__(cls, widths)
         uses = Counter(name for own in names for name in set(own))
-        layers.names = tuple(
-            tuple(
-                name
-                for name in dict.fromkeys(own)
-                if uses[name] == 1 and _NAME.fullmatch(name) and not name.isdecimal()
-            )
-            for own in names
-        )
+        usable = {name for name in uses if uses[name] == 1 and _NAME.fullmatch(name) and not name.isdecimal()}
+        layers.names = tuple(tuple(name for name in dict.fromkeys(own) if name in usable) for own in names)
         return layers
 
 
 def describe_layers(layers: Sequence[int]) -> str:
-    """The layers in words, for messages: ``layers 0..1 of 256 units``."""
-    if any(_names(layers, layer) for layer in range(len(layers))):
-        return "layers " + ", ".join(
-            f"{layer} ({shown[0]}) of {width} units"
-            if (shown := _names(layers, layer))
-            else f"{layer} of {width} units"
-            for layer, width in enumerate(layers)
-        )
-    if len(set(layers)) == 1 and len(layers) > 1:
+    """Describe the layers for messages: ``layers 0..1 of 256 units``."""
+    named = [f" ({names[0]})" if (names := _names(layers, layer)) else "" for layer in range(len(layers))]
+    if len(set(layers)) == 1 and len(layers) > 1 and not any(named):
         return f"layers 0..{len(layers) - 1} of {layers[0]} units"
-    return "layers " + ", ".join(f"{layer} of {width} units" for layer, width in enumerate(layers))
+    parts = enumerate(zip(named, layers, strict=True))
+    return "layers " + ", ".join(f"{layer}{name} of {width} units" for layer, (name, width) in parts)
 
 
 def parse_unit(address: str, layers: Sequence[int]) -> int:
-    """Flat index of ``layer:index`` in a policy with these layer widths.
+    """Return the flat index of ``layer:index`` in a policy with these layer widths.
 
     The layer is a number, or one of its names where `layers` are `LayerWidths` with names: ``conv1:37``. A
     unit of a layer of any shape counts in C order.
@@ -79,13 +68,13 @@ def parse_unit(address: str, layers: Sequence[int]) -> int:
 
 
 def format_unit(flat: int, layers: Sequence[int]) -> str:
-    """``layer:index`` of a flat index, by the layer's name where it has one."""
+    """Return ``layer:index`` of a flat index, by the layer's name where it has one."""
     layer, index = locate_unit(flat, layers)
     return f"{next(iter(_names(layers, layer)), layer)}:{index}"
 
 
 def locate_unit(flat: int, layers: Sequence[int]) -> tuple[int, int]:
-    """Number of the layer and index in it of a flat index.
+    """Return the number of the layer, and the index in it, of a flat index.
 
     Raises:
         PolicyError: there are fewer units.
@@ -114,7 +103,7 @@ class Stimulation:
 
     Attributes:
         units: flat indices, layer by layer.
-        values: the output v of each.
+        values: the output v of each unit.
     """
 
     units: tuple[int, ...] = ()
@@ -122,11 +111,11 @@ class Stimulation:
 
     @classmethod
     def of(cls, values: Mapping[int, float]) -> Stimulation:
-        """From a mapping of flat index to v."""
+        """Return the stimulation that sets units, given by flat index, to the outputs v."""
         return cls(tuple(values), tuple(values.values()))
 
     def by_address(self, layers: Sequence[int]) -> dict[str, float]:
-        """Outputs v by the addresses of their units."""
+        """Return the outputs v by the addresses of their units."""
         pairs = zip(self.units, self.values, strict=True)
         return {format_unit(unit, layers): value for unit, value in pairs}
 

@@ -18,11 +18,7 @@ from pdtui.driving.loop_builder import build_loop
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
-from pdtui.sessions.environment_versions import (
-    collect_versions,
-    list_numeric_version_differences,
-    list_version_differences,
-)
+from pdtui.sessions.environment_versions import collect_versions, list_version_differences
 from pdtui.sessions.session_comparison import (
     AttributeDeviation,
     attribute_differences,
@@ -169,7 +165,7 @@ def replay_session(
             raise SessionError(f"{path}: the robot measures other attributes now; nothing can be compared")
         first, changes, stopped = _run(session, loop, progress)
     here = collect_versions()
-    elsewhere = bool(list_numeric_version_differences(session.versions, here)) and not strict
+    elsewhere = bool(list_version_differences(session.versions, here, numeric=True)) and not strict
     spread = measure_spread(session.attributes)
     wrong = np.flatnonzero((changes > tolerance * spread).any(axis=1))
     agreed = (first or 0) + (int(wrong[0]) if wrong.size else len(changes))

@@ -101,9 +101,8 @@ def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, s
     # Older sessions, which lack the property, contain all activations.
     kept = _read_value(properties, "activations", str) if "activations" in properties else "all"
     if kept not in ACTIVATIONS_KEPT:
-        raise SessionError(
-            f"property 'activations': expected one of {', '.join(ACTIVATIONS_KEPT)}, found '{kept[:40]}'"
-        )
+        known = ", ".join(ACTIVATIONS_KEPT)
+        raise SessionError(f"property 'activations': expected one of {known}, found '{kept[:40]}'")
     info = DriveInfo(
         robot=_read_value(properties, "robot", str),
         seed=int(seed),

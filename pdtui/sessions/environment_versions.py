@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -37,25 +37,28 @@ def collect_versions() -> dict[str, str]:
     return found
 
 
-def list_version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
+def version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
+    """Yield name, version there and version here of whatever differs; a missing version is ``absent``."""
+    for name in dict.fromkeys((*a, *b)):
+        if a.get(name) != b.get(name):
+            yield name, a.get(name, "absent"), b.get(name, "absent")
+
+
+def list_version_differences(
+    a: Mapping[str, str], b: Mapping[str, str], *, numeric: bool = False
+) -> list[str]:
     """List the differences between two environments, such as ``numpy: 2.2.0 there, 2.3.1 here``.
 
     Args:
         a: the versions there, from a session.
         b: the versions here.
+        numeric: whether to list only what can affect the numbers of a run.
     """
     return [
-        f"{name}: {a.get(name, 'absent')} there, {b.get(name, 'absent')} here"
-        for name in dict.fromkeys((*a, *b))
-        if a.get(name) != b.get(name)
+        f"{name}: {there} there, {here} here"
+        for name, there, here in version_differences(a, b)
+        if not (numeric and name in COMPUTES_NOTHING)
     ]
-
-
-def list_numeric_version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
-    """List those of the differences that can affect the numbers of a run."""
-    return list_version_differences(
-        *({name: value for name, value in one.items() if name not in COMPUTES_NOTHING} for one in (a, b))
-    )
 
 
 def _cpu_name() -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats, wrap_angles
 from pdtui.core.errors import SessionError
 from pdtui.core.events import Event, describe_event
+from pdtui.sessions.environment_versions import version_differences
 from pdtui.sessions.session_reader import Session
 
 
@@ -91,23 +92,15 @@ def summarise_deviations(
     largest, worst = change.max(axis=0), change.argmax(axis=0)
     mean = change.mean(axis=0)
     order = np.lexsort((-largest / spread, -change[0] / spread))
-    return tuple(
-        AttributeDeviation(
-            attributes[j].name,
-            attributes[j].unit,
-            float(change[0, j]),
-            float(largest[j]),
-            float(mean[j]),
-            first + int(worst[j]),
-        )
-        for j in order
-        if largest[j] > 0
-    )
+    found = []
+    for j in order[largest[order] > 0]:
+        numbers = float(change[0, j]), float(largest[j]), float(mean[j]), first + int(worst[j])
+        found.append(AttributeDeviation(attributes[j].name, attributes[j].unit, *numbers))
+    return tuple(found)
 
 
 def measure_spread(values: Floats) -> Floats:
-    """Return the standard deviation of each attribute over a session, 1 if it is nearly constant; shape
-    (J,)."""
+    """Return the standard deviation of each attribute, shape (J,), over a session; 1 if nearly constant."""
     if not len(values):
         return np.ones(values.shape[1])
     with np.errstate(invalid="ignore"):
@@ -122,17 +115,15 @@ def compare_sessions(a: Session, b: Session) -> SessionComparison:
         SessionError: the sessions have different attributes.
     """
     if a.info.attributes != b.info.attributes:
-        raise SessionError(
-            f"{a.path} and {b.path}: cannot be compared: their robots have different attributes"
-        )
+        why = "cannot be compared: their robots have different attributes"
+        raise SessionError(f"{a.path} and {b.path}: {why}")
     steps = min(a.steps, b.steps)
     differing: NDArray[np.intp] = np.flatnonzero(a.digests[:steps] != b.digests[:steps])
     first = int(differing[0]) if differing.size else None
     found: tuple[AttributeDeviation, ...] = ()
     if first is not None:
-        change = attribute_differences(
-            a.attributes[first:steps], b.attributes[first:steps], a.info.attributes
-        )
+        values_a, values_b = a.attributes[first:steps], b.attributes[first:steps]
+        change = attribute_differences(values_a, values_b, a.info.attributes)
         found = summarise_deviations(change, a.info.attributes, first, measure_spread(a.attributes))
     return SessionComparison(
         steps, (a.steps, b.steps), first, found, _first_event(a.events, b.events, steps), _circumstances(a, b)
@@ -159,10 +150,6 @@ def _circumstances(a: Session, b: Session) -> tuple[str, ...]:
     ]
     if a.info.map_text != b.info.map_text:
         lines.append("map: not the same text")
-    versions = dict.fromkeys((*a.versions, *b.versions))
-    lines += [
-        f"{name}: {a.versions.get(name, 'absent')} and {b.versions.get(name, 'absent')}"
-        for name in versions
-        if a.versions.get(name) != b.versions.get(name)
-    ]
+    different = version_differences(a.versions, b.versions)
+    lines += [f"{name}: {there} and {here}" for name, there, here in different]
     return tuple(lines)

@@ -25,8 +25,7 @@ _WRITERS: dict[str, Callable[[pa.Table, str], None]] = {
 
 
 def export_stream(path: Path, stream: str, output: Path, *, overwrite: bool = False) -> int:
-    """Write one stream of a session as a table with the columns ``step``, ``time`` (s) and those of the
-    stream.
+    """Write one stream of a session as a table with the columns ``step``, ``time`` (s) and its own.
 
     Args:
         path: the session.
@@ -107,12 +106,8 @@ def _stimulation(session: Session) -> Columns:
 
 def _events(session: Session) -> Columns:
     columns: Columns = {"step": [event.step for event in session.events]}
-    for field, kind in (
-        ("kind", pa.utf8()),
-        ("name", pa.utf8()),
-        ("value", pa.float64()),
-        ("key", pa.utf8()),
-    ):
+    kinds = {"kind": pa.utf8(), "name": pa.utf8(), "value": pa.float64(), "key": pa.utf8()}
+    for field, kind in kinds.items():
         columns[field] = pa.array([getattr(event, field) for event in session.events], kind)
     return columns
 
@@ -125,16 +120,10 @@ STREAMS: dict[str, tuple[str, Callable[[Session], Columns]]] = {
     "attributes": ("kinematic attributes after each step", _attributes),
     "actions": ("what the policy commanded", _actions),
     "gains": ("reward, cost, episode, and why it ended", _rewards),
-    "digests": (
-        "digest of the simulator's state after each step",
-        lambda session: {"digest": session.digests},
-    ),
+    "digests": ("digest of the simulator's state after each step", lambda one: {"digest": one.digests}),
     "activations": ("output of every hidden unit, as the next layer received it", _activations),
     "behaviors": ("active behaviors with their controllers, one row each", _behaviors),
-    "stimulation": (
-        "stimulated units with their natural and overwritten outputs, one row each",
-        _stimulation,
-    ),
+    "stimulation": ("stimulated units, with natural and overwritten outputs, one row each", _stimulation),
     "events": ("everything that changed the run, one row per event", _events),
 }
 """The streams by name: what each contains, and the function that returns its columns."""

@@ -18,14 +18,7 @@ from pdtui.sessions.drive_info import decode_drive_info
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_header import SessionHeader, count_steps, decode_header
-from pdtui.sessions.session_schema import (
-    ACTIVE_FIELDS,
-    DIGEST_EPISODE,
-    DRIVE,
-    INFO,
-    OVERWRITE_FIELDS,
-    REWARD_COST_ACTION,
-)
+from pdtui.sessions.session_schema import ACTIVE_FIELDS, DIGEST_EPISODE, DRIVE, INFO, REWARD_COST_ACTION
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,9 +102,8 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
         drive = file.table(DRIVE)
         count_steps(drive)
         if info.activations == "off":
-            raise SessionError(
-                "the activations were not recorded (--record-activations off); a replay computes them"
-            )
+            how = "(--record-activations off); a replay computes them"
+            raise SessionError(f"the activations were not recorded {how}")
         kind = np.float16 if info.activations == "half" else np.float32
         return drive.read_matrix("activations", kind, sum(info.layers)).astype(np.float32, copy=False)
     except SessionError as error:
@@ -125,9 +117,8 @@ def _active(drive: EntityTable) -> tuple[tuple[ActiveBehavior, ...], ...]:
     for names, flat in zip(drive.read_lists("behaviors", str, optional=True), states, strict=True):
         if len(flat) != len(names) * width:
             raise SessionError(f"stream 'active': expected {width} numbers per behavior")
-        steps.append(
-            tuple(_behavior(name, flat[i * width : (i + 1) * width]) for i, name in enumerate(names))
-        )
+        parts = [flat[start : start + width] for start in range(0, len(flat), width)]
+        steps.append(tuple(map(_behavior, names, parts)))
     return tuple(steps)
 
 
@@ -140,11 +131,10 @@ def _behavior(name: str, values: Sequence[float]) -> ActiveBehavior:
 def _stimulations(
     drive: EntityTable, units: int
 ) -> tuple[tuple[Stimulation, ...], tuple[tuple[float, ...], ...]]:
-    width = len(OVERWRITE_FIELDS)
     stimulations, natural = [], []
     for flat in drive.read_lists("stimulation", float, optional=True):
-        chosen, values, would = flat[::width], flat[1::width], flat[2::width]
-        if len(flat) % width or not all(unit.is_integer() and 0 <= unit < units for unit in chosen):
+        chosen, values, would = flat[::3], flat[1::3], flat[2::3]
+        if len(flat) % 3 or not all(unit.is_integer() and 0 <= unit < units for unit in chosen):
             raise SessionError(f"stream 'stimulation': expected units 0..{units - 1} with two values each")
         stimulations.append(Stimulation(tuple(int(unit) for unit in chosen), tuple(values)))
         natural.append(tuple(would))

@@ -82,9 +82,8 @@ def repair_session(path: Path, output: Path) -> SessionHeader:
         contents = RrdContents(partial, only=(DIGEST_EPISODE,))
         repaired = decode_header(contents, output, count_steps(contents.table(DRIVE)))
         if repaired.steps != condition.steps:
-            raise SessionError(
-                f"{path}: expected {condition.steps} steps in the repaired session, found {repaired.steps}"
-            )
+            found = f"found {repaired.steps} in the repaired session"
+            raise SessionError(f"{path}: expected {condition.steps} steps, {found}")
         partial.chmod(path.stat().st_mode & 0o777)
     return repaired
 
@@ -108,10 +107,8 @@ def _read_kept_chunks(path: Path, steps: int) -> Iterator[rerun.chunk.Chunk]:
     stream = iter(ChunkStream(path))
     while True:
         try:
-            chunk = next(stream, None)
-        except SessionError:  # the rest is left out
-            return
-        if chunk is None:
+            chunk = next(stream)
+        except (SessionError, StopIteration):  # what follows damage is left out
             return
         batch = chunk.batch
         if STEP in chunk.timelines:
@@ -120,7 +117,6 @@ def _read_kept_chunks(path: Path, steps: int) -> Iterator[rerun.chunk.Chunk]:
             try:
                 ready = rerun.chunk.Chunk.from_record_batch(batch)
             except (ValueError, RuntimeError, pa.ArrowException) as error:
-                raise SessionError(
-                    f"{path}: rows of '{chunk.entity[:80]}' cannot be rescued: {error}"
-                ) from error
+                rows = f"rows of '{chunk.entity[:80]}'"
+                raise SessionError(f"{path}: {rows} cannot be rescued: {error}") from error
             yield from ready

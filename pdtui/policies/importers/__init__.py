@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from pdtui.core.errors import PolicyError
@@ -54,7 +55,7 @@ def import_network(
     try:
         found = _find(read_bounded(path), source, import_options)
         if normaliser is not None and import_options.normaliser != NO_NORMALISER:
-            found = found.with_statistics(read_statistics(normaliser, found.layers[0].shape[1]))
+            found = replace(found, statistics=read_statistics(normaliser, found.layers[0].shape[1]))
         return assemble_network(found, import_options, spaces, source)
     except PolicyError as error:
         text = str(error)

@@ -8,6 +8,7 @@ PPO's actor is ``actor_mean.0 …`` with ``actor_logstd``, or ``actor.0 …`` wi
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.partial_policy import (
@@ -41,22 +42,13 @@ def import_cleanrl(tensors: Tensors) -> PartialPolicy | None:
 def _off_policy(named: Tensors, last: str) -> PartialPolicy:
     numbers = sorted(int(match[1]) for name in named if (match := re.fullmatch(r"fc(\d{1,4})\.weight", name)))
     hidden = [read_linear_layer(named, f"fc{number}") for number in numbers]
-    low, high = _bounds(named)
     if last == "fc_mu":
         layers = check_layer_chain([*hidden, read_linear_layer(named, last)], "fc")
-        return PartialPolicy("CleanRL TD3 or DDPG", layers, squash="tanh", low=low, high=high)
+        return PartialPolicy("CleanRL TD3 or DDPG", layers, "action", "", "tanh", *_bounds(named))
     head = join_mean_and_deviation(read_linear_layer(named, last), read_linear_layer(named, "fc_logstd"))
-    return PartialPolicy(
-        "CleanRL SAC",
-        check_layer_chain([*hidden, head], "fc"),
-        "gaussian pair",
-        squash="tanh",
-        low=low,
-        high=high,
-        log_std_low=-5.0,
-        log_std_high=2.0,
-        log_std_rule="tanh",
-    )
+    layers = check_layer_chain([*hidden, head], "fc")
+    policy = PartialPolicy("CleanRL SAC", layers, "gaussian pair", "", "tanh", *_bounds(named))
+    return replace(policy, log_std_low=-5.0, log_std_high=2.0, log_std_rule="tanh")
 
 
 def _bounds(named: Tensors) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -64,8 +56,6 @@ def _bounds(named: Tensors) -> tuple[tuple[float, ...], tuple[float, ...]]:
         return (), ()
     scale, bias = named["action_scale"].reshape(-1), named["action_bias"].reshape(-1)
     if scale.shape != bias.shape:
-        raise PolicyError(
-            f"tensor 'action_scale': expected the shape {tuple(bias.shape)} of 'action_bias', found "
-            f"{tuple(scale.shape)}"
-        )
+        expected = f"expected the shape {tuple(bias.shape)} of 'action_bias'"
+        raise PolicyError(f"tensor 'action_scale': {expected}, found {tuple(scale.shape)}")
     return tuple((bias - scale).tolist()), tuple((bias + scale).tolist())

@@ -40,18 +40,16 @@ def read_statistics(path: Path, observations: int) -> ObservationStatistics:
         raise PolicyError(
             f"{path}: expected 'mean' and 'var' of the observation, found {', '.join(tensors) or 'nothing'}"
         )
-    mean, spread = tensors["mean"].double(), tensors.get("var", tensors.get("std"))
-    assert spread is not None
-    for name, tensor in (("mean", mean), ("var" if "var" in tensors else "std", spread)):
+    spread_name = "var" if "var" in tensors else "std"
+    mean, spread = tensors["mean"].double(), tensors[spread_name].double()
+    for name, tensor in (("mean", mean), (spread_name, spread)):
         if tuple(tensor.shape) != (observations,):
-            raise PolicyError(
-                f"{path}: '{name}': expected shape ({observations},) as the policy observes, found "
-                f"{tuple(tensor.shape)}"
-            )
+            expected = f"shape ({observations},) as the policy observes"
+            raise PolicyError(f"{path}: '{name}': expected {expected}, found {tuple(tensor.shape)}")
         if not bool(torch.isfinite(tensor).all()) or (name != "mean" and bool((tensor < 0).any())):
             raise PolicyError(f"{path}: '{name}': expected finite numbers and no negative variance")
     clip, epsilon = _number(tensors, "clip_obs", 0.0, path), _number(tensors, "epsilon", _EPSILON, path)
-    std = torch.sqrt(spread.double() + epsilon) if "var" in tensors else spread.double()
+    std = torch.sqrt(spread + epsilon) if "var" in tensors else spread
     return ObservationStatistics(mean.float(), std.float(), clip)
 
 

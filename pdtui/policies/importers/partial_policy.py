@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
@@ -78,10 +78,6 @@ class PartialPolicy:
     log_std_rule: Literal["clip", "tanh"] = "clip"
     mean_limit: float = 0.0
     statistics: ObservationStatistics | None = None
-
-    def with_statistics(self, statistics: ObservationStatistics | None) -> PartialPolicy:
-        """Return the policy with these statistics instead of its own; None keeps its own."""
-        return self if statistics is None else replace(self, statistics=statistics)
 
 
 def read_linear_layer(tensors: Tensors, prefix: str) -> LinearLayer:

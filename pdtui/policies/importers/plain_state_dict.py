@@ -60,10 +60,9 @@ def _chains(tensors: Tensors) -> list[tuple[tuple[LinearLayer, ...], list[str]]]
 
 
 def _ordered(tensors: Tensors) -> list[str]:
-    weights = [name.removesuffix(".weight") for name, tensor in tensors.items() if name.endswith(".weight")]
-    weights = [name for name in weights if tensors[f"{name}.weight"].ndim == 2]
+    weights = [name for name, tensor in tensors.items() if name.endswith(".weight") and tensor.ndim == 2]
     containers: dict[str, list[tuple[int, str]]] = {}
-    for position, name in enumerate(weights):
+    for position, name in enumerate(name.removesuffix(".weight") for name in weights):
         match = _NUMBERED.fullmatch(name)
         container, number = (match[1], int(match[2])) if match else (name, position)
         containers.setdefault(container, []).append((number, name))
@@ -72,11 +71,7 @@ def _ordered(tensors: Tensors) -> list[str]:
 
 def _log_std(tensors: Tensors, layers: tuple[LinearLayer, ...]) -> torch.Tensor | None:
     actions = layers[-1].shape[0]
-    return next(
-        (
-            tensor
-            for name, tensor in tensors.items()
-            if _LOG_STD.fullmatch(name) and tensor.numel() == actions and tensor.is_floating_point()
-        ),
-        None,
-    )
+    for name, tensor in tensors.items():
+        if _LOG_STD.fullmatch(name) and tensor.numel() == actions and tensor.is_floating_point():
+            return tensor
+    return None

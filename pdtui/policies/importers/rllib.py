@@ -8,6 +8,7 @@ logits of discrete actions.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.partial_policy import (
@@ -27,37 +28,23 @@ def import_rllib(tensors: Tensors) -> PartialPolicy | None:
 
     A policy and its target network have the same layers; the first in the file is the policy.
     """
-    for pattern, output, squash, log_std_range in (
-        (_SAC, "gaussian pair", "tanh", (-5.0, 2.0)),
-        (_PPO, "unknown pair", "", (-20.0, 20.0)),
-    ):
-        layers = _actor(tensors, pattern)
-        if layers:
-            low, high = log_std_range
-            name = "RLlib SAC" if output == "gaussian pair" else "RLlib PPO"
-            return PartialPolicy(
-                name,
-                layers,
-                "gaussian pair" if output == "gaussian pair" else "unknown pair",
-                squash=squash,
-                log_std_low=low,
-                log_std_high=high,
-            )
-    return None
+    if layers := _actor(tensors, _SAC):
+        policy = PartialPolicy("RLlib SAC", layers, "gaussian pair", squash="tanh")
+        return replace(policy, log_std_low=-5.0, log_std_high=2.0)
+    layers = _actor(tensors, _PPO)
+    return PartialPolicy("RLlib PPO", layers, "unknown pair") if layers else None
 
 
 def _actor(tensors: Tensors, pattern: re.Pattern[str]) -> tuple[LinearLayer, ...]:
     layers: dict[str, LinearLayer] = {}
     scope = None
     for name in tensors:
-        match = pattern.fullmatch(name)
-        if match is None:
-            continue
-        prefix = name.removesuffix("/kernel")
-        here = prefix.rpartition("/")[0]
-        scope = here if scope is None else scope
-        if here == scope:
-            layers[match[3]] = _transposed(tensors, prefix)
+        if match := pattern.fullmatch(name):
+            prefix = name.removesuffix("/kernel")
+            here = prefix.rpartition("/")[0]
+            scope = here if scope is None else scope
+            if here == scope:
+                layers[match[3]] = _transposed(tensors, prefix)
     if "out" not in layers:
         return ()
     order = sorted((key for key in layers if key != "out"), key=int)

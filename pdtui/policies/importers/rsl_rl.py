@@ -7,6 +7,9 @@ Three generations of names are understood: ``actor.0.weight`` with ``std`` or ``
 
 from __future__ import annotations
 
+import re
+from itertools import chain
+
 import torch
 
 from pdtui.policies.importers.partial_policy import ObservationStatistics, PartialPolicy, read_layer_sequence
@@ -26,33 +29,19 @@ def import_rsl_rl(tensors: Tensors) -> PartialPolicy | None:
     log_std = _log_std(named)
     if prefix is None or log_std is None:
         return None
-    return PartialPolicy(
-        "rsl_rl",
-        read_layer_sequence(named, prefix),
-        squash="none",
-        log_std=log_std,
-        statistics=_statistics(named),
-    )
+    layers = read_layer_sequence(named, prefix)
+    return PartialPolicy("rsl_rl", layers, squash="none", log_std=log_std, statistics=_statistics(named))
 
 
 def _unwrapped(tensors: Tensors) -> Tensors:
     """Return the tensors without the prefixes that a checkpoint puts before the actor's names."""
-    named: Tensors = {}
-    for name, tensor in tensors.items():
-        for wrapper in ("model_state_dict.", "actor_state_dict."):
-            if name.startswith(wrapper):
-                named[name.removeprefix(wrapper)] = tensor
-                break
-        else:
-            named[name] = tensor
-    return named
+    return {re.sub(r"^(model|actor)_state_dict\.", "", name): tensor for name, tensor in tensors.items()}
 
 
 def _log_std(named: Tensors) -> torch.Tensor | None:
-    for name in _LOG_STDS:
-        if name in named:
-            return named[name]
-    return next((torch.log(named[name].clamp(min=1e-6)) for name in _STDS if name in named), None)
+    stated = (named[name] for name in _LOG_STDS if name in named)
+    derived = (torch.log(named[name].clamp(min=1e-6)) for name in _STDS if name in named)
+    return next(chain(stated, derived), None)
 
 
 def _statistics(named: Tensors) -> ObservationStatistics | None:

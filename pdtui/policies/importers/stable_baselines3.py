@@ -16,7 +16,6 @@ from torch import nn
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.partial_policy import (
-    LinearLayer,
     PartialPolicy,
     check_layer_chain,
     describe_tensors,
@@ -29,6 +28,7 @@ from pdtui.policies.importers.zip_archive import ZipArchive
 from pdtui.policies.weights.import_options import NO_NORMALISER, ImportOptions
 from pdtui.policies.weights.policy_network import ACTIVATIONS
 
+_ORIGIN = "Stable-Baselines3 "
 _MAX_DATA = 64 << 20
 _CLASS = re.compile(r"<class '([\w.]+)'>")
 _FUNCTION = re.compile(r"<function ([\w.<>]+)\.__init__ at")
@@ -82,19 +82,16 @@ class _Reader:
         if "actor.latent_pi.0.weight" in self._tensors:
             return self._sac()
         if "actor.mu.0.weight" in self._tensors:
-            name = "DDPG" if str(self._kwargs.get("n_critics")) == "1" else "TD3"
-            layers = read_layer_sequence(self._tensors, "actor.mu")
-            low, high = self._bounds()
-            return PartialPolicy(
-                self._origin(name), layers, "action", self._activation("relu"), "tanh", low, high
-            )
+            origin = _ORIGIN + ("DDPG" if str(self._kwargs.get("n_critics")) == "1" else "TD3")
+            layers, activation = read_layer_sequence(self._tensors, "actor.mu"), self._activation("relu")
+            return PartialPolicy(origin, layers, "action", activation, "tanh", *self._bounds())
         raise PolicyError(
             f"{self._source}: expected an actor of PPO, A2C, SAC, TD3 or DDPG, found "
             f"{_policy_class(self._data)} with tensors {describe_tensors(self._tensors)}"
         )
 
     def _actor_critic(self) -> PartialPolicy:
-        origin = self._origin("PPO" if "clip_range" in self._data else "A2C")
+        origin = _ORIGIN + ("PPO" if "clip_range" in self._data else "A2C")
         hidden = read_layer_sequence(self._tensors, "mlp_extractor.shared_net") + read_layer_sequence(
             self._tensors, "mlp_extractor.policy_net"
         )
@@ -108,39 +105,27 @@ class _Reader:
         log_std = self._tensors.get("log_std")
         if log_std is None:
             return PartialPolicy(origin, layers, "categorical", activation)
-        low, high = self._bounds()
         # State-dependent exploration has a matrix here, whose noise is no Gaussian of one step.
         drawn = log_std if log_std.ndim == 1 else None
         squashed = log_std.ndim == 2 and self._kwargs.get("squash_output") in (True, "True")
         squash = "tanh" if squashed else "none" if self._unbounded() else "clip"
-        return PartialPolicy(origin, layers, "action", activation, squash, low, high, drawn)
+        return PartialPolicy(origin, layers, "action", activation, squash, *self._bounds(), drawn)
 
     def _sac(self) -> PartialPolicy:
         hidden = read_layer_sequence(self._tensors, "actor.latent_pi")
-        activation, (low, high) = self._activation("relu"), self._bounds()
-        origin = self._origin("SAC")
+        rest = self._activation("relu"), "tanh", *self._bounds()
         if "actor.log_std.weight" in self._tensors:
             head = join_mean_and_deviation(
                 read_linear_layer(self._tensors, "actor.mu"),
                 read_linear_layer(self._tensors, "actor.log_std"),
             )
             layers = check_layer_chain([*hidden, head], "actor")
-            return PartialPolicy(
-                origin,
-                layers,
-                "gaussian pair",
-                activation,
-                "tanh",
-                low,
-                high,
-                log_std_low=-20.0,
-                log_std_high=2.0,
-            )
+            return PartialPolicy(_ORIGIN + "SAC", layers, "gaussian pair", *rest, log_std_high=2.0)
         limited = "actor.mu.0.weight" in self._tensors
-        mean: LinearLayer = read_linear_layer(self._tensors, "actor.mu.0" if limited else "actor.mu")
+        mean = read_linear_layer(self._tensors, "actor.mu.0" if limited else "actor.mu")
         limit = float(self._kwargs.get("clip_mean", 2.0)) if limited else 0.0
         layers = check_layer_chain([*hidden, mean], "actor")
-        return PartialPolicy(origin, layers, "action", activation, "tanh", low, high, mean_limit=limit)
+        return PartialPolicy(_ORIGIN + "SAC", layers, "action", *rest, mean_limit=limit)
 
     def _activation(self, default: str) -> str:
         """Return what `policy_kwargs` says, else the default of Stable-Baselines3's own policy classes."""
@@ -160,9 +145,6 @@ class _Reader:
 
     def _unbounded(self) -> bool:
         return any("inf" in str(self._actions.get(side, "")) for side in ("low", "high"))
-
-    def _origin(self, algorithm: str) -> str:
-        return f"Stable-Baselines3 {algorithm}"
 
 
 def _policy_class(data: dict[str, Any]) -> str:
@@ -198,15 +180,14 @@ def _check_flat(tensors: Tensors, data: dict[str, Any], source: str) -> None:
 def _parts(data: dict[str, Any], name: str) -> dict[str, Any]:
     """Return the readable parts of a field, without its pickle."""
     value = data.get(name)
-    if not isinstance(value, dict):
-        return {}
-    return {key: part for key, part in value.items() if key != ":serialized:"}
+    parts = value.items() if isinstance(value, dict) else ()
+    return {key: part for key, part in parts if key != ":serialized:"}
 
 
 def _numbers(text: Any) -> tuple[float, ...]:
-    words = str(text if text is not None else "").replace("[", " ").replace("]", " ").split()
+    words = str("" if text is None else text).replace("[", " ").replace("]", " ").split()
     try:
-        numbers = tuple(float(word) for word in words)
+        numbers = tuple(map(float, words))
     except ValueError:
         return ()
     return numbers if all(map(math.isfinite, numbers)) else ()

@@ -22,6 +22,14 @@ from safetensors.torch import load as load_safetensors
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.zip_archive import ZipArchive
 
+Tensors = dict[str, torch.Tensor]
+_MAX_NESTING = 6
+"""Levels of containers that are searched for tensors."""
+_MAX_PICKLE = 64 << 20
+"""Bytes of the pickle with the names of tensors."""
+_MAX_HEADER = 10_000
+"""Bytes of an array's header."""
+
 
 class FileKind(Enum):
     """Kinds of files, with their descriptions for messages."""
@@ -37,10 +45,10 @@ class FileKind(Enum):
 
 
 def file_kind_of(content: bytes) -> FileKind:
-    """Return the kind of a file with this content."""
+    """Return the kind of a file, told by its first bytes and not by its name."""
     if not content:
         return FileKind.EMPTY
-    if content.startswith(b"PK\x03\x04") or content.startswith(b"PK\x05\x06"):
+    if content.startswith((b"PK\x03\x04", b"PK\x05\x06")):
         return FileKind.ZIP
     if content.startswith(b"\x89HDF"):
         return FileKind.HDF5
@@ -56,15 +64,6 @@ def file_kind_of(content: bytes) -> FileKind:
     if content[:1] == b"\x08" and b"onnx" in content[:200].lower():
         return FileKind.ONNX
     return FileKind.UNKNOWN
-
-
-Tensors = dict[str, torch.Tensor]
-_MAX_NESTING = 6
-"""Levels of containers that are searched for tensors."""
-_MAX_PICKLE = 64 << 20
-"""Bytes of the pickle with the names of tensors."""
-_MAX_HEADER = 10_000
-"""Bytes of an array's header."""
 
 
 def from_npz(archive: ZipArchive) -> Tensors:

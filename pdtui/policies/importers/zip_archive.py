@@ -8,10 +8,12 @@ import zlib
 from pathlib import Path
 
 from pdtui.core.errors import PolicyError
+from pdtui.core.untrusted_file import read_bounded_file
 
 MAX_BYTES = 1 << 30
 _MAX_ENTRIES = 20_000
 _SHOWN = 8
+_DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError, OSError)
 
 
 class ZipArchive:
@@ -45,14 +47,7 @@ class ZipArchive:
         try:
             with self._zip.open(name) as stream:
                 content = stream.read(size + 1)
-        except (
-            zipfile.BadZipFile,
-            zlib.error,
-            EOFError,
-            RuntimeError,
-            NotImplementedError,
-            OSError,
-        ) as error:
+        except _DAMAGED as error:
             raise PolicyError(f"{self.source}: entry '{name}' cannot be unpacked: {error}") from error
         if len(content) != size:
             raise PolicyError(
@@ -75,11 +70,6 @@ def shorten(names: tuple[str, ...] | list[str]) -> str:
 def read_bounded(path: Path) -> bytes:
     """Return the content of a file; one that cannot be read or is too large is a `PolicyError`."""
     try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise PolicyError(
-                f"{path}: expected a file of at most {MAX_BYTES >> 20} MiB, found {size >> 20} MiB"
-            )
-        return path.read_bytes()
+        return read_bounded_file(path, MAX_BYTES)
     except OSError as error:
         raise PolicyError(f"{path}: cannot be read: {error.strerror}") from error

@@ -14,6 +14,7 @@ from pdtui.core.errors import PolicyError
 Storage = Callable[[str, str, int], torch.Tensor]
 _VALUES = ("BINUNICODE", "SHORT_BINUNICODE", "BININT", "BININT1", "BININT2", "LONG1", "LONG4", "BINFLOAT")
 _CONSTANTS = {"NEWTRUE": True, "NEWFALSE": False, "NONE": None}
+_EMPTY: dict[str, Callable[[], Any]] = {"EMPTY_TUPLE": tuple, "EMPTY_LIST": list, "EMPTY_DICT": dict}
 _LISTS = ("build_intlist", "build_doublelist", "build_boollist", "build_tensorlist")
 _MARK = object()
 
@@ -50,7 +51,7 @@ def read_pickle(content: bytes, storage: Storage, source: str) -> Any:
         for opcode, argument, _ in pickletools.genops(content):
             if opcode.name == "STOP":
                 return stack.pop()
-            _step(opcode.name, argument, stack, memo, storage)
+            _run_opcode(opcode.name, argument, stack, memo, storage)
     except PolicyError as error:
         raise PolicyError(f"{source}: {error}") from error
     except (ValueError, IndexError, KeyError, TypeError, AttributeError, RuntimeError) as error:
@@ -58,35 +59,29 @@ def read_pickle(content: bytes, storage: Storage, source: str) -> Any:
     raise PolicyError(f"{source}: damaged: it does not end")
 
 
-def _step(name: str, argument: Any, stack: list[Any], memo: dict[int, Any], storage: Storage) -> None:
-    if name in _VALUES:
-        stack.append(argument)
-    elif name in _CONSTANTS:
-        stack.append(_CONSTANTS[name])
-    elif name in ("PROTO", "FRAME"):
-        pass
-    elif name in ("BINPUT", "LONG_BINPUT"):
-        memo[argument] = stack[-1]
-    elif name in ("BINGET", "LONG_BINGET"):
-        stack.append(memo[argument])
-    elif name == "GLOBAL":
-        stack.append(PickledName(argument.replace(" ", ".")))
-    elif name == "BINPERSID":
-        stack.append(_storage(stack.pop(), storage))
-    else:
-        _combine(name, stack)
-
-
-def _combine(name: str, stack: list[Any]) -> None:  # noqa: PLR0912 - one case per opcode
+def _run_opcode(  # noqa: PLR0912 - one case per opcode
+    name: str, argument: Any, stack: list[Any], memo: dict[int, Any], storage: Storage
+) -> None:
     match name:
+        case _ if name in _VALUES:
+            stack.append(argument)
+        case _ if name in _CONSTANTS:
+            stack.append(_CONSTANTS[name])
+        case "PROTO" | "FRAME":
+            pass
+        case "BINPUT" | "LONG_BINPUT":
+            memo[argument] = stack[-1]
+        case "BINGET" | "LONG_BINGET":
+            stack.append(memo[argument])
+        case "GLOBAL":
+            stack.append(PickledName(argument.replace(" ", ".")))
+        case "BINPERSID":
+            _, kind, key, _, count = stack.pop()
+            stack.append(storage(str(key), kind.text, int(count)))
         case "MARK":
             stack.append(_MARK)
-        case "EMPTY_TUPLE":
-            stack.append(())
-        case "EMPTY_LIST":
-            stack.append([])
-        case "EMPTY_DICT":
-            stack.append({})
+        case _ if name in _EMPTY:
+            stack.append(_EMPTY[name]())
         case "TUPLE":
             stack.append(tuple(_since_mark(stack)))
         case "TUPLE1" | "TUPLE2" | "TUPLE3":
@@ -114,7 +109,7 @@ def _combine(name: str, stack: list[Any]) -> None:  # noqa: PLR0912 - one case p
             stack[-1].attributes.update(state)
         case "REDUCE":
             arguments = stack.pop()
-            stack.append(_reduce(stack.pop(), arguments))
+            stack.append(_call_named(stack.pop(), arguments))
         case _:
             raise PolicyError(f"holds pickle's '{name}', which no TorchScript archive needs")
 
@@ -126,12 +121,7 @@ def _since_mark(stack: list[Any]) -> list[Any]:
     return values[::-1]
 
 
-def _storage(identity: Any, storage: Storage) -> torch.Tensor:
-    _, kind, key, _, count = identity
-    return storage(str(key), kind.text, int(count))
-
-
-def _reduce(called: Any, arguments: tuple[Any, ...]) -> Any:
+def _call_named(called: Any, arguments: tuple[Any, ...]) -> Any:
     name = called.text if isinstance(called, PickledName) else "an object"
     if name == "torch._utils._rebuild_tensor_v2":
         flat, offset, shape, stride = arguments[:4]

@@ -14,14 +14,8 @@ from pdtui.policies.runtime.fast_mlp import ACTIVATION_TYPES
 from pdtui.policies.torchscript.pickle_reader import PickledObject
 from pdtui.policies.torchscript.torchscript_operators import call_operator
 
-_UNITS = {kind.__name__ for kind in ACTIVATION_TYPES} | {
-    "LSTM",
-    "GRU",
-    "RNN",
-    "LSTMCell",
-    "GRUCell",
-    "RNNCell",
-}
+_RECURRENT = ("LSTM", "GRU", "RNN", "LSTMCell", "GRUCell", "RNNCell")
+_UNITS = {*_RECURRENT, *(kind.__name__ for kind in ACTIVATION_TYPES)}
 _CASTS: dict[str, Any] = {"int": int, "float": float, "bool": bool}
 _MOST_STATEMENTS = 20_000
 """Statements per forward pass, which bounds recursion and time."""
@@ -68,7 +62,7 @@ class TorchScriptProgram:
             self.statements = 0
         self._depth += 1
         try:
-            return _Frame(self, values).run(function.body)
+            return _StackFrame(self, values).run(function.body)
         finally:
             self._depth -= 1
 
@@ -77,14 +71,14 @@ class ScriptedModule(nn.Module):
     """A submodule of the archive, whose methods are interpreted."""
 
     def __init__(
-        self, thing: PickledObject, program: TorchScriptProgram, built: dict[int, ScriptedModule]
+        self, pickled: PickledObject, program: TorchScriptProgram, built: dict[int, ScriptedModule]
     ) -> None:
         super().__init__()
-        built[id(thing)] = self
-        self.kind, self._program = thing.kind, program
-        self._plain: dict[str, Any] = dict(program.fields.get(thing.kind, {}))
-        self.is_activation = thing.kind.rpartition(".")[2] in _UNITS
-        for name, value in thing.attributes.items():
+        built[id(pickled)] = self
+        self.kind, self._program = pickled.kind, program
+        self._plain: dict[str, Any] = dict(program.fields.get(pickled.kind, {}))
+        self.is_activation = pickled.kind.rpartition(".")[2] in _UNITS
+        for name, value in pickled.attributes.items():
             if isinstance(value, PickledObject):
                 known = built.get(id(value))
                 self.add_module(name, known or ScriptedModule(value, program, built))
@@ -120,7 +114,7 @@ class _Return(Exception):  # noqa: N818 - it carries a value
     pass
 
 
-class _Frame:
+class _StackFrame:
     def __init__(self, program: TorchScriptProgram, values: dict[str, Any]) -> None:
         self._program, self._values = program, values
 
@@ -150,9 +144,8 @@ class _Frame:
                 case ast.Pass():
                     pass
                 case _:
-                    raise PolicyError(
-                        f"its code has a statement '{type(node).__name__}', which pdtui does not run"
-                    )
+                    kind = type(node).__name__
+                    raise PolicyError(f"its code has a statement '{kind}', which pdtui does not run")
 
     def _assign(self, target: ast.expr, value: Any) -> None:
         if isinstance(target, ast.Tuple | ast.List):
@@ -222,9 +215,8 @@ class _Frame:
                 if method.partition("__")[0] == "forward" and not keywords:
                     return owner(*arguments, method=method)
                 return owner.run(method, arguments, keywords)
-        raise PolicyError(
-            f"its code calls '{(name or ast.unparse(node.func))[:80]}', which pdtui does not do"
-        )
+        called = (name or ast.unparse(node.func))[:80]
+        raise PolicyError(f"its code calls '{called}', which pdtui does not do")
 
 
 def _primitive(name: str, arguments: list[Any]) -> Any:

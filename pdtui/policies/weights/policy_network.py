@@ -82,10 +82,8 @@ class NetworkSpec:
         squashed = self.head in ("squashed_gaussian", "tanh")
         allowed = {0} if self.head == "categorical" else {self.actions} if squashed else {0, self.actions}
         if len(self.action_low) not in allowed or len(self.action_high) != len(self.action_low):
-            raise PolicyError(
-                f"expected {max(allowed)} action bounds, "
-                f"got {len(self.action_low)} and {len(self.action_high)}"
-            )
+            low, high = len(self.action_low), len(self.action_high)
+            raise PolicyError(f"expected {max(allowed)} action bounds, got {low} and {high}")
 
     def check_values(self) -> None:
         """Check every field, since a file may hold anything.
@@ -180,10 +178,9 @@ class PolicyNetwork(nn.Module):
 
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
         """Return the head's output for observations of shape (..., observations)."""
-        x = observation
         for stage in self.stages():
-            x = stage(x)
-        return x
+            observation = stage(observation)
+        return observation
 
 
 def check_tensors(expected: Mapping[str, torch.Tensor], found: Mapping[str, torch.Tensor]) -> None:

@@ -44,8 +44,7 @@ def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
 def is_own_format(path: Path) -> bool:
     """Return whether `save_network` wrote the file: safetensors with pdtui's metadata."""
     try:
-        with open_regular_file(path):
-            pass  # refuses pipes, on which opening could wait forever
+        open_regular_file(path).close()  # refuses pipes, on which opening could wait forever
         with safe_open(str(path), framework="pt") as handle:
             return _KEY in (handle.metadata() or {})
     except (OSError, SafetensorError):
@@ -110,9 +109,8 @@ def _read(path: Path) -> tuple[dict[str, str], dict[str, torch.Tensor]]:
         with open_regular_file(path) as file:
             size = fstat(file.fileno()).st_size
         if size > MAX_BYTES:
-            raise PolicyError(
-                f"{path}: expected weights of at most {MAX_BYTES >> 20} MiB, found {size >> 20} MiB"
-            )
+            limit, found = f"{MAX_BYTES >> 20} MiB", f"{size >> 20} MiB"
+            raise PolicyError(f"{path}: expected weights of at most {limit}, found {found}")
         with safe_open(str(path), framework="pt") as handle:
             metadata: dict[str, str] = handle.metadata() or {}
             return metadata, {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118

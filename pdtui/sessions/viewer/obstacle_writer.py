@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.robot_data import NO_OBSTACLES
@@ -47,7 +48,7 @@ class ObstacleWriter:
         for step, obstacles in pending:
             self._write(step, obstacles.astype(np.float32))
 
-    def _write(self, step: int, obstacles: np.ndarray[tuple[int, ...], np.dtype[np.float32]]) -> None:
+    def _write(self, step: int, obstacles: NDArray[np.float32]) -> None:
         count = len(obstacles)
         radii = obstacles[None, :, 2]
         centers = np.full((1, count, 3), _HEIGHT / 2, np.float32)

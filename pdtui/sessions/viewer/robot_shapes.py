@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.robot_data import Link
@@ -29,22 +31,11 @@ class RobotShapes:
         parts: list[rr.Capsules3D | rr.Boxes3D] = []
         if self._round:
             lengths = [2 * link.size[1] if link.shape == "capsule" else 0.0 for link in self._round]
-            parts.append(
-                rr.Capsules3D.from_fields(
-                    lengths=lengths,
-                    radii=[link.size[0] for link in self._round],
-                    colors=_colors(self._round),
-                    fill_mode="solid",
-                )
-            )
+            radii = [link.size[0] for link in self._round]
+            parts.append(rr.Capsules3D.from_fields(lengths=lengths, radii=radii, **_style(self._round)))
         if self._boxes:
-            parts.append(
-                rr.Boxes3D.from_fields(
-                    half_sizes=[link.size for link in self._boxes],
-                    colors=_colors(self._boxes),
-                    fill_mode="solid",
-                )
-            )
+            sizes = [link.size for link in self._boxes]
+            parts.append(rr.Boxes3D.from_fields(half_sizes=sizes, **_style(self._boxes)))
         return parts
 
     def columns(self, poses: Floats) -> list[ComponentColumn]:
@@ -67,9 +58,9 @@ class RobotShapes:
         return columns
 
 
-def _xyzw(placed: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+def _xyzw(placed: Floats) -> NDArray[np.float32]:
     return placed[..., [4, 5, 6, 3]].astype(np.float32)
 
 
-def _colors(links: Sequence[Link]) -> list[tuple[int, int, int]]:
-    return [_TORSO if link.body == 0 else _COLOR for link in links]
+def _style(links: Sequence[Link]) -> dict[str, Any]:
+    return {"colors": [_TORSO if link.body == 0 else _COLOR for link in links], "fill_mode": "solid"}

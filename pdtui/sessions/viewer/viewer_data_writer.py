@@ -43,7 +43,7 @@ class ViewerDataWriter:
         for part in self._shapes.static():
             log_static(ROBOT, part)
         self._legend = BehaviorLegend(info)
-        self._units: ViewerCurves[tuple[str, int]] = ViewerCurves(
+        self._units = ViewerCurves[tuple[str, int]](
             UNITS,
             lambda key: f"{key[0]}, {format_unit(key[1], info.layers)}",
             lambda key: self._color(key[0]),
@@ -51,12 +51,9 @@ class ViewerDataWriter:
             send,
             log_static,
         )
-        self._targets: ViewerCurves[str] = ViewerCurves(
-            TARGETS, str, self._legend.color, ("target",), send, log_static
-        )
-        self._magnitudes: ViewerCurves[str] = ViewerCurves(
-            MAGNITUDES, str, self._legend.color, ("",), send, log_static
-        )
+        color = self._legend.color
+        self._targets = ViewerCurves[str](TARGETS, str, color, ("target",), send, log_static)
+        self._magnitudes = ViewerCurves[str](MAGNITUDES, str, color, ("",), send, log_static)
         self._obstacles = ObstacleWriter(send, log_static)
         self._shown_units: dict[str, tuple[int, ...]] = {}
         self._left_out = False
@@ -95,16 +92,10 @@ class ViewerDataWriter:
             if stimulation.units or self._units.drawing:
                 self._units.add(record.step, self._outputs(state, record))
             if behaviors or self._magnitudes.drawing:
-                self._targets.add(
-                    record.step, {one.name: (one.target,) for one in behaviors if one.target is not None}
-                )
-                self._magnitudes.add(
-                    record.step,
-                    {
-                        one.name: (one.factor * (1.0 if one.magnitude is None else one.magnitude),)
-                        for one in behaviors
-                    },
-                )
+                targets = {one.name: (one.target,) for one in behaviors if one.target is not None}
+                self._targets.add(record.step, targets)
+                sizes = ((one, 1.0 if one.magnitude is None else one.magnitude) for one in behaviors)
+                self._magnitudes.add(record.step, {one.name: (one.factor * size,) for one, size in sizes})
             self._heat.add(record.step, record.activations)
 
     @property
@@ -184,9 +175,8 @@ class ViewerDataWriter:
         before = np.concatenate([here[:1] if self._here is None else self._here, here[:-1]])
         before[jumps] = here[jumps]
         self._here = here[-1:].copy()
-        self._bounds = np.array(
-            [np.fmin(self._bounds[0], here.min(0)), np.fmax(self._bounds[1], here.max(0))]
-        )
+        low, high = self._bounds
+        self._bounds = np.array([np.fmin(low, here.min(0)), np.fmax(high, here.max(0))])
         pieces = np.zeros((len(steps), 2, 3), np.float32)
         pieces[:, 0, :2], pieces[:, 1, :2] = before, here
         # The y axis of a 2D view points down, and only a 2D view can be fitted to the path.

@@ -44,6 +44,9 @@ class TimeColumn:
         return self.array
 
 
+Descriptor = rr.ComponentDescriptor | str
+
+
 def stack_rows(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """Stack arrays of shape (width,) like `numpy.stack`, which takes twice as long for many short arrays."""
     return np.concatenate(arrays).reshape(len(arrays), -1)
@@ -56,21 +59,20 @@ def time_columns(steps: Sequence[int], dt: float) -> list[TimeColumn]:
     return [TimeColumn(STEP, pa.array(numbers)), TimeColumn(TIME, pa.array(nanoseconds))]
 
 
-def number_list_column(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
+def number_list_column(descriptor: Descriptor, block: NDArray[Any]) -> ComponentColumn:
     """Return an array (n, width) as n lists, or an array (n,) as n lists of one number."""
-    return _list_column(
-        descriptor, pa.array(block.reshape(-1)), _even_offsets(len(block), block.size // len(block))
-    )
+    offsets = _even_offsets(len(block), block.size // len(block))
+    return _list_column(descriptor, pa.array(block.reshape(-1)), offsets)
 
 
-def nested_list_column(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
+def nested_list_column(descriptor: Descriptor, block: NDArray[Any]) -> ComponentColumn:
     """Return an array (n, width) as n lists of one list each, from which the viewer can select a number."""
     inner = _even_offsets(len(block), block.shape[1])
     values = pa.ListArray.from_arrays(inner, pa.array(block.reshape(-1)))
     return _list_column(descriptor, values, _even_offsets(len(block), 1))
 
 
-def vector_list_column(descriptor: rr.ComponentDescriptor | str, block: NDArray[Any]) -> ComponentColumn:
+def vector_list_column(descriptor: Descriptor, block: NDArray[Any]) -> ComponentColumn:
     """Return an array (n, m, k) as n lists of m vectors of length k."""
     count, width, length = block.shape
     item = pa.field("item", pa.from_numpy_dtype(block.dtype), nullable=False)
@@ -78,7 +80,7 @@ def vector_list_column(descriptor: rr.ComponentDescriptor | str, block: NDArray[
     return _list_column(descriptor, values, _even_offsets(count, width))
 
 
-def polyline_column(descriptor: rr.ComponentDescriptor, block: NDArray[Any]) -> ComponentColumn:
+def polyline_column(descriptor: Descriptor, block: NDArray[Any]) -> ComponentColumn:
     """Return an array (n, m, k) as n lists of one polyline through m points with k coordinates."""
     points = vector_list_column(descriptor, block).array
     item = pa.field("item", points.type.value_type, nullable=False)
@@ -87,7 +89,7 @@ def polyline_column(descriptor: rr.ComponentDescriptor, block: NDArray[Any]) -> 
 
 
 def ragged_list_column(
-    descriptor: rr.ComponentDescriptor | str, lists: Sequence[Sequence[Any]], kind: pa.DataType
+    descriptor: Descriptor, lists: Sequence[Sequence[Any]], kind: pa.DataType
 ) -> ComponentColumn:
     """Return one list per row; their lengths may differ."""
     flat = [value for row in lists for value in row]
@@ -95,7 +97,7 @@ def ragged_list_column(
     return _list_column(descriptor, pa.array(flat, kind), offsets)
 
 
-def text_column(descriptor: rr.ComponentDescriptor | str, values: Iterable[str]) -> ComponentColumn:
+def text_column(descriptor: Descriptor, values: Iterable[str]) -> ComponentColumn:
     """Return one text per row."""
     array = pa.array(list(values), pa.utf8())
     return _list_column(descriptor, array, _even_offsets(len(array), 1))
@@ -106,7 +108,7 @@ def _even_offsets(count: int, width: int) -> pa.Array:
     return pa.array(np.arange(count + 1, dtype=np.int32) * np.int32(width))
 
 
-def _list_column(descriptor: rr.ComponentDescriptor | str, values: Any, offsets: pa.Array) -> ComponentColumn:
+def _list_column(descriptor: Descriptor, values: Any, offsets: pa.Array) -> ComponentColumn:
     if isinstance(descriptor, str):
         descriptor = rr.ComponentDescriptor(descriptor)
     return ComponentColumn(descriptor, pa.ListArray.from_arrays(offsets, values))

@@ -32,9 +32,8 @@ def open_recording(path: Path, info: DriveInfo, recording_id: str | None = None)
         path.parent.mkdir(parents=True, exist_ok=True)
         recording = rr.RecordingStream(APP, recording_id=recording_id)
         if not is_enabled(recording):
-            raise SessionError(
-                f"{path}: cannot be written: recording is disabled by the environment variable RERUN=off"
-            )
+            why = "recording is disabled by the environment variable RERUN=off"
+            raise SessionError(f"{path}: cannot be written: {why}")
         recording.set_sinks(rr.FileSink(path), default_blueprint=session_blueprint(info))
     return recording
 

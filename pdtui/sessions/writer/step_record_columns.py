@@ -44,15 +44,11 @@ def step_record_columns(
     ]
     if kept != "off":
         activations = stack_rows(of.activations)
-        columns.append(
-            nested_list_column("activations", to_half(activations) if kept == "half" else activations)
-        )
+        stored = _to_half(activations) if kept == "half" else activations
+        columns.append(nested_list_column("activations", stored))
     if any(stimulation.units for stimulation in of.stimulation):
-        columns.append(
-            ragged_list_column(
-                "stimulation", [_flatten_stimulation(record) for record in records], pa.float64()
-            )
-        )
+        flat = [_flatten_stimulation(record) for record in records]
+        columns.append(ragged_list_column("stimulation", flat, pa.float64()))
     if any(of.behaviors):
         names = [[behavior.name for behavior in behaviors] for behaviors in of.behaviors]
         states = [
@@ -66,7 +62,7 @@ def step_record_columns(
     return columns
 
 
-def to_half(activations: NDArray[np.float32]) -> NDArray[np.float16]:
+def _to_half(activations: NDArray[np.float32]) -> NDArray[np.float16]:
     """Convert to float16; values beyond its range (±65504) become infinite, without a warning."""
     with np.errstate(over="ignore"):
         return activations.astype(np.float16)
