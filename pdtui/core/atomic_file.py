@@ -42,21 +42,13 @@ def replace_file(path: Path, error: type[PdtuiError]) -> Iterator[Path]:
 
 
 def write_file(path: Path, content: str | bytes, error: type[PdtuiError]) -> None:
-    """Replace a file by text (as UTF-8) or bytes, as `replace_file` does.
-
-    Raises:
-        error: the file cannot be written; the message names it.
-    """
+    """Replace a file by text (as UTF-8) or bytes, as `replace_file` does, with the same errors."""
     with replace_file(path, error) as partial:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 def check_writable(path: Path, error: type[PdtuiError]) -> None:
-    """Find out before long work whether `replace_file` can write a file.
-
-    Raises:
-        error: it cannot; the message names the file.
-    """
+    """Find out before long work whether `replace_file` can write a file; if not, raise its `error`."""
     with _named_errors(path, error):
         target = path.resolve()
         if target.is_file() or not target.exists():

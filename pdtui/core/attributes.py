@@ -34,11 +34,7 @@ class Attribute:
 
 
 def column_of(name: str, attributes: Sequence[Attribute], owner: str) -> int:
-    """Return the column of an attribute.
-
-    Raises:
-        RobotError: there is no such attribute; the message names the `owner`.
-    """
+    """Return the column of an attribute; one that is missing is a `RobotError` that names the `owner`."""
     names = [attribute.name for attribute in attributes]
     if name not in names:
         raise RobotError(f"{owner}: no attribute '{name}'; there are {', '.join(names)}")

@@ -74,11 +74,7 @@ def format_unit(flat: int, layers: Sequence[int]) -> str:
 
 
 def locate_unit(flat: int, layers: Sequence[int]) -> tuple[int, int]:
-    """Return the number of the layer, and the index in it, of a flat index.
-
-    Raises:
-        PolicyError: there are fewer units.
-    """
+    """Return the layer of a flat index and the index in that layer; `PolicyError` if it is too large."""
     for layer, width in enumerate(layers):
         if flat < width:
             return layer, flat

@@ -9,11 +9,7 @@ from pathlib import Path
 
 
 def open_regular_file(path: Path) -> BufferedReader:
-    """Open a regular file for reading; pipes and devices, which might never end, are refused.
-
-    Raises:
-        OSError: the file cannot be opened or is not a regular file.
-    """
+    """Open a regular file for reading; pipes and devices, which might never end, are an `OSError`."""
     # Without O_NONBLOCK, opening a pipe would wait for a writer.
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
@@ -23,15 +19,7 @@ def open_regular_file(path: Path) -> BufferedReader:
 
 
 def read_bounded_file(path: Path, limit: int) -> bytes:
-    """Read all bytes of a regular file.
-
-    Args:
-        path: the file.
-        limit: largest size that is accepted, bytes.
-
-    Raises:
-        OSError: the file cannot be read, is not a regular file, or is larger.
-    """
+    """Read all bytes of a regular file; one of more than `limit` bytes is an `OSError`."""
     with open_regular_file(path) as file:
         content = file.read(limit + 1)
     if len(content) > limit:

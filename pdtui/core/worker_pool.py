@@ -51,11 +51,7 @@ class WorkerProcess(Closable):
             theirs.close()
 
     def send(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Call a function of a module with the state and these arguments in the process.
-
-        Raises:
-            WorkerError: the process has died.
-        """
+        """Call a function of a module with the state and these arguments; `WorkerError` if the process is dead."""
         try:
             self.connection.send((function, arguments))
         except OSError as error:
@@ -64,8 +60,7 @@ class WorkerProcess(Closable):
     def receive(self) -> Any:
         """Wait for the result of the call and return it, or raise the exception that the call raised.
 
-        Raises:
-            WorkerError: the process has died.
+        The death of the process is a `WorkerError`.
         """
         try:
             succeeded, answer = self.connection.recv()
@@ -119,15 +114,12 @@ class WorkerPool(Closable, Generic[State]):
         jobs: Sequence[Job],
         progress: Callable[[int, int], None] | None = None,
     ) -> list[Result]:
-        """Run all jobs and return their results in the order of the jobs.
+        """Run all jobs and return their results in the order of the jobs; `WorkerError` if a worker dies.
 
         Args:
             function: function of a module, called with the worker's state and a job.
             jobs: one argument of `function` each.
             progress: called with the number of jobs finished and of all jobs.
-
-        Raises:
-            WorkerError: a worker process died.
         """
         results: dict[int, Result] = {}
         for number, result in self.as_completed(function, jobs):
@@ -141,8 +133,7 @@ class WorkerPool(Closable, Generic[State]):
     ) -> Iterator[tuple[int, Result]]:
         """Run all jobs and yield the index and the result of each as soon as it is finished.
 
-        Raises:
-            WorkerError: a worker process died.
+        The death of a worker is a `WorkerError`.
         """
         if self._workers <= 1:
             for number, job in enumerate(jobs):

@@ -39,11 +39,7 @@ NO_STATISTICS = EpisodeStatistics()
 
 
 class EpisodeStatisticsCounter:
-    """Counts the statistics of each episode; after a rewind, those of the earlier episode are continued.
-
-    Args:
-        info: the drive.
-    """
+    """Counts the statistics of each episode; after a rewind, those of the earlier episode are continued."""
 
     def __init__(self, info: DriveInfo) -> None:
         columns = [
@@ -58,14 +54,7 @@ class EpisodeStatisticsCounter:
         self._statistics: dict[int, EpisodeStatistics] = {}
 
     def add(self, episode: int, *, keyed: bool, cost: float, attributes: Floats) -> None:
-        """Count one control step.
-
-        Args:
-            episode: number of the episode.
-            keyed: whether a key was pressed.
-            cost: cost of the step.
-            attributes: attributes after the step, shape (J,).
-        """
+        """Count one control step, with its cost, the attributes after it, and whether a key was pressed."""
         before = self.of(episode)
         self._statistics[episode] = replace(
             before,

@@ -18,11 +18,9 @@ from pdtui.sessions.session_reader import Session
 
 @dataclass(frozen=True)
 class AttributeDeviation:
-    """How much an attribute deviates between two runs.
+    """How much an attribute deviates between two runs, in its unit.
 
     Attributes:
-        attribute: name of the attribute.
-        unit: unit of the three numbers.
         first: deviation in the first step that differs.
         largest, mean: largest and mean deviation from that step to the end.
         step: the step with the largest deviation.
@@ -66,9 +64,7 @@ class SessionComparison:
 def attribute_differences(a: Floats, b: Floats, attributes: Sequence[Attribute]) -> Floats:
     """Return absolute differences of attributes; angles that wrap differ by at most π, and NaN equals NaN.
 
-    Args:
-        a, b: values of the attributes, shape (..., J).
-        attributes: the J attributes.
+    The values `a` and `b` have the shape (..., J), for J attributes.
     """
     with np.errstate(invalid="ignore"):
         change: Floats = np.abs(a - b)
@@ -111,8 +107,7 @@ def measure_spread(values: Floats) -> Floats:
 def compare_sessions(a: Session, b: Session) -> SessionComparison:
     """Find the first step that differs, and how much the attributes deviate from it on.
 
-    Raises:
-        SessionError: the sessions have different attributes.
+    Sessions with different attributes are a `SessionError`.
     """
     if a.info.attributes != b.info.attributes:
         why = "cannot be compared: their robots have different attributes"

@@ -43,10 +43,9 @@ class SessionCondition:
 
 
 def examine_session(path: Path) -> SessionCondition:
-    """Read a session as far as possible and report what is there.
+    """Report what can be read of a session.
 
-    Raises:
-        SessionError: the file is no session, or was cut off before the first control step.
+    A file that is no session, or was cut off before its first control step, is a `SessionError`.
     """
     file = RrdContents(path, only=(DIGEST_EPISODE,), torn=True)
     try:

@@ -80,10 +80,8 @@ class Latch:
     def latch_behavior(self, name: str, attributes: Floats) -> None:
         """Latch a behavior and end those that may not run beside it. A latched behavior starts again.
 
-        In mode ``pid``, the target starts at the present value, and latching a latched behavior ends it.
-
-        Raises:
-            KeystrokeError: the map has no such behavior.
+        In mode ``pid``, the target starts at the present value, and latching a latched behavior ends it. A
+        behavior that the map lacks is a `KeystrokeError`.
         """
         if name not in self._behaviors:
             known = ", ".join(self._behaviors)
@@ -110,31 +108,20 @@ class Latch:
         self._latched = []
 
     def set_target(self, name: str, target: float) -> None:
-        """Set the target of a latched behavior of mode ``pid``.
-
-        Raises:
-            KeystrokeError: it is not latched or has no target.
-        """
+        """Set the target of a latched behavior of mode ``pid``; for any other, raise a `KeystrokeError`."""
         controller = self._find(name).controller
         if controller is None:
             raise KeystrokeError(f"behavior '{name}' holds no target; its mode is fixed")
         controller.set_target(target)
 
     def set_factor(self, name: str, factor: float) -> None:
-        """Set the factor on the magnitudes of a latched behavior.
-
-        Raises:
-            KeystrokeError: it is not latched.
-        """
+        """Set the factor on the magnitudes of a behavior; one that is not latched is a `KeystrokeError`."""
         self._find(name).factor = factor
 
     def stimulate(self, attributes: Floats) -> Stimulation:
-        """Return what this control step overwrites.
+        """Return what this control step overwrites, given the robot's present attributes, shape (J,).
 
         If two latched behaviors share a unit or a command, the one latched last decides.
-
-        Args:
-            attributes: the robot's present values, shape (J,).
         """
         self.commands = {}
         if not self._latched:

@@ -28,8 +28,7 @@ def search_folders(kind: str) -> tuple[Path, ...]:
 def find_map(name: str) -> Path:
     """Return the path of a map, given by its file or its name.
 
-    Raises:
-        MapError: There is no such map; the message lists those that exist.
+    If there is none, a `MapError` lists those that exist.
     """
     if name.endswith(".toml"):
         if Path(name).is_file():

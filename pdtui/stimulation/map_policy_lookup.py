@@ -39,11 +39,7 @@ def resolve_map_policy(
 def locate_map_policy(
     stimulation_map: StimulationMap, policy: str = "", import_options: ImportOptions = NO_OPTIONS
 ) -> StimulationMap:
-    """Do as `resolve_map_policy`, but leave the map's text as it is.
-
-    Raises:
-        PolicyError: The map names a file outside of its own folder and the working directory.
-    """
+    """Do the same as `resolve_map_policy`, but leave the text of the map as it is."""
     source = stimulation_map.source
     folder = Path(source).parent
     name = policy or _from_here(stimulation_map.policy, folder, source)

@@ -46,15 +46,7 @@ def load_map(path: Path) -> StimulationMap:
 
 
 def parse_map(text: str, source: str) -> StimulationMap:
-    """Read a map from its text.
-
-    Args:
-        text: The map.
-        source: Name of the map in messages.
-
-    Raises:
-        MapError: As `load_map`.
-    """
+    """Read a map from its text, as `load_map` does from a file; messages call it `source`."""
     if len(text) > MAX_BYTES:
         raise MapError(f"{source}: expected a map of at most {MAX_BYTES} characters")
     if _has_long_key(text):

@@ -37,11 +37,7 @@ _OPTIONAL_FIELDS = "says mode period task magnitudes base commands together pid 
 
 
 def compose_map(stimulation_map: StimulationMap, comments: Sequence[str] = ()) -> str:
-    """Return the text of a new map with comments at the top; the map's own `text` is not used.
-
-    Raises:
-        MapError: Something in it is not allowed in a map.
-    """
+    """Return the text of a new map with comments at the top; its own `text` is not used."""
     document = tomlkit.document()
     for line in comments:
         document.add(tomlkit.comment(line))
@@ -64,11 +60,7 @@ def compose_map(stimulation_map: StimulationMap, comments: Sequence[str] = ()) -
 
 
 def replace_effects(text: str, measured: Mapping[str, MeasuredEffect], source: str) -> str:
-    """Return the text of a map with other measured effects, given by the names of their behaviors.
-
-    Raises:
-        MapError: The text is no map, or it lacks one of the behaviors.
-    """
+    """Return the text of a map with other measured effects of behaviors, given by name."""
 
     def replace(behavior: Any, effect: MeasuredEffect) -> None:
         behavior["measured"] = _effect_table(effect)
@@ -77,11 +69,7 @@ def replace_effects(text: str, measured: Mapping[str, MeasuredEffect], source: s
 
 
 def replace_gains(text: str, gains: Mapping[str, PidGains], source: str) -> str:
-    """Return the text of a map with other gains and limits, given by the names of behaviors of mode ``pid``.
-
-    Raises:
-        MapError: As `replace_effects`, or a behavior has another mode.
-    """
+    """Return the text of a map with other gains and limits of behaviors of mode ``pid``, given by name."""
 
     def replace(behavior: Any, pid: PidGains) -> None:
         if "pid" not in behavior:
@@ -92,11 +80,7 @@ def replace_gains(text: str, gains: Mapping[str, PidGains], source: str) -> str:
 
 
 def replace_policy(text: str, name: str, import_options: ImportOptions, source: str) -> str:
-    """Return the text of a map that names another weights file or shipped policy. The hash stays.
-
-    Raises:
-        MapError: The text is no map.
-    """
+    """Return the text of a map that names another weights file or shipped policy. The hash stays."""
 
     def replace(document: Any) -> None:
         policy = document["policy"]
@@ -106,11 +90,7 @@ def replace_policy(text: str, name: str, import_options: ImportOptions, source: 
 
 
 def add_behavior(text: str, behavior: Behavior, source: str) -> str:
-    """Return the text of a map with one more behavior; one of the same name is replaced but keeps its key.
-
-    Raises:
-        MapError: The text is no map, or the behavior does not fit into it.
-    """
+    """Return the text of a map with one more behavior; one of the same name is replaced but keeps its key."""
     fields = _behavior_fields(behavior)
 
     def add(document: Any) -> None:
@@ -129,11 +109,7 @@ def add_behavior(text: str, behavior: Behavior, source: str) -> str:
 
 
 def rewrite_map(path: Path, change: Callable[[str], str]) -> None:
-    """Replace the text of a map's file by what `change` makes of it, atomically.
-
-    Raises:
-        MapError: What `change` raises, or the file cannot be read or written.
-    """
+    """Replace the text of a map's file by what `change` makes of it, atomically."""
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:

@@ -131,11 +131,7 @@ class Policy:
         return () if self._initial is None else recurrent_state.state_to_arrays(self._state)
 
     def restore(self, state: PolicyState) -> None:
-        """Return to a recurrent state that `snapshot` gave.
-
-        Raises:
-            PolicyError: The state is another network's.
-        """
+        """Return to a recurrent state that `snapshot` gave; that of another network is a `PolicyError`."""
         expected, found = recurrent_state.state_shapes(self._initial), [array.shape for array in state]
         if expected != found:
             raise PolicyError(f"{self.name}: expected a recurrent state of shapes {expected}, got {found}")

@@ -13,15 +13,10 @@ from pdtui.policies.runtime.policy import Policy
 
 
 def check_fit(policy: Policy, world: gymnasium.Env[Any, Any], name: str) -> None:
-    """Check that a policy takes a world's observations and gives its actions.
-
-    Args:
-        policy: The policy; it acts once on zeros, and its recurrent state is restored.
-        world: The robot, of which only the spaces are read.
-        name: Name of the robot, for the message.
+    """Check that a policy takes a world's observations and gives its actions, by acting once on zeros.
 
     Raises:
-        PolicyError: A shape differs; the message states the policy's and the robot's.
+        PolicyError: A shape differs; the message states those of the policy and of the robot called `name`.
     """
     observed = world.observation_space.shape or ()
     taken = policy.shape

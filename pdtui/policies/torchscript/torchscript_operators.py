@@ -70,8 +70,7 @@ _UNARY = ("neg", "__not__", "len", "list")
 def call_operator(name: str, arguments: list[Any], keywords: dict[str, Any]) -> Any:
     """Apply TorchScript's operator ``torch.NAME``.
 
-    Raises:
-        PolicyError: The operator is not on the list, cannot be computed, or its result would be too large.
+    One that is not listed, cannot be computed, or has too large a result is a `PolicyError`.
     """
     tensors = [one for one in _flatten(arguments) if isinstance(one, torch.Tensor)]
     if name in _PLAIN and (name in _ANY or not tensors):

@@ -71,8 +71,7 @@ class WorldSpaces:
     def of(cls, owner: str, observation_space: Any, action_space: Any) -> WorldSpaces:
         """Return the description of Gymnasium's spaces, with flattened shapes.
 
-        Raises:
-            PolicyError: Observations are not an array of numbers.
+        Observations that are not an array of numbers are a `PolicyError`.
         """
         if observation_space.shape is None:
             raise PolicyError(f"{owner}: expected observations of one shape, found {observation_space}")
@@ -90,19 +89,11 @@ class WorldSpaces:
 
     @classmethod
     def of_world(cls, world: Any) -> WorldSpaces:
-        """Return the description of a robot's spaces.
-
-        Raises:
-            PolicyError: As for `of`.
-        """
+        """Return the description of a robot's spaces, as `of` does."""
         return cls.of(world.name, world.observation_space, world.action_space)
 
     def check(self, source: str, observations: int, actions: int, discrete_actions: int) -> None:
-        """Check that a policy of these sizes fits.
-
-        Raises:
-            PolicyError: The policy does not fit; the message states both shapes.
-        """
+        """Check that a policy of these sizes fits; otherwise a `PolicyError` states both."""
         expected = _describe_spaces(self.observations, self.actions, self.discrete_actions)
         found = _describe_spaces(observations, actions, discrete_actions)
         if expected != found:

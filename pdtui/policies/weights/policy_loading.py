@@ -111,10 +111,7 @@ def _find_statistics(path: Path, import_options: ImportOptions, folders: Sequenc
 def convert_policy(
     path: Path, output: Path, import_options: ImportOptions, spaces: WorldSpaces | None
 ) -> NetworkSpec:
-    """Write a policy of another program as a safetensors file that states everything.
-
-    Returns:
-        The specification that was written.
+    """Write a policy of another program as a safetensors file, and return the specification that it states.
 
     Raises:
         PolicyError: As for `load_policy`; or the output exists already or cannot be written.

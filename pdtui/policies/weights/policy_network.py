@@ -86,11 +86,7 @@ class NetworkSpec:
             raise PolicyError(f"expected {max(allowed)} action bounds, got {low} and {high}")
 
     def check_values(self) -> None:
-        """Check every field, since a file may hold anything.
-
-        Raises:
-            PolicyError: A field is not what it should be.
-        """
+        """Check every field, since a file may hold anything; a wrong one is a `PolicyError`."""
         sizes = (self.observations, self.actions, *self.layers)
         if not all(type(size) is int and 0 < size <= MAX_WIDTH for size in sizes):
             raise PolicyError(f"expected sizes of 1 to {MAX_WIDTH}, found {str(sizes)[:80]}")
@@ -158,8 +154,7 @@ class PolicyNetwork(nn.Module):
     def load_tensors(self, tensors: dict[str, torch.Tensor]) -> None:
         """Load weights by name.
 
-        Raises:
-            PolicyError: A tensor is missing, superfluous, of another shape or not finite.
+        A tensor that is missing, superfluous, of another shape or not finite is a `PolicyError`.
         """
         check_tensors(self.state_dict(), tensors)
         for name, tensor in tensors.items():

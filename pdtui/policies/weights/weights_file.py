@@ -29,8 +29,7 @@ _KEY = "pdtui"
 def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
     """Return the path of a weights file: as given, in one of the folders, or a shipped one by its name.
 
-    Raises:
-        PolicyError: There is none; the message lists the shipped policies.
+    If there is none, a `PolicyError` lists the shipped policies.
     """
     own = find_beside(name, folders)
     if own is not None:
@@ -52,11 +51,7 @@ def is_own_format(path: Path) -> bool:
 
 
 def hash_file(path: Path) -> str:
-    """Return the SHA-256 of a file as hexadecimal digits.
-
-    Raises:
-        PolicyError: The file cannot be read.
-    """
+    """Return the SHA-256 of a file as hexadecimal digits; `PolicyError` if it cannot be read."""
     try:
         with open_regular_file(path) as file:
             return file_digest(file, "sha256").hexdigest()
@@ -65,11 +60,7 @@ def hash_file(path: Path) -> str:
 
 
 def save_network(path: Path, network: PolicyNetwork) -> None:
-    """Write weights as float32 and their metadata.
-
-    Raises:
-        PolicyError: the file cannot be written.
-    """
+    """Write weights as float32 and their metadata; `PolicyError` if the file cannot be written."""
     tensors = {name: tensor.detach().float().contiguous() for name, tensor in network.state_dict().items()}
     payload = save(tensors, metadata={_KEY: json.dumps(asdict(network.spec), sort_keys=True)})
     write_file(path, payload, PolicyError)
@@ -78,8 +69,7 @@ def save_network(path: Path, network: PolicyNetwork) -> None:
 def load_network(path: Path) -> PolicyNetwork:
     """Read a network that `save_network` wrote.
 
-    Raises:
-        PolicyError: The file is not a safetensors file, lacks pdtui's metadata, or its tensors do not fit it.
+    A file that is no safetensors file, lacks pdtui's metadata or has other tensors is a `PolicyError`.
     """
     metadata, tensors = _read(path)
     if _KEY not in metadata:

@@ -26,8 +26,7 @@ _RECORD_BATCH = 3  # type of a header
 def read_record_batch(data: pa.Buffer) -> pa.RecordBatch:
     """Read an IPC stream that consists of a schema and one record batch.
 
-    Raises:
-        ValueError, pyarrow.ArrowException: the stream is damaged, too large, or not as Rerun writes it.
+    A damaged or hostile one is a `ValueError` or an `ArrowException`.
     """
     reader = pa.ipc.MessageReader.open_stream(data)
     try:

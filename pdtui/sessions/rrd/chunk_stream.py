@@ -45,11 +45,10 @@ class ChunkStream:
         self.skipped_rows: Counter[str] = Counter()
 
     def __iter__(self) -> Iterator[EntityChunk]:
-        """Read the file from its beginning.
+        """Read the file from its beginning; the chunks before any damage are yielded first.
 
         Raises:
-            SessionError: the file does not exist, is no recording of pdtui, or is damaged; the chunks before
-                the damage are yielded first. The message names the file and the byte.
+            SessionError: the file does not exist, is no recording of pdtui, or is damaged, and at which byte.
         """
         try:
             with open_regular_file(self._path) as file:

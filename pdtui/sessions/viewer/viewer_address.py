@@ -28,8 +28,7 @@ class ViewerAddress:
     def parse(cls, text: str) -> ViewerAddress:
         """Parse ``PORT``, ``HOST`` or ``HOST:PORT``; the defaults are 127.0.0.1 and 9876.
 
-        Raises:
-            SessionError: the text has none of these forms.
+        Text that has none of these forms is a `SessionError`.
         """
         match = re.fullmatch(
             r"(?:(?P<host>[A-Za-z][\w.-]*|\d+(?:\.\d+){3})(?::(?=\d)|$))?(?P<port>\d{1,5})?", text
@@ -59,11 +58,7 @@ class ViewerAddress:
 
 
 def viewer_command(path: Path, *, web: bool = False) -> list[str]:
-    """Return the command that opens a session in the viewer.
-
-    Args:
-        path: the session.
-        web: whether it is served to a browser on this machine instead of shown in a window.
+    """Return the command that opens a session in the viewer's window, or serves it to a local browser.
 
     Raises:
         SessionError: the viewer is not installed, or there is no display for its window.

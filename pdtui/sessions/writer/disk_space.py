@@ -60,8 +60,7 @@ class DiskReserve:
     def require_space_to_begin(self) -> None:
         """Create the recording's folder and check that there is space to begin the recording.
 
-        Raises:
-            SessionError: the disk is full, or the folder cannot be written.
+        A full disk and a folder that cannot be written are a `SessionError`.
         """
         needed = self._fixed + self._least * self._rows
         try:

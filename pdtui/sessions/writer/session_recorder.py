@@ -114,11 +114,7 @@ class SessionRecorder:
             self._flush_rows(wait=self._waits_for_batches or self._batches % _BATCHES_ON_THEIR_WAY == 0)
 
     def flush(self) -> None:
-        """Write all steps so far and wait until they were handed to the operating system.
-
-        Raises:
-            SessionError: the file cannot be written.
-        """
+        """Write all steps so far and wait until they were handed to the operating system."""
         self._write_rows()
         self._flush_rows()
 
@@ -130,11 +126,7 @@ class SessionRecorder:
     def close(self, outcome: str) -> None:
         """Write the rest, the outcome and the index at the end of the file. A second call does nothing.
 
-        Args:
-            outcome: how the drive ended, in words; not empty.
-
-        Raises:
-            SessionError: the file cannot be written.
+        The outcome says in words how the drive ended. A file that cannot be written is a `SessionError`.
         """
         if self._closed:
             return
