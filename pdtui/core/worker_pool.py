@@ -51,7 +51,7 @@ class WorkerProcess(Closable):
             theirs.close()
 
     def send(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Call a function of a module with the state and these arguments; `WorkerError` if the process is dead."""
+        """Call a function of a module with the state and arguments; `WorkerError` if the process is dead."""
         try:
             self.connection.send((function, arguments))
         except OSError as error:
