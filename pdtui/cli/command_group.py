@@ -18,9 +18,7 @@ OPTIONAL_ROOMS = ("pdtui.benchmarks", "pdtui.paper", "pdtui.training")
 class LazyCommandGroup(click.Group):
     """Imports a command's module when the command is used, and prints expected errors as one line.
 
-    Args:
-        commands: for each command, where it is ("package.module:attribute") and its summary for the list.
-        arguments: as for `click.Group`.
+    `lazy_commands` gives for each command where it is ("package.module:attribute") and its summary.
     """
 
     def __init__(self, *, lazy_commands: Mapping[str, tuple[str, str]], **arguments: Any) -> None:

@@ -159,13 +159,10 @@ def drive_config(
         robot: name of a robot or environment, or a map file.
         map_name: name or file of the map; None for the robot's.
         policy: weights to use instead of the map's, or an empty string.
-        import_options: what the file of the weights leaves open.
+        import_options: answers to what the weights file does not state.
         seed: seed of the drive.
         without_map: whether a robot without a map may be driven by its policy alone.
         options: further fields of `DriveConfig`.
-
-    Raises:
-        PdtuiError: the robot or the map does not exist or cannot be read.
     """
     from pdtui.driving.drive_config import DriveConfig
     from pdtui.robots import check_robot, file_stem, trust_module
@@ -216,11 +213,7 @@ def show_result(data: dict[str, Any] | list[dict[str, Any]], as_json: bool, tabl
 
 @contextmanager
 def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[..., None] | None]:
-    """Show a progress bar with the remaining time on standard error, unless `quiet`.
-
-    Yields:
-        The function ``advance(done, total, note="")`` that updates the bar; None where `quiet`.
-    """
+    """Show a progress bar on standard error and yield ``advance(done, total, note="")``; None if `quiet`."""
     if quiet:
         yield None
         return

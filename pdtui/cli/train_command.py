@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -40,13 +41,7 @@ from pdtui.cli.shared_options import FILE_PATH, integer_option, progress_bar
     help="Folder of the checkpoints; default: runs/ROBOT-ALGORITHM-SEED.",
 )
 def train(
-    robot: str,
-    algorithm: str,
-    seed: int,
-    steps: int | None,
-    learning_rate: float | None,
-    forward: str | None,
-    folder: Path | None,
+    robot: str, algorithm: str, seed: int, forward: str | None, folder: Path | None, **options: Any
 ) -> None:
     """Train a policy for ROBOT.
 
@@ -54,15 +49,9 @@ def train(
     """
     from pdtui.training.train_policy import train_policy
 
+    folder = folder or Path("runs") / "-".join(filter(None, (robot, algorithm, forward, str(seed))))
     with progress_bar("training") as advance:
         path = train_policy(
-            robot,
-            algorithm,
-            seed,
-            steps,
-            learning_rate,
-            forward,
-            folder or Path("runs") / "-".join(filter(None, (robot, algorithm, forward, str(seed)))),
-            advance,
+            robot, algorithm, seed, forward=forward, folder=folder, progress=advance, **options
         )
     click.echo(f"best weights: {path}")

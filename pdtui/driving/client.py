@@ -24,12 +24,10 @@ class DriveConnection(Protocol):
     """The screen's end of the pipe to a drive."""
 
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:
-        """Return the next message, or None if none has arrived. The first is a `DriveFacts`.
+        """Return the next message, or None if none has arrived; the first is a `DriveFacts`.
 
-        Each call that returns a message asks for the next snapshot, so that at most one is on its way.
-
-        Raises:
-            PdtuiError: the simulation's process has ended; the message says why.
+        A call that returns a message asks for the next snapshot, so at most one is on its way. Once the
+        simulation's process has ended, a `PdtuiError` says why.
         """
 
     def press_key(self, key: str) -> None:
@@ -45,19 +43,13 @@ class DriveConnection(Protocol):
 def _simulate(connection: Connection, config: DriveConfig) -> None:
     # The recording library would print over the screen when the disk is full or a viewer has gone.
     os.environ.setdefault("RUST_LOG", "off")
-    from pdtui.driving.server import (
-        serve_drive,  # loads torch and the simulator, which the screen does without
-    )
+    from pdtui.driving import server  # loads torch and the simulator, which the screen does without
 
-    serve_drive(connection, config)
+    server.serve_drive(connection, config)
 
 
 class DriveClient(DriveConnection):
-    """Starts the simulation's process; create it before the screen takes over the terminal.
-
-    Args:
-        config: the drive to start.
-    """
+    """Starts the simulation's process; create it before the screen takes over the terminal."""
 
     def __init__(self, config: DriveConfig) -> None:
         context = multiprocessing.get_context("spawn")
@@ -113,7 +105,7 @@ class DriveClient(DriveConnection):
             self._process.kill()
             self._process.join()
         self._connection.close()
-        return self._last_words or self._death()
+        return self._last_words or self._describe_death()
 
     def _receive(self, timeout: float = 0.0) -> DriveFacts | DriveSnapshot | PdtuiError | str | None:
         try:
@@ -121,7 +113,7 @@ class DriveClient(DriveConnection):
                 return None
             message: DriveFacts | DriveSnapshot | PdtuiError | str = self._connection.recv()
         except (EOFError, OSError):
-            return PdtuiError(self._death())
+            return PdtuiError(self._describe_death())
         return message
 
     def _send(self, kind: str, value: str | None) -> None:
@@ -130,6 +122,6 @@ class DriveClient(DriveConnection):
         except OSError:
             return  # the process is gone; the next poll says why
 
-    def _death(self) -> str:
+    def _describe_death(self) -> str:
         line = f"the simulation's process {describe_exit(self._process)}"
         return f"{line}; the recording up to then is in {self._recording}" if self._recording else line

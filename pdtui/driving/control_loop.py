@@ -32,9 +32,7 @@ class ControlLoop:
         start: name of the state in which episodes start; empty for the robot's default.
 
     Raises:
-        PolicyError: a unit of the map does not exist.
-        MapError: the robot has no command that a behavior of the map sets.
-        RobotError: the robot has no such start.
+        PdtuiError: a unit or a command that the map names does not exist, or the robot has no such start.
     """
 
     def __init__(
@@ -85,11 +83,9 @@ class ControlLoop:
     def advance(self, events: Sequence[Event] = ()) -> StepRecord:
         """Apply the events, then run one control step.
 
-        Where the episode ended with the step before, the next one starts first. A simulation that diverges
-        gives a record that says so; the loop cannot go on after it.
-
-        Raises:
-            KeystrokeError: an event does not fit the map or the present state.
+        If the previous step ended the episode, the next episode starts first. After a record that says that
+        the simulation diverged, the loop cannot go on. An event that does not fit the map or the present
+        state raises a `KeystrokeError`.
         """
         if self._ended:
             self._start_episode()
@@ -104,7 +100,7 @@ class ControlLoop:
             self._observation = self.robot.observe()
         behaviors = self.latch.active
         acted = self.policy.act(self._observation, stimulation, self._noise)
-        diverged, fell, ended, reward, cost, finished = False, False, "", 0.0, 0.0, False
+        ended, reward, cost, diverged, fell, finished = "", 0.0, 0.0, False, False, False
         try:
             self._observation, gained, terminated, truncated, details = self.robot.step(acted.action)
             reward, cost = float(gained), float(details["cost"])
@@ -141,7 +137,7 @@ class ControlLoop:
         return record
 
     def _apply(self, event: Event, *, rehearsing: bool = False) -> None:
-        """Apply an event; in a rehearsal, only to the latch and the rewind history's position."""
+        """Apply an event; while rehearsing, only to the latch and to the position in the rewind history."""
         match event.kind:
             case "behavior":
                 self.latch.latch_behavior(event.name, self.attributes)
@@ -164,12 +160,11 @@ class ControlLoop:
 
     @contextmanager
     def rehearsal(self) -> Iterator[Callable[[Event], None]]:
-        """Yield a function that applies an event of this step to the latch; everything is undone at the end.
+        """Yield a function that applies an event of this step to the latch; at the end, all is undone.
 
-        This shows what a key means after other keys that were pressed before the same step.
+        It shows what a key means after other keys that were pressed before the same step.
         """
         latch, position = self.latch.copy_state(), self.history.position
-
         if self._ended:
             self.latch.clear()  # the next step begins an episode
         try:

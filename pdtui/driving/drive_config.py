@@ -1,4 +1,4 @@
-"""The configuration of a drive, as plain data that is sent to the simulation's process."""
+"""The configuration of a drive: plain data that is sent to the simulation's process."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class DriveConfig:
         robot: name of the robot.
         stimulation_map: the behaviors.
         seed: seed of the drive.
-        policy: weights file or shipped name; empty takes the map's.
+        policy: weights file or shipped name; empty for the map's.
         stochastic: draw actions from the policy's distribution instead of taking its mean.
         start: name of the state in which episodes start; empty for the robot's default.
         force: drive even if the policy is not the map's.

@@ -1,4 +1,4 @@
-"""What the simulation's process sends to the screen, as plain data."""
+"""The messages that the simulation's process sends to the screen, as plain data."""
 
 from __future__ import annotations
 

@@ -48,8 +48,7 @@ class DriveSummary:
 def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:
     """Return the events of keys that are pressed before the loop's next step.
 
-    Raises:
-        KeystrokeError: a key means nothing in the present state.
+    A key that means nothing in the present state raises a `KeystrokeError`.
     """
     events = []
     for key, meaning in zip(keys, interpret_keys(keys, loop), strict=True):
@@ -62,11 +61,9 @@ def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:
 def drive_keys(loop: ControlLoop, presses: Mapping[int, Sequence[str]], steps: int) -> Iterator[StepRecord]:
     """Yield the records of a drive from keystrokes, as fast as possible.
 
-    Keys of one step are interpreted in order, because what a key means depends on the keys before it.
-
     Raises:
-        KeystrokeError: a key means nothing in the state it meets.
-        SimulationDiverged: after the record of the step that diverged.
+        KeystrokeError: a key means nothing in the state at its step.
+        SimulationDiverged: the simulation cannot go on; the record of the step that says so comes first.
     """
     for _ in range(steps):
         record = loop.advance(key_events(presses.get(loop.step, ()), loop))
@@ -78,12 +75,9 @@ def drive_keys(loop: ControlLoop, presses: Mapping[int, Sequence[str]], steps: i
 def run_episode(
     loop: ControlLoop, steps: int, events_before: Callable[[int], Sequence[Event]] = lambda _: ()
 ) -> Iterator[StepRecord]:
-    """Drive from the loop's present step until the episode ends, and at most so many steps.
+    """Drive until the episode ends, for at most `steps` control steps, and yield the records.
 
-    Args:
-        loop: the drive.
-        steps: control steps at most.
-        events_before: given the number of a control step, returns the events before it.
+    `events_before` returns the events before the control step with the given number.
     """
     for _ in range(steps):
         record = loop.advance(events_before(loop.step))
@@ -94,19 +88,19 @@ def run_episode(
 
 @contextmanager
 def catch_ending_signals() -> Iterator[Callable[[], str]]:
-    """Yield a function that says which signal has come; it returns an empty string while none has.
+    """Yield a function that names the signal that has come; while none has, it returns an empty string.
 
-    By default, SIGTERM and SIGHUP would leave a recording without its end. The handlers are restored at the
-    end. Only a program's main thread can do this.
+    A drive can thus end between two control steps: by default, SIGTERM and SIGHUP would leave a recording
+    without its end. Only a program's main thread can catch signals. The handlers are restored at the end.
     """
-    came: list[str] = []
+    signals: list[str] = []
 
     def note(number: int, _frame: FrameType | None) -> None:
-        came.append(f"ended by {signal.Signals(number).name}")
+        signals.append(f"ended by {signal.Signals(number).name}")
 
     before = {number: signal.signal(number, note) for number in ENDING_SIGNALS}
     try:
-        yield lambda: came[0] if came else ""
+        yield lambda: signals[0] if signals else ""
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -145,7 +139,7 @@ def drive_headless(
 
     Raises:
         DriveEnded: `ended` returned a reason.
-        PdtuiError: as for `drive_keys`; the recording is complete nevertheless.
+        PdtuiError: as for `drive_keys`; the recording is complete all the same.
     """
     falls = involvement = done = 0
     total = np.zeros(len(loop.robot.attributes))
@@ -157,13 +151,10 @@ def drive_headless(
             involvement += any(event.key for event in record.events)
             total += record.attributes
             if reason := ended():
-                raise DriveEnded(f"{reason}: {done} steps{_recorded(recorder)}")
+                where = "" if recorder is None else f", recorded in {recorder.path}"
+                raise DriveEnded(f"{reason}: {done} steps{where}")
     means = {
         attribute.name: float(value / max(done, 1))
         for attribute, value in zip(loop.robot.attributes, total, strict=True)
     }
     return DriveSummary(done, done * loop.robot.control_dt, falls, involvement, means)
-
-
-def _recorded(recorder: SessionRecorder | None) -> str:
-    return "" if recorder is None else f", recorded in {recorder.path}"

@@ -1,4 +1,4 @@
-"""Turning pressed keys and keystroke files into events."""
+"""Turns pressed keys into events, and keystroke files into pressed keys."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _rewind_event(row: FixedKey, loop: ControlLoop) -> Event | str:
 
 
 def _target_event(row: FixedKey, loop: ControlLoop) -> Event | str:
-    """Of several targets, left and right move a heading, and up and down anything else."""
+    """Return the event of an arrow: left and right move the target of a heading, up and down any other."""
     held = [view for view in loop.latch.active if view.target is not None]
     if not held:
         return "no target is held; only behaviors of mode pid hold one"
@@ -95,10 +95,7 @@ def _target_event(row: FixedKey, loop: ControlLoop) -> Event | str:
 def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, list[str]]:
     """Return key presses by control step from a text file with one ``STEP KEY`` per line.
 
-    ``#`` starts a comment.
-
-    Raises:
-        KeystrokeError: the file cannot be read, or a line, which the message names, is wrong.
+    ``#`` starts a comment. A `KeystrokeError` names the file or the line that is wrong.
     """
     try:
         with path.open("rb") as file:  # it may be a pipe
@@ -133,13 +130,9 @@ def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, li
 
 
 def format_keystrokes(events: Iterable[Event]) -> str:
-    """Return the key presses among events as the text of a keystroke file.
-
-    Raises:
-        KeystrokeError: a key's name is not a single word.
-    """
+    """Return the key presses among events as the text of a keystroke file."""
     pressed = [event for event in events if event.key]
     for event in pressed:
         if _LINE.fullmatch(f"{event.step} {event.key}") is None or "#" in event.key:
-            raise KeystrokeError(f"step {event.step}: {event.key[:40]!r} is no name of a key")
+            raise KeystrokeError(f"step {event.step}: {event.key[:40]!r} is not the name of a key")
     return "".join(f"{event.step} {event.key}\n" for event in pressed)

@@ -1,4 +1,4 @@
-"""Building a control loop from a drive's configuration."""
+"""Builds a control loop from the configuration of a drive."""
 
 from __future__ import annotations
 
@@ -20,21 +20,22 @@ from pdtui.robots.robot import Robot
 def build_loop(
     config: DriveConfig, robot: Robot | None = None, policy: Policy | nn.Module | None = None
 ) -> ControlLoop:
-    """Load the robot and the policy, unless they are given, and set the loop to step 0.
+    """Return a loop before its first step; the robot and the policy are loaded unless they are given.
 
-    Raises:
-        PdtuiError: robot, policy or map cannot be loaded or do not fit each other.
+    Those that cannot be loaded, or do not fit each other or the map, raise a `PdtuiError`.
     """
-    robot, wanted = robot or make_robot(config.robot), config.stimulation_map
+    robot, stimulation_map = robot or make_robot(config.robot), config.stimulation_map
     if isinstance(policy, nn.Module):
         policy = policy_from_network(policy, robot.observation_space, robot.action_space)
     policy = policy or load_policy(
-        config.policy or wanted.policy,
+        config.policy or stimulation_map.policy,
         config.robot,
-        import_options=wanted.import_options,
+        import_options=stimulation_map.import_options,
         spaces=WorldSpaces.of_world(robot),
-        folders=(Path(wanted.source).parent,),
+        folders=(Path(stimulation_map.source).parent,),
     )
-    wanted.check(config.robot, policy.layers, policy.sha256, force=config.force)
+    stimulation_map.check(config.robot, policy.layers, policy.sha256, force=config.force)
     check_fit(policy, robot, config.robot)
-    return ControlLoop(robot, policy, wanted, config.seed, stochastic=config.stochastic, start=config.start)
+    return ControlLoop(
+        robot, policy, stimulation_map, config.seed, stochastic=config.stochastic, start=config.start
+    )

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 PaceRequest = Literal["pause", "step", "slower", "faster"]
 SLOWEST, FASTEST = 1 / 16, 16.0
 _LAG_FORGIVEN = 0.25
+"""Longest delay that is caught up by faster steps, s."""
 
 
 class Pacer:
@@ -25,11 +26,7 @@ class Pacer:
         self._marks: list[float] = []
 
     def change_pace(self, pace: PaceRequest, now: float) -> None:
-        """Change the pace; a single step pauses first.
-
-        Raises:
-            ValueError: there is no such request.
-        """
+        """Change the pace; a single step pauses first."""
         match pace:
             case "pause":
                 self.paused = not self.paused

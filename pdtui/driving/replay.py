@@ -1,4 +1,4 @@
-"""Run a session again and compare, step by step."""
+"""Runs a session again and compares every step."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ from pdtui.stimulation.map_policy_lookup import locate_map_policy
 from pdtui.stimulation.map_reader import parse_map
 
 TOLERANCE = 5e-6
-"""In standard deviations of each attribute over the session, for `REQUIRED_STEPS`.
+"""Tolerance in the first `REQUIRED_STEPS`, in standard deviations of each attribute over the session.
 
 Another processor sums in another order. The shipped samples, recorded on an AMD EPYC and computed again on
-an Intel Xeon, differ by an ulp of the policy's float32 output from the first control step on: by at most
-2.5e-6 in the first 5 steps, 5e-5 in the first 20, and by everything after some seconds, since contacts
-amplify the last bits. A change that is meant is larger at once: with weights changed by 1e-5 of themselves,
+an Intel Xeon, differ by the last bit of the policy's float32 output from the first control step on: by at
+most 2.5e-6 in the first 5 steps, by 5e-5 in the first 20, and entirely after some seconds, since contacts
+amplify rounding. A deliberate change is larger at once: if each weight is changed by 1e-5 of itself,
 attributes are off by 2e-5 or more within 5 steps (four robots, six draws each).
 """
 
 REQUIRED_STEPS = 5
-"""Control steps for which a drive on another machine has to agree."""
+"""Control steps in which a drive on another machine must be within the tolerance."""
 
 
 @dataclass(frozen=True)
@@ -50,16 +50,16 @@ class ReplayResult:
     Attributes:
         steps: control steps that were compared.
         first_difference: the first control step whose digest differs; None if none does.
-        change: by how much the attribute that differs most does so in that step, in its unit.
-        detail: that attribute and its change, in words.
+        change: difference, in that step and in its unit, of the attribute that differs most.
+        detail: that attribute and its difference, in words.
         environment: how machine and versions differ from the session's.
         total: control steps of the session.
         dt: simulated time of a control step, s.
         deviations: how far each attribute is off from the first difference on, worst first.
-        agreed: control steps, from the first, in which every attribute is within the tolerance.
-        tolerance: in standard deviations of each attribute; None where only the same bits will do.
-        judged: control steps that have to be within the tolerance.
-        stopped: why the replay could not go on after it had departed from the session; empty if it could.
+        agreed: number of first control steps in which every attribute is within the tolerance.
+        tolerance: in standard deviations of each attribute; None if every bit must be the same.
+        judged: number of first control steps that must be within the tolerance.
+        stopped: why the replay could not go on after it differed from the session; empty if it could.
     """
 
     steps: int
@@ -82,7 +82,7 @@ class ReplayResult:
 
     @property
     def passed(self) -> bool:
-        """Whether the session repeats: bit for bit, or elsewhere within the tolerance."""
+        """Whether the session repeats: bit for bit, or on another machine within the tolerance."""
         return self.identical or (self.tolerance is not None and self.agreed >= self.judged)
 
     @property
@@ -102,16 +102,15 @@ class ReplayResult:
 
 
 def replay_config(session: Session, source: str, policy: str = "") -> DriveConfig:
-    """The drive that repeats a session.
+    """Return the configuration of the drive that repeats a session.
 
-    Raises:
-        MapError: the map inside the session is broken.
-        PolicyError: it names a file that lies outside of the session's folder and the working directory.
+    A `MapError` means that the map inside the session is broken; a `PolicyError`, that the map names a file
+    outside of the session's folder and the working directory.
     """
     info = session.info
     stimulation_map = parse_map(info.map_text, f"{source} (map)")
     stimulation_map = locate_map_policy(stimulation_map, policy)
-    # A drive that was forced had other weights than its map was made for; a replay wants the session's own.
+    # A forced drive had other weights than its map was made for; a replay needs the session's own.
     stimulation_map = replace(stimulation_map, policy_hash=info.policy_hash)
     return DriveConfig(
         robot=info.robot,
@@ -136,25 +135,25 @@ def replay_session(
     force: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> ReplayResult:
-    """Run a session from its file and its policy alone, comparing every step.
+    """Run a session from its file and its policy alone, and compare every step.
 
-    With the machine and the versions that recorded it, every digest must be the same. Elsewhere sums may be
-    rounded otherwise, and a robot that touches the ground amplifies that until nothing agrees any more:
-    there, the attributes have to agree in the first control steps.
+    On the machine and with the versions that recorded it, every digest must be the same. Elsewhere, sums may
+    be rounded differently, and a robot's contacts with the ground amplify that until nothing agrees any more;
+    there, the attributes must agree in the first control steps.
 
     Args:
         path: the session.
-        policy: the policy or its weights file, where the one that the map names is elsewhere now.
-        robot: the robot, where its name is not known.
-        strict: every digest must be the same, wherever this runs.
+        policy: the policy or its weights file, if it is no longer where the map says.
+        robot: the robot, if it cannot be built from its name.
+        strict: whether every digest must be the same on any machine.
         tolerance: elsewhere, in standard deviations of each attribute over the session.
-        required_steps: elsewhere, the control steps for which they have to agree.
-        force: run although the policy is not the session's.
-        progress: called with steps done and steps in all.
+        required_steps: elsewhere, number of first control steps that must be within the tolerance.
+        force: run even if the policy is not the session's.
+        progress: called with the number of steps done and the total.
 
     Raises:
-        PdtuiError: the session cannot be read, its policy cannot be had, or an event does not fit although
-            nothing had differed before it.
+        PdtuiError: the session or its policy cannot be loaded, or an event does not fit although nothing had
+            differed before it.
     """
     session = read_session(path)
     given = None if isinstance(policy, str) else policy
@@ -162,23 +161,25 @@ def replay_session(
     with open_robot(robot or config.robot) as world:
         loop = build_loop(replace(config, force=force), world, given)
         if world.attributes != session.info.attributes:
-            raise SessionError(f"{path}: the robot measures other attributes now; nothing can be compared")
-        first, changes, stopped = _run(session, loop, progress)
+            raise SessionError(f"{path}: the robot has other attributes than the session")
+        first, changes, stopped = _compare_steps(session, loop, progress)
     here = collect_versions()
     elsewhere = bool(list_version_differences(session.versions, here, numeric=True)) and not strict
     spread = measure_spread(session.attributes)
-    wrong = np.flatnonzero((changes > tolerance * spread).any(axis=1))
-    agreed = (first or 0) + (int(wrong[0]) if wrong.size else len(changes))
-    found = summarise_deviations(changes, session.info.attributes, first, spread) if first is not None else ()
+    outside = np.flatnonzero((changes > tolerance * spread).any(axis=1))
+    agreed = (first or 0) + (int(outside[0]) if outside.size else len(changes))
+    deviations = (
+        summarise_deviations(changes, session.info.attributes, first, spread) if first is not None else ()
+    )
     return ReplayResult(
         steps=session.steps if first is None else first + len(changes),
         first_difference=first,
-        change=found[0].first if found else 0.0,
-        detail=_detail(found),
+        change=deviations[0].first if deviations else 0.0,
+        detail=_detail(deviations),
         environment=tuple(list_version_differences(session.versions, here)),
         total=session.steps,
         dt=session.info.dt,
-        deviations=found,
+        deviations=deviations,
         agreed=session.steps if first is None else agreed,
         tolerance=tolerance if elsewhere else None,
         judged=min(session.steps, required_steps),
@@ -186,10 +187,10 @@ def replay_session(
     )
 
 
-def _run(
+def _compare_steps(
     session: Session, loop: ControlLoop, progress: Callable[[int, int], None] | None
 ) -> tuple[int | None, Floats, str]:
-    """The first step that differs, how far attributes are off from there on, and why that ended early."""
+    """Return the first step that differs, how far attributes are off from there on, and why it stopped."""
     events = group_events_by_step(session.events)
     first: int | None = None
     changes = []
@@ -200,7 +201,7 @@ def _run(
         except PdtuiError as error:
             if first is None:
                 raise
-            # A robot that fell elsewhere than in the session no longer does what the keys ask of it.
+            # Once the replay differs, an event of the session may no longer fit its state.
             stopped = f"step {step}: {error}"
             break
         if first is None and record.digest != digest:
@@ -219,10 +220,10 @@ def _run(
     return first, np.array(changes).reshape(-1, len(session.info.attributes)), stopped
 
 
-def _detail(found: tuple[AttributeDeviation, ...]) -> str:
-    if not found:
-        return "the simulator's state differs, no attribute does"
-    worst = found[0]
+def _detail(deviations: tuple[AttributeDeviation, ...]) -> str:
+    if not deviations:
+        return "the simulator's state differs, but no attribute does"
+    worst = deviations[0]
     if worst.first == 0.0:
-        return f"the simulator's state differs; attributes do later: {worst}"
+        return f"the simulator's state differs; attributes differ later: {worst}"
     return f"{worst.attribute} is off by {worst.first:.3g} {worst.unit}"

@@ -48,14 +48,14 @@ class _KeptState:
 class RewindHistory:
     """The latest kept states, by the control step before which they held.
 
-    The step counter never goes back: after a rewind, an earlier state goes on under new numbers. How far back
-    a state lies is therefore counted along the way that led to the present one.
+    The step counter never goes back: after a rewind, an earlier state goes on under new step numbers. How far
+    back a state lies is therefore counted along the steps that led to the present one.
     """
 
     def __init__(self) -> None:
         self._kept: OrderedDict[int, _KeptState] = OrderedDict()
         self.position: tuple[int | None, int] = (None, 0)
-        """The latest kept state that led to the present one, and the step counter minus that way's steps."""
+        """The latest kept state that led to the present one, and how far the step counter is ahead of it."""
 
     def keep(self, step: int, state: DriveState) -> None:
         """Keep the state before a control step, and forget the oldest one beyond `MAX_KEPT_STATES`."""
@@ -76,11 +76,7 @@ class RewindHistory:
         return None
 
     def return_to(self, target: float, step: int) -> DriveState:
-        """Return the state before step `target`, from which the present `step` goes on.
-
-        Raises:
-            KeystrokeError: no such state is kept.
-        """
+        """Return the state before step `target`, from which the present `step` goes on."""
         wanted = int(target) if math.isfinite(target) else -1
         if wanted not in self._kept:
             known = f"{next(iter(self._kept))}..{next(reversed(self._kept))}" if self._kept else "none yet"

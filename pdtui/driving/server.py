@@ -27,14 +27,15 @@ from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 SendMessage = Callable[[object], Future[None]]
 _IDLE = 0.05
+"""Longest wait for a request while the drive is paused or over, s."""
 PACED_ROWS_PER_WRITE = 4
 
 
 class DriveServer:
     """Runs one drive at its pace, controlled through a pipe.
 
-    A snapshot is built only when the screen has asked for one and the last one has been sent, so it is the
-    newest, and a screen that has stopped never blocks the drive.
+    A snapshot is built only when the screen has asked for one and the last one has been sent. It is therefore
+    the newest, and a screen that has stopped never blocks the drive.
 
     Args:
         connection: the pipe; requests are read from it.
@@ -94,7 +95,7 @@ class DriveServer:
             self._close_recording()
 
     def stop(self, reason: str) -> None:
-        """End the drive after the present step; safe in a signal handler."""
+        """End the drive after the present step; a signal handler may call this."""
         self._closing = reason
 
     def outcome(self) -> str:

@@ -1,4 +1,4 @@
-"""Builds the snapshots that the screen draws from the steps between them."""
+"""Builds the snapshots that the screen draws."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.events import describe_event
 from pdtui.core.robot_data import NO_OBSTACLES
-from pdtui.core.step_record import ActiveBehavior, StepRecord
+from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_snapshot import DriveSnapshot, StimulatedUnit
 from pdtui.sessions.episode_statistics import EpisodeStatisticsCounter
@@ -16,11 +16,7 @@ _ROWS_KEPT = 4000
 
 
 class SnapshotBuilder:
-    """Collects steps since the last snapshot, so that skipped frames lose nothing.
-
-    Args:
-        loop: the loop of the drive.
-    """
+    """Collects the steps since the last snapshot, so that skipped frames lose nothing."""
 
     def __init__(self, loop: ControlLoop) -> None:
         self._loop = loop
@@ -61,7 +57,7 @@ class SnapshotBuilder:
     ) -> DriveSnapshot:
         """Return the present state, with history and path since the last call."""
         loop, last = self._loop, self._last
-        active: tuple[ActiveBehavior, ...] = loop.latch.active
+        active = loop.latch.active
         units: tuple[StimulatedUnit, ...] = ()
         if last is not None and active:
             stimulated = zip(last.stimulation.units, last.natural, last.stimulation.values, strict=True)

@@ -66,11 +66,7 @@ class Trajectory:
         )
 
     def unit(self, address: str) -> NDArray[np.float32]:
-        """Activations of one unit, shape (S,).
-
-        Raises:
-            PolicyError: no such unit.
-        """
+        """Return the activations of one unit, shape (S,); a `PolicyError` says that there is no such unit."""
         return self.activations[:, parse_unit(address, self.info.layers)]
 
 
@@ -84,13 +80,13 @@ def collect_trajectory(
 
     Args:
         loop: the drive, before its first step.
-        keys: one key, or several, by the control step before which they are pressed.
+        keys: one key or several for each control step before which they are pressed.
         steps: control steps.
         recorder: records every step, and is closed however the drive ends.
 
     Raises:
         KeystrokeError: a key means nothing in the state at its step.
-        SimulationDiverged: the simulation cannot go on; the recording is complete nevertheless.
+        SimulationDiverged: the simulation cannot go on; the recording is complete all the same.
     """
     presses = {step: [pressed] if isinstance(pressed, str) else pressed for step, pressed in keys.items()}
     records: list[StepRecord] = []

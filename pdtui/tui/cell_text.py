@@ -5,24 +5,10 @@ from __future__ import annotations
 from rich.cells import cell_len, set_cell_size
 from rich.segment import Segment
 from rich.style import Style
+from textual.keys import format_key
 from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
-
-_KEYS = {
-    "up": "↑",
-    "down": "↓",
-    "left": "←",
-    "right": "→",
-    "plus": "+",
-    "minus": "-",
-    "comma": ",",
-    "full_stop": ".",
-    "question_mark": "?",
-    "backspace": "⌫",
-    "space": "space",
-    "enter": "↵",
-}
 
 
 def fit_cells(text: str, width: int) -> str:
@@ -52,7 +38,7 @@ def format_signed(value: float) -> str:
 
 def key_name(key: str) -> str:
     """Return the name under which the screen shows a key."""
-    return make_printable(_KEYS.get(key, key))
+    return make_printable(format_key(key))
 
 
 class ScreenRow:

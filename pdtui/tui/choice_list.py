@@ -19,13 +19,7 @@ MAX_CHOICES = 200
 
 
 class Choice(Option):
-    """One choice.
-
-    Args:
-        prompt: what the list shows.
-        value: what choosing it gives.
-        disabled: whether it is shown but cannot be chosen.
-    """
+    """One choice: the text that the list shows, and the value that choosing it gives."""
 
     def __init__(self, prompt: Text, value: Any, *, disabled: bool = False) -> None:
         super().__init__(prompt, disabled=disabled)
@@ -76,11 +70,7 @@ class ChoiceList(Vertical):
 
     @dataclass
     class Chosen(Message):
-        """A choice was made.
-
-        Attributes:
-            value: the value of the choice.
-        """
+        """A choice with this value was made."""
 
         value: Any
 

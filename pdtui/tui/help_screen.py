@@ -26,12 +26,7 @@ KeyLines = Sequence[tuple[str, str]]
 
 
 class HelpScreen(ModalScreen[None]):
-    """Lists the keys of the map, then the application's; the drive and its keys go on working beneath.
-
-    Args:
-        stimulation_map: the behaviors and their keys.
-        keys: the application's keys as remapped, and what each does.
-    """
+    """Lists the keys of the map, then the application's keys as remapped; the drive goes on beneath."""
 
     BINDINGS: ClassVar = [
         Binding("question_mark,q,enter,escape", "dismiss", "closes the help", id="close_help"),

@@ -60,11 +60,7 @@ def map_picker_rows(maps: Sequence[ListedMap]) -> list[MapPickerRow]:
 
 
 class MapPickerApp(App[MapPickerRow]):
-    """Lets the user choose a map by arrow keys and a filter; `run` returns the chosen row or None.
-
-    Args:
-        rows: the maps, in the order to list them.
-    """
+    """Lets the user choose a map by arrow keys and a filter; `run` returns the chosen row or None."""
 
     CSS = """
     Screen { align: center middle; background: $background; }

@@ -8,13 +8,15 @@ from pdtui.core.attributes import Floats
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.perspective_camera import PerspectiveCamera
 
+_ON_GROUND = np.array([1.0, 1.0, 0.0])
+"""Makes the place on the ground of x, y and radius."""
 _LEAST = 1.0
 """Radius of the smallest disc, in dots: larger than a dot of the ground."""
 
 
 def draw_from_above(canvas: BrailleCanvas, camera: PerspectiveCamera, obstacles: Floats, ink: int) -> None:
     """Draw a disc per obstacle, with a rim that keeps the ground grid away."""
-    dots, magnification, before = camera.project(_on_ground(obstacles))
+    dots, magnification, before = camera.project(obstacles * _ON_GROUND)
     for dot, scale, radius in zip(dots[before], magnification[before], obstacles[before, 2], strict=True):
         canvas.draw_capsule(dot, dot, max(_LEAST, float(radius * scale) * camera.zoom), ink, halo=1.0)
 
@@ -24,17 +26,12 @@ def draw_from_side(
 ) -> None:
     """Draw a trunk per obstacle, far ones first; in front of the robot only its outline, which hides nothing.
 
-    The height of obstacles is unknown, so trunks reach to the picture's edge.
-
-    Args:
-        canvas, camera: those of the robot.
-        obstacles: x, y and radius, m, shape (N, 3).
-        ink: ink of the trunks.
-        behind: draw the obstacles behind the robot instead of those in front of it.
+    The height of obstacles is unknown, so trunks reach to the picture's edge. `obstacles` are x, y and radius
+    in m, shape (N, 3); those behind the robot are drawn if `behind`, otherwise those in front of it.
     """
     chosen = obstacles[(obstacles[:, 1] > camera.target[1]) == behind]
     chosen = chosen[np.argsort(-chosen[:, 1], kind="stable")]
-    feet, magnification, before = camera.project(_on_ground(chosen))
+    feet, magnification, before = camera.project(chosen * _ON_GROUND)
     widths = chosen[:, 2] * magnification * camera.zoom
     for row in np.flatnonzero(before):
         foot, top = feet[row], np.array([feet[row, 0], min(feet[row, 1], 0.0)])
@@ -43,8 +40,3 @@ def draw_from_side(
         else:
             sides = np.array([[-widths[row], 0.0], [widths[row], 0.0]])
             canvas.draw_segments(foot + sides, top + sides, ink)
-
-
-def _on_ground(obstacles: Floats) -> Floats:
-    places: Floats = obstacles * np.array([1.0, 1.0, 0.0])
-    return places

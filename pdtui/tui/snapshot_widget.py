@@ -25,12 +25,7 @@ Sides = tuple[Strip, Strip, Color, Style]
 
 
 class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
-    """Paints whole lines, repaints only those that changed, and never changes the layout.
-
-    Args:
-        stimulation_map: the behaviors of the drive.
-        id: name in the style sheet.
-    """
+    """Paints whole lines, repaints only those that changed, and never changes the layout."""
 
     ALLOW_SELECT: ClassVar[bool] = False
     facts: reactive[DriveFacts | None] = reactive(None, init=False, repaint=False, always_update=True)

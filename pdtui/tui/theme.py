@@ -1,8 +1,6 @@
-"""The theme and the styles of pictures and tables derived from it."""
+"""The screen's only theme, and the styles of pictures and tables that are derived from it."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 from rich.style import Style
 from textual.color import Color
@@ -30,9 +28,25 @@ _DEPTHS = ((0.0, 0.45), (0.0, 0.62), (0.0, 0.80), (0.03, 1.0), (0.16, 1.0))
 """From far to near: the lightening of the robot's colour, and its share in the blend with the background."""
 
 
-@dataclass(frozen=True)
+_VARIABLES = THEME.to_color_system().generate()
+_BACK, _FRONT, _MAIN, _ACCENT, _SUCCESS, _WARNING, _ERROR, _PANEL = (
+    Color.parse(_VARIABLES[name])
+    for name in ("background", "foreground", "primary", "accent", "success", "warning", "error", "panel")
+)
+_BEHAVIORS = tuple(Color.parse(color) for color in BEHAVIOR_COLORS)
+
+
+def _style(color: Color, *, bold: bool = False, on: Color | None = None) -> Style:
+    return Style(color=color.rich_color, bold=bold or None, bgcolor=None if on is None else on.rich_color)
+
+
+def _heat(level: int) -> Color:
+    share = (abs(level) / HEAT_LEVELS) ** 0.8
+    return _BACK.blend(_PANEL, 0.8).blend(_WARM if level > 0 else _COLD, share)
+
+
 class ThemeStyles:
-    """The styles of a theme.
+    """The styles that are derived from the theme.
 
     Attributes:
         base: the background.
@@ -48,65 +62,27 @@ class ThemeStyles:
         heat: colours from −1 over 0 to +1, 2 × HEAT_LEVELS + 1 of them.
     """
 
-    base: Style
-    text: Style
-    muted: Style
-    faint: Style
-    title: Style
-    primary: Style
-    accent: Style
-    good: Style
-    warn: Style
-    bad: Style
-    alert: Style
-    obstacle: Style
-    key: Style
-    behaviors: tuple[Style, ...]
-    caps: tuple[Style, ...]
-    depth: tuple[Style, ...]
-    heat: tuple[Color, ...]
+    base = Style(bgcolor=_BACK.rich_color)
+    text = _style(_FRONT)
+    muted = _style(_BACK.blend(_FRONT, 0.58))
+    faint = _style(_BACK.blend(_FRONT, 0.30))
+    title = _style(_FRONT, bold=True)
+    primary = _style(_MAIN)
+    accent = _style(_ACCENT, bold=True)
+    good = _style(_SUCCESS)
+    warn = _style(_WARNING)
+    bad = _style(_ERROR)
+    alert = _style(_BACK, bold=True, on=_ERROR)
+    obstacle = _style(_SUCCESS, bold=True)
+    key = _style(_FRONT, bold=True, on=_BACK.blend(_FRONT, 0.16))
+    behaviors = tuple(_style(color) for color in _BEHAVIORS)
+    caps = tuple(_style(_BACK, bold=True, on=color) for color in _BEHAVIORS)
+    depth = tuple(_style(_BACK.blend(_MAIN.lighten(light), share)) for light, share in _DEPTHS)
+    heat = tuple(_heat(level) for level in range(-HEAT_LEVELS, HEAT_LEVELS + 1))
 
     def behavior(self, row: int) -> Style:
         """Return the colour of the behavior in a row of the map; faint for no behavior."""
         return self.faint if row < 0 else self.behaviors[row % len(self.behaviors)]
 
 
-def _derive_styles(theme: Theme) -> ThemeStyles:
-    variables = theme.to_color_system().generate()
-    names = ("background", "foreground", "primary", "accent", "success", "warning", "error", "panel")
-    back, front, main, accent, success, warning, error, panel = (
-        Color.parse(variables[name]) for name in names
-    )
-    colors = [Color.parse(color) for color in BEHAVIOR_COLORS]
-    zero = back.blend(panel, 0.8)
-
-    def style(color: Color, *, bold: bool = False, on: Color | None = None) -> Style:
-        return Style(color=color.rich_color, bold=bold or None, bgcolor=None if on is None else on.rich_color)
-
-    def heat(level: int) -> Color:
-        share = (abs(level) / HEAT_LEVELS) ** 0.8
-        return zero.blend(_WARM if level > 0 else _COLD, share)
-
-    return ThemeStyles(
-        base=Style(bgcolor=back.rich_color),
-        text=style(front),
-        muted=style(back.blend(front, 0.58)),
-        faint=style(back.blend(front, 0.30)),
-        title=style(front, bold=True),
-        primary=style(main),
-        accent=style(accent, bold=True),
-        good=style(success),
-        warn=style(warning),
-        bad=style(error),
-        alert=style(back, bold=True, on=error),
-        obstacle=style(success, bold=True),
-        key=style(front, bold=True, on=back.blend(front, 0.16)),
-        behaviors=tuple(style(color) for color in colors),
-        caps=tuple(style(back, bold=True, on=color) for color in colors),
-        depth=tuple(style(back.blend(main.lighten(light), share)) for light, share in _DEPTHS),
-        heat=tuple(heat(level) for level in range(-HEAT_LEVELS, HEAT_LEVELS + 1)),
-    )
-
-
-STYLES = _derive_styles(THEME)
-"""The styles of the screen's only theme."""
+STYLES = ThemeStyles()

@@ -37,12 +37,7 @@ _KEYS = "/ search   l links   t contents   b back   [ ] pages   ↑ ↓ scroll  
 
 
 class GuideApp(App[None]):
-    """Show the guide.
-
-    Args:
-        pages: every page, by topic and in reading order.
-        topic: the page to begin with.
-    """
+    """Shows all pages, which are given by topic and in reading order, beginning with one topic."""
 
     CSS = GUIDE_STYLE
     TITLE = "pdtui guide"
@@ -139,12 +134,7 @@ class GuideApp(App[None]):
 
 
 class GuideChooser(ModalScreen[str | None]):
-    """The overlay in which text, a link or a heading is found; the result is a link, or None.
-
-    Args:
-        title: what is chosen.
-        find_choices: returns the choices for what was typed.
-    """
+    """The overlay in which text, a link or a heading is chosen; the result is a link, or None."""
 
     BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "closes the list", id="guide_close")]
 

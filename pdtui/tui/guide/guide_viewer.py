@@ -27,11 +27,7 @@ class GuideViewer(MarkdownViewer):
         return path.stem
 
     async def follow(self, target: str) -> None:
-        """Show what a link leads to.
-
-        Args:
-            target: of the link: a page, a page and a heading, a heading of this page, or a web address.
-        """
+        """Show what a link leads to: a page, a heading of it or of this page; copy a web address."""
         path, _ = Markdown.sanitize_location(target)
         if "://" in target or path.suffix not in ("", ".md"):
             self.app.copy_to_clipboard(target)

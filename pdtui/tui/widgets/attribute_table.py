@@ -104,12 +104,7 @@ class AttributeTable(SnapshotWidget):
 
 
 class AttributeHistory:
-    """The last `length` values of J attributes.
-
-    Args:
-        length: number of rows to keep.
-        columns: J.
-    """
+    """The last `length` values of each of `columns` attributes, and their range so far."""
 
     def __init__(self, length: int, columns: int) -> None:
         self._rows = np.full((length, columns), np.nan)
