@@ -99,7 +99,7 @@ def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, s
     if sum(layers) > _MAX_UNITS:
         raise SessionError(f"property 'layers': expected at most {_MAX_UNITS} units, found {sum(layers)}")
     # Older sessions, which lack the property, contain all activations.
-    kept = _read_value(properties, "activations", str) if "activations" in properties else "all"
+    kept = _read_value(properties, "activations", str, "all")
     if kept not in ACTIVATIONS_KEPT:
         known = ", ".join(ACTIVATIONS_KEPT)
         raise SessionError(f"property 'activations': expected one of {known}, found '{kept[:40]}'")
@@ -116,14 +116,15 @@ def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, s
         layers=tuple(layers),
         activations=kept,
         # Older sessions lack the following properties.
-        start=_read_value(properties, "start", str) if "start" in properties else "",
-        obstacles=_read_value(properties, "obstacles", bool) if "obstacles" in properties else False,
+        start=_read_value(properties, "start", str, ""),
+        obstacles=_read_value(properties, "obstacles", bool, False),
     )
     return info, _read_value(properties, "created", str)
 
 
-def _read_value(properties: Mapping[str, list[Any]], name: str, kind: type[T]) -> T:
-    values = properties.get(name)
+def _read_value(properties: Mapping[str, list[Any]], name: str, kind: type[T], default: T | None = None) -> T:
+    """Return a property of one value; `default` if there is no such property."""
+    values = properties.get(name, [] if default is None else [default])
     if not isinstance(values, list) or len(values) != 1 or type(values[0]) is not kind:
         found = "nothing" if not values else f"{type(values[0]).__name__} × {len(values)}"
         raise SessionError(f"property '{name}': expected one {kind.__name__}, found {found}")

@@ -69,16 +69,9 @@ def read_session_header(path: Path | str) -> SessionHeader:
 def decode_header(file: RrdContents, path: Path, steps: int) -> SessionHeader:
     """Return the header of a session of which properties, events and endings were read."""
     info, created = decode_drive_info(file.properties(INFO))
-    return SessionHeader(
-        path=path,
-        info=info,
-        versions={name: str(values[0]) for name, values in file.properties(VERSIONS).items() if values},
-        created=created,
-        events=_read_events(file.table(EVENTS)),
-        steps=steps,
-        endings=_read_endings(file.table(ENDINGS)),
-        outcome=read_outcome(file),
-    )
+    versions = {name: str(values[0]) for name, values in file.properties(VERSIONS).items() if values}
+    events, endings = _read_events(file.table(EVENTS)), _read_endings(file.table(ENDINGS))
+    return SessionHeader(path, info, versions, created, events, steps, endings, read_outcome(file))
 
 
 def count_steps(drive: EntityTable) -> int:
@@ -93,8 +86,9 @@ def count_steps(drive: EntityTable) -> int:
 def _read_events(table: EntityTable) -> tuple[Event, ...]:
     if not len(table.steps):
         return ()
-    order = np.argsort(table.read_numbers("number", np.int64), kind="stable")
-    if not np.array_equal(table.read_numbers("number", np.int64)[order], np.arange(len(order))):
+    numbers = table.read_numbers("number", np.int64)
+    order = np.argsort(numbers, kind="stable")
+    if not np.array_equal(numbers[order], np.arange(len(order))):
         raise SessionError("an event is missing")
     kinds, names, keys = table.read_texts("kind"), table.read_texts("name"), table.read_texts("key")
     values = table.read_numbers("value", np.float64)

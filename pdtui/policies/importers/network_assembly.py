@@ -34,7 +34,7 @@ def assemble_network(
         robot="",
         observations=observations,
         layers=tuple(layer.shape[0] for layer in found.layers[:-1]),
-        activation=import_options.activation or found.activation or _ask_activation(found, source),
+        activation=_activation(found, import_options, source),
         actions=actions,
         head=head,
         action_low=low,
@@ -98,7 +98,9 @@ def _bounds(
     return low, high
 
 
-def _ask_activation(found: PartialPolicy, source: str) -> str:
+def _activation(found: PartialPolicy, import_options: ImportOptions, source: str) -> str:
+    if activation := import_options.activation or found.activation:
+        return activation
     raise PolicyError(
         f"{source}: {found.origin} does not say the activation function of its "
         f"{len(found.layers) - 1} hidden layers; choose with --activation {'|'.join(ACTIVATION_NAMES)}"
@@ -116,7 +118,6 @@ def _tensors(found: PartialPolicy, network: PolicyNetwork, source: str) -> dict[
         tensors["normaliser.mean"] = found.statistics.mean.float()
         tensors["normaliser.std"] = found.statistics.std.float()
         if bool((found.statistics.std <= 0).any()):
-            raise PolicyError(
-                f"{source}: statistics of the observation: expected positive standard deviations"
-            )
+            what = "statistics of the observation"
+            raise PolicyError(f"{source}: {what}: expected positive standard deviations")
     return tensors

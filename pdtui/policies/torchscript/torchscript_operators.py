@@ -41,28 +41,13 @@ MAX_ELEMENTS = 1 << 26
 _MAX_INTEGER = (1 << 63) - 1
 """TorchScript's integers have 64 bits."""
 
+_SAME_NAME = "add sub mul neg floordiv eq ne lt le gt ge __contains__ __not__ __and__ __or__"
 _PLAIN: dict[str, Callable[..., Any]] = {
-    "add": operator.add,
-    "sub": operator.sub,
-    "mul": operator.mul,
-    "neg": operator.neg,
-    "floordiv": operator.floordiv,
-    "remainder": operator.mod,
-    "eq": operator.eq,
-    "ne": operator.ne,
-    "lt": operator.lt,
-    "le": operator.le,
-    "gt": operator.gt,
-    "ge": operator.ge,
-    "len": len,
-    "list": list,
-    "__contains__": operator.contains,
-    "__is__": operator.is_,
-    "__isnot__": operator.is_not,
-    "__not__": operator.not_,
-    "__and__": operator.and_,
-    "__or__": operator.or_,
+    **{name: getattr(operator, name) for name in _SAME_NAME.split()},
+    **{"remainder": operator.mod, "__is__": operator.is_, "__isnot__": operator.is_not},
+    **{"len": len, "list": list},
 }
+"""Operators on numbers and lists, most of which are called as in Python's own `operator`."""
 _ANY = ("__is__", "__isnot__", "__not__", "len", "list", "__contains__")
 _UNARY = ("neg", "__not__", "len", "list")
 

@@ -44,11 +44,10 @@ def read_record_batch(data: pa.Buffer) -> pa.RecordBatch:
         _check_field(field)
     if message.type != _BATCH:
         raise ValueError(f"expected a {_BATCH}, found a {message.type}")
-    if _is_compressed(message.metadata):
+    _, compressed = read_batch_header(memoryview(message.metadata))
+    if compressed:
         raise ValueError("expected uncompressed buffers, found compressed ones")
     batch = pa.ipc.read_record_batch(message, schema)
-    if batch.num_rows > MAX_ROWS:
-        raise ValueError(f"expected at most {MAX_ROWS} rows, found {batch.num_rows}")
     batch.validate(full=True)
     return batch
 
@@ -89,37 +88,25 @@ def _check_type(kind: pa.DataType, depth: int) -> None:
         _check_type(one, depth - 1)
 
 
-def count_rows(metadata: memoryview) -> int:
-    """Return the number of rows that the metadata of a record batch state, a `ValueError` if damaged."""
+def read_batch_header(metadata: memoryview) -> tuple[int, bool]:
+    """Return the number of rows of a record batch and whether they are compressed, from its metadata.
+
+    Only the flatbuffer of the message tells beforehand. Damaged metadata are a `ValueError`.
+    """
     try:
         (root,) = struct.unpack_from("<I", metadata, 0)
-        kind, length = _field(metadata, root, _HEADER_TYPE), _field(metadata, _header(metadata), _LENGTH)
-        if kind is None or metadata[kind] != _RECORD_BATCH:
+        kind, header = _field(metadata, root, _HEADER_TYPE), _field(metadata, root, _HEADER)
+        if kind is None or header is None or metadata[kind] != _RECORD_BATCH:
             raise ValueError("expected the metadata of a record batch")
+        header += struct.unpack_from("<I", metadata, header)[0]
+        length = _field(metadata, header, _LENGTH)
         rows = 0 if length is None else struct.unpack_from("<q", metadata, length)[0]
+        compressed = _field(metadata, header, _COMPRESSION) is not None
     except (struct.error, IndexError) as error:
         raise ValueError(f"the header of a message is damaged: {error}") from error
     if not 0 <= rows <= MAX_ROWS:
         raise ValueError(f"expected at most {MAX_ROWS} rows, found {rows}")
-    return int(rows)
-
-
-def _is_compressed(metadata: pa.Buffer) -> bool:
-    """Return whether a record batch is compressed, which only its flatbuffer tells beforehand."""
-    view = memoryview(metadata)
-    try:
-        return _field(view, _header(view), _COMPRESSION) is not None
-    except struct.error as error:
-        raise ValueError(f"the header of a message is damaged: {error}") from error
-
-
-def _header(view: memoryview) -> int:
-    """Return the position of the header of a message."""
-    (root,) = struct.unpack_from("<I", view, 0)
-    header = _field(view, root, _HEADER)
-    if header is None:
-        raise ValueError("the message has no header")
-    return int(header + struct.unpack_from("<I", view, header)[0])
+    return int(rows), compressed
 
 
 def _field(view: memoryview, table: int, number: int) -> int | None:

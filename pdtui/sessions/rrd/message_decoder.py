@@ -12,7 +12,7 @@ from typing import BinaryIO, NamedTuple
 
 import pyarrow as pa
 
-from pdtui.sessions.rrd.arrow_checks import count_rows, read_record_batch
+from pdtui.sessions.rrd.arrow_checks import read_batch_header, read_record_batch
 from pdtui.sessions.rrd.message_framing import MessageFrame
 from pdtui.sessions.rrd.protobuf_fields import Value, bytes_field, number_field, read_fields, text_field
 
@@ -120,7 +120,8 @@ def read_chunk_head(file: BinaryIO, frame: MessageFrame, own: StoreInfo | None) 
         begin, end = (_metadata_end(data, messages) for messages in (1, 2))
         if end > len(data):
             return None
-        return ChunkHead(store, entity, count_rows(memoryview(data)[begin + _IPC_PREFIX.size : end]))
+        rows, _ = read_batch_header(memoryview(data)[begin + _IPC_PREFIX.size : end])
+        return ChunkHead(store, entity, rows)
     except (ValueError, KeyError, IndexError, StopIteration, OSError, struct.error, pa.ArrowException):
         return None
 

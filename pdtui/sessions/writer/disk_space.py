@@ -74,14 +74,11 @@ class DiskReserve:
                 f"a recording needs {filesize.decimal(needed)} to begin"
             )
 
-    def needed(self, steps: int, chunks: int) -> int:
-        """Return the space for the rows on their way, the heat map, the outcome and the index, bytes.
+    def is_short(self, steps: int, chunks: int) -> bool:
+        """Return whether there is space only for the rows on their way, the heat map, outcome and index.
 
         The size of a step is estimated from the control steps, and that of the index from the chunks so far.
         """
         step = max(self._least, 2 * self._path.stat().st_size // max(steps, self._rows))
-        return self._fixed + _FOOTER_OF_CHUNK * chunks + step * self._rows
-
-    def is_short(self, steps: int, chunks: int) -> bool:
-        """Return whether there is space only for the end of the recording."""
-        return free_space(self._path) < self.needed(steps, chunks)
+        needed = self._fixed + _FOOTER_OF_CHUNK * chunks + step * self._rows
+        return free_space(self._path) < needed

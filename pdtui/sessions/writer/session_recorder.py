@@ -141,7 +141,8 @@ class SessionRecorder:
         finally:
             if self._failed:
                 abandon_recording(self._recording)
-                self._truncate()
+                with self._errors_named():
+                    os.truncate(self.path, undamaged_length(self.path))
             else:
                 self._recording.disconnect()
             if self._live is not None:
@@ -170,17 +171,10 @@ class SessionRecorder:
         self._property(VERSIONS, collect_versions())
 
     def _require_space(self) -> None:
-        if not self._reserve.is_short(self._steps, self._chunks):
-            return
-        self.close(f"the disk is full: {self._steps} steps were recorded")
-        raise RecordingEnded(
-            f"the disk is full; {self.path} was closed in time and is complete: {self._steps} steps"
-        )
-
-    def _truncate(self) -> None:
-        """Truncate the file after its last complete message."""
-        with self._errors_named():
-            os.truncate(self.path, undamaged_length(self.path))
+        if self._reserve.is_short(self._steps, self._chunks):
+            self.close(f"the disk is full: {self._steps} steps were recorded")
+            closed = f"{self.path} was closed in time and is complete"
+            raise RecordingEnded(f"the disk is full; {closed}: {self._steps} steps")
 
     def _write_rows(self) -> None:
         records, self._rows = self._rows, []
