@@ -13,7 +13,7 @@ from pdtui.core.closable import Closable
 from pdtui.core.errors import PdtuiError, RobotError
 from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome
-from pdtui.robots.simulators.python_state import digest_of
+from pdtui.robots.simulators.python_state import digest_values
 
 _SCHEMA = "CREATE TABLE IF NOT EXISTS rollouts (key BLOB PRIMARY KEY, outcome BLOB NOT NULL) WITHOUT ROWID"
 
@@ -92,7 +92,7 @@ class RolloutJournal(Closable):
 
 def fingerprint_start_state(start: StartState) -> bytes:
     """Return a hash of the whole state that a roll-out begins with: the robot's and the policy's."""
-    return digest_of(start.snapshot, start.policy_state).to_bytes(8, "little")
+    return digest_values(start.snapshot, start.policy_state).to_bytes(8, "little")
 
 
 def _encode(outcome: RolloutOutcome) -> bytes:

@@ -1,4 +1,4 @@
-"""The Unitree A1 of the paper: a quadruped that feels only its own body, in PyBullet."""
+"""The Unitree A1 of the paper, in PyBullet: a quadruped that senses only its own body."""
 
 from __future__ import annotations
 
@@ -13,91 +13,84 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
-from pdtui.robots.legged.terrain import RoughGround, rough_ground, scatter_trees
-from pdtui.robots.robot_goals import WALKING_GOALS
+from pdtui.robots.legged.terrain import RoughGround, draw_rough_ground, scatter_trees
+from pdtui.robots.robot import TRUNK_ATTRIBUTES, ResetResult, StepResult, TrainingRecipe, torque_attributes
 from pdtui.robots.simulators.bullet_robot import BulletRobot, add_ground, add_plane, add_trees, data_folder
 from pdtui.robots.simulators.urdf_links import read_urdf_links
 from pdtui.robots.task import Task
-from pdtui.robots.training_recipe import TrainingRecipe
 
-_LEGS = ("FR", "FL", "RR", "RL")
-_LEG_NAMES = {"FR": "front right", "FL": "front left", "RR": "rear right", "RL": "rear left"}
+_LEGS = {"FR": "front right", "FL": "front left", "RR": "rear right", "RL": "rear left"}
 _JOINTS = tuple(f"{leg}_{part}" for leg in _LEGS for part in ("hip", "upper", "lower"))
+# Joint angles at action 0, and their change per unit of action, rad.
 _STANCE = np.array([0.0, 0.9, -1.8] * 4)
-_REACH = np.array([0.05, 0.5, 0.5] * 4)
-# A right and a left triple of actions, each for a diagonal: FR and RL the right one, FL and RR the left one.
+_ACTION_SCALE = np.array([0.05, 0.5, 0.5] * 4)
+# The action of each joint. Diagonal legs share theirs: FR and RL the first three, FL and RR the last three.
 _DIAGONALS = np.array([0, 1, 2, 3, 4, 5, 3, 4, 5, 0, 1, 2])
-_KP, _KD = 80.0, 0.4
+_STIFFNESS, _DAMPING = 80.0, 0.4  # N m/rad, N m s/rad
+# Physics step (s), physics steps per control step, and age of what is observed, in physics steps.
 _DT, _SUBSTEPS, _LATENCY = 0.001, 16, 2
-_START_HEIGHT = 0.28
-_START_NOISE = 0.05
-_LOWEST, _LEAST_UPRIGHT = 0.2, 0.6
+_START_HEIGHT = 0.28  # of the trunk, m
+_START_NOISE = 0.05  # rad
+# Below this height (m), or with less than this share of its vertical axis upright, the robot has fallen.
+_MIN_HEIGHT, _MIN_UPRIGHT = 0.2, 0.6
 _FRICTION = {"lateralFriction": 1.0, "spinningFriction": 0.01, "rollingFriction": 0.01}
-_NEAR = 0.8
-_APART = 31  # control steps, half a second
-_REMEMBERED = (
-    "_place",
-    "_displacements",
-    "_attitudes",
-    "_targets",
-    "_angles",
-    "_torques",
-    "_contacts",
-    "_untouched",
-)
-_ALIVE, _FALL, _ENERGY = 0.3, 10.0, 0.0005
-
-# A policy that runs faster cannot be steered between trees. PyBullet holds Python's lock while it steps, and
-# its steps are slow: batches smaller than the paper's 16384 learn from fewer. A world takes 70 MB.
-A1_RECIPE = TrainingRecipe(
-    options={"terrain": "rough", "top_speed": 2.0},
-    settings={
-        "layers": (256, 256, 256, 256),
-        "processes": True,
-        "worlds": 32,
-        "chunk": 128,
-        "minibatch": 512,
-        "total_steps": 6_000_000,
-        "evaluate_every": 163_840,
-        "evaluate_steps": 400,
-    },
-)
+# Distance from the trunk to a trunk of a tree within which the legs may touch the tree, m.
+_REACH = 0.8
+_STEPS_BETWEEN_HITS = 31  # half a second
+_ALIVE_REWARD, _FALL_PENALTY, _ENERGY_WEIGHT = 0.3, 10.0, 0.0005
 
 
 class A1(BulletRobot):
-    """PyBullet's model of the Unitree A1; 16 physics steps of 1 ms in a control step.
+    """PyBullet's model of the Unitree A1; a control step is 16 physics steps of 1 ms.
 
-    Observation (93), for the last 3 control steps, the newest first: the trunk's displacement in one step
-    in the world (3 × 3), its roll, pitch, yaw and yaw rate (3 × 4), the joints' target angles (3 × 12) and
-    the joints' angles (3 × 12); angles and rates are 2 ms old. Nothing in it tells of the ground or of trees.
+    The observation (93) holds values of the last 3 control steps, the newest first: the trunk's displacement
+    in each step in the world's frame (3 × 3), its roll, pitch, yaw and yaw rate (3 × 4), the joints' target
+    angles (3 × 12) and the joints' angles (3 × 12). Angles and rates are 2 ms old. Ground and trees are not
+    observed.
 
-    Action (6), each in [−1, 1]: hip, upper and lower joint of one pair of diagonal legs (front right and rear
-    left), then of the other; 0 is standing. A proportional-derivative controller without torque limit moves
-    the joints to these targets.
+    The action (6), each number in [−1, 1], moves hip, upper and lower joint of one pair of diagonal legs
+    (front right and rear left), then of the other; 0 is standing. A proportional-derivative controller
+    without a torque limit moves the joints to these targets.
 
-    Reward: vx in m/s, up to `top_speed`, + 0.3 − 0.0005 × the motors' power in W, and −10 for a fall. An
-    episode ends where the trunk is less than 0.2 m above the ground or leans by more than 53°. A cost of 1
-    counts every tree that the robot runs into; one that it touches again within half a second does not
-    count again.
+    The reward is vx in m/s, up to `top_speed`, plus 0.3, minus 0.0005 times the motors' power in W, and −10
+    for a fall. An episode ends when the trunk is less than 0.2 m above the ground or leans by more than 53°.
+    Every collision with a tree costs 1, unless the same tree was touched within the last half second.
 
-    Ground, trees and the small differences of the joints at the start are functions of the seed: the same
-    seed gives the same rough ground with and without trees.
+    Ground, trees and the small deviations of the joints at the start are functions of the seed: the same seed
+    gives the same rough ground with and without trees.
 
     Args:
-        terrain: where it starts unless `reset` says otherwise: on a ``plane``, on ``rough`` ground, or in a
-            ``forest`` on rough ground.
-        roughness: the most by which rough ground rises, m.
-        density: trees of the forest, a square metre.
-        top_speed: more speed than this, m/s, is not rewarded.
+        terrain: Where the robot starts unless `reset` says otherwise: on a ``plane``, on ``rough`` ground, or
+            in a ``forest`` on rough ground.
+        roughness: Largest height of rough ground, m.
+        density: Trees of the forest per square metre.
+        top_speed: Speed beyond which going faster is not rewarded, m/s.
     """
 
     name = "a1"
     title = "Unitree A1 (PyBullet)"
-    goals = WALKING_GOALS
     tasks: tuple[Task, ...] = A1_TASKS
-    training_recipe = A1_RECIPE
+    # A policy that runs faster cannot be steered between trees. PyBullet holds Python's lock while it steps,
+    # and its steps are slow: batches smaller than the paper's 16384 learn from fewer. A robot takes 70 MB.
+    training_recipe = TrainingRecipe(
+        options={"terrain": "rough", "top_speed": 2.0},
+        settings={
+            "layers": (256, 256, 256, 256),
+            "processes": True,
+            "worlds": 32,
+            "chunk": 128,
+            "minibatch": 512,
+            "total_steps": 6_000_000,
+            "evaluate_every": 163_840,
+            "evaluate_steps": 400,
+        },
+    )
     starts = ("plane", "rough", "forest")
     episode_steps = 400
+    control_dt = _DT * _SUBSTEPS
+    state_arrays = (
+        "_place", "_displacements", "_attitudes", "_targets", "_angles", "_torques", "_contacts", "_untouched"
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -115,28 +108,14 @@ class A1(BulletRobot):
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (6,), np.float32)
         self._urdf = data_folder() / "a1" / "a1.urdf"
         self.links = read_urdf_links(self._urdf, ("trunk", *_JOINTS))
-        self.renew(0, terrain)
+        self.rebuild_world(0, terrain)
         limits = [self.bullet.getJointInfo(self.robot_id, joint)[10] for joint in self._joints]
         self.attributes = (
-            Attribute("vx", "m/s"),
-            Attribute("vy", "m/s"),
-            Attribute("speed", "m/s"),
-            Attribute("yaw", "rad", wraps=True),
-            Attribute("yaw rate", "rad/s"),
-            Attribute("roll", "rad", wraps=True),
-            Attribute("pitch", "rad"),
-            Attribute("height", "m"),
+            *TRUNK_ATTRIBUTES,
             Attribute("distance", "m"),
-            *(
-                Attribute(f"{_LEG_NAMES[joint[:2]]} {joint[3:]} torque", "N m", scale=1.0 / limit)
-                for joint, limit in zip(_JOINTS, limits, strict=True)
-            ),
-            *(Attribute(f"{leg} contact", "") for leg in _LEG_NAMES.values()),
+            *torque_attributes([f"{_LEGS[joint[:2]]} {joint[3:]}" for joint in _JOINTS], limits),
+            *(Attribute(f"{leg} contact", "") for leg in _LEGS.values()),
         )
-
-    @property
-    def control_dt(self) -> float:
-        return _DT * _SUBSTEPS
 
     def build_world(self, seed: int, start: str) -> int:
         bullet, rng = self.bullet, np.random.default_rng(seed)
@@ -149,7 +128,7 @@ class A1(BulletRobot):
         if start == "plane":
             add_plane(bullet, _FRICTION)
         else:
-            self.ground = rough_ground(rng, self._roughness)
+            self.ground = draw_rough_ground(rng, self._roughness)
             add_ground(bullet, self.ground, _FRICTION)
         if start == "forest":
             self.obstacles = scatter_trees(rng, self._density)
@@ -160,40 +139,41 @@ class A1(BulletRobot):
         names = {bullet.getJointInfo(robot, j)[12].decode(): j for j in range(bullet.getNumJoints(robot))}
         self._joints = [names[joint] for joint in _JOINTS]
         self._shins = [{names[f"{leg}_lower"], names[f"{leg}_toe"]} for leg in _LEGS]
-        self._trunk = -np.array(bullet.getDynamicsInfo(robot, -1)[3])
+        self._trunk_offset = -np.array(bullet.getDynamicsInfo(robot, -1)[3])
         for link in range(-1, bullet.getNumJoints(robot)):
             bullet.changeDynamics(robot, link, linearDamping=0, angularDamping=0)
-            if link >= 0:  # joints brake by themselves unless told not to
+            if link >= 0:  # by default, joints brake by themselves
                 bullet.setJointMotorControl2(robot, link, bullet.VELOCITY_CONTROL, targetVelocity=0, force=0)
         for joint, angle in zip(self._joints, angles.tolist(), strict=True):
             bullet.resetJointState(robot, joint, angle)
         return robot
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Floats, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> ResetResult:
         super().reset(seed=seed)
         start = self.check_start(str((options or {}).get("start", ""))) or self._terrain
-        self.renew(int(self.np_random.integers(2**31)), start)
+        self.rebuild_world(int(self.np_random.integers(2**31)), start)
         angles = np.array([state[0] for state in self._joint_states()])
         self._place = np.array(self._base()[0])
         self._displacements = np.zeros((3, 3))
         self._attitudes = np.tile(self._attitude(), (3, 1))
         self._targets, self._angles = np.tile(_STANCE, (3, 1)), np.tile(angles, (3, 1))
         self._torques, self._contacts = np.zeros(12), np.zeros(4)
-        self._untouched = np.full(len(self._trees), float(_APART))
+        self._untouched = np.full(len(self._trees), float(_STEPS_BETWEEN_HITS))
         return self.observe(), {}
 
-    def step(self, action: NDArray[np.float32]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+    def step(self, action: NDArray[np.float32]) -> StepResult:
         bullet, robot = self.bullet, self.robot_id
-        target = _STANCE + _REACH * np.clip(np.asarray(action, np.float64), -1.0, 1.0)[_DIAGONALS]
+        target = _STANCE + _ACTION_SCALE * np.clip(np.asarray(action, np.float64), -1.0, 1.0)[_DIAGONALS]
         goals, near = target.tolist(), self._near_trees()
         touched, energy = np.zeros(len(self._trees), bool), 0.0
         for substep in range(_SUBSTEPS):
             states = self._joint_states()
             if substep == _SUBSTEPS - _LATENCY:
-                felt_angles, felt_attitude = [state[0] for state in states], self._attitude()
-            torques = [_KP * (goal - now[0]) - _KD * now[1] for goal, now in zip(goals, states, strict=True)]
+                sensed_angles, sensed_attitude = [state[0] for state in states], self._attitude()
+            torques = [
+                _STIFFNESS * (goal - now[0]) - _DAMPING * now[1]
+                for goal, now in zip(goals, states, strict=True)
+            ]
             energy += sum(abs(torque * now[1]) for torque, now in zip(torques, states, strict=True))
             bullet.setJointMotorControlArray(robot, self._joints, bullet.TORQUE_CONTROL, forces=torques)
             bullet.stepSimulation()
@@ -202,48 +182,41 @@ class A1(BulletRobot):
                     touched[tree] = True
         place = np.array(self._base()[0])
         if not np.isfinite(place).all():
-            raise SimulationDiverged(f"{self.name}: the simulation diverged: the trunk's place is not finite")
+            raise SimulationDiverged(
+                f"{self.name}: the simulation diverged: the trunk's position is not finite"
+            )
         moved, self._place = place - self._place, place
         self._displacements = np.vstack([moved, self._displacements[:2]])
-        self._attitudes = np.vstack([felt_attitude, self._attitudes[:2]])
+        self._attitudes = np.vstack([sensed_attitude, self._attitudes[:2]])
         self._targets = np.vstack([target, self._targets[:2]])
-        self._angles = np.vstack([felt_angles, self._angles[:2]])
-        self._torques, self._contacts = np.array(torques), self._feel_ground()
-        cost = float((touched & (self._untouched >= _APART)).sum())
+        self._angles = np.vstack([sensed_angles, self._angles[:2]])
+        self._torques, self._contacts = np.array(torques), self._sense_contacts()
+        cost = float((touched & (self._untouched >= _STEPS_BETWEEN_HITS)).sum())
         self._untouched = np.where(touched, 0.0, self._untouched + 1.0)
-        reason = self._fallen()
+        reason = self._find_fall()
         forward = min(float(moved[0]) / self.control_dt, self._top_speed)
-        reward = forward + _ALIVE - _ENERGY * energy / _SUBSTEPS
+        reward = forward + _ALIVE_REWARD - _ENERGY_WEIGHT * energy / _SUBSTEPS
         info: dict[str, Any] = {"cost": cost}
         if reason:
-            reward, info["reason"] = reward - _FALL, reason
+            reward, info["reason"] = reward - _FALL_PENALTY, reason
         return self.observe(), reward, bool(reason), False, info
 
     def observe(self) -> Floats:
         parts = (self._displacements, self._attitudes, self._targets, self._angles)
-        return np.concatenate([part.ravel() for part in parts])
+        return np.concatenate(parts, axis=None)
 
     def read_attributes(self) -> Floats:
-        (x, y, z), (qx, qy, qz, qw) = self._base()
+        x, y, z = self._base()[0]
         vx, vy, _ = self.bullet.getBaseVelocity(self.robot_id)[0]
-        roll, pitch, yaw = roll_pitch_yaw(qw, qx, qy, qz)
-        rate = self._attitude()[3]
-        height = z - self._ground_at(x, y)
-        motion = [vx, vy, math.hypot(vx, vy), yaw, rate, roll, pitch, height, x]
+        roll, pitch, yaw, rate = self._attitude()
+        motion = [vx, vy, math.hypot(vx, vy), yaw, rate, roll, pitch, z - self._ground_at(x, y), x]
         return np.array([*motion, *self._torques, *self._contacts])
 
     def read_poses(self) -> Floats:
-        place, turn = self.bullet.multiplyTransforms(*self._base(), self._trunk.tolist(), [0, 0, 0, 1])
+        place, turn = self.bullet.multiplyTransforms(*self._base(), self._trunk_offset.tolist(), [0, 0, 0, 1])
         links = self.bullet.getLinkStates(self.robot_id, self._joints, computeForwardKinematics=True)
         poses = np.array([[*place, *turn], *([*link[4], *link[5]] for link in links)])
         return poses[:, [0, 1, 2, 6, 3, 4, 5]]
-
-    def memory(self) -> tuple[Floats, ...]:
-        return tuple(getattr(self, name) for name in _REMEMBERED)
-
-    def recall(self, memory: tuple[Floats, ...]) -> None:
-        for name, array in zip(_REMEMBERED, memory, strict=True):
-            setattr(self, name, array)
 
     def simulator_numbers(self) -> tuple[Any, ...]:
         joints = [state[:2] for state in self._joint_states()]
@@ -256,7 +229,7 @@ class A1(BulletRobot):
         return self.bullet.getJointStates(self.robot_id, self._joints)
 
     def _attitude(self) -> list[float]:
-        """Roll, pitch, yaw, and the rate of turning about the trunk's own vertical axis."""
+        """Return roll, pitch, yaw, and the rate of turning about the trunk's own vertical axis."""
         x, y, z, w = self._base()[1]
         wx, wy, wz = self.bullet.getBaseVelocity(self.robot_id)[1]
         rate = 2 * (x * z + w * y) * wx + 2 * (y * z - w * x) * wy + (1 - 2 * (x * x + y * y)) * wz
@@ -266,21 +239,20 @@ class A1(BulletRobot):
         return 0.0 if self.ground is None else self.ground.height(x, y)
 
     def _near_trees(self) -> list[int]:
-        """Trees that the robot may touch in this control step."""
-        if not self._trees:
-            return []
+        """Return the numbers of the trees that the robot may touch in this control step."""
         away = np.hypot(*(self.obstacles[:, :2] - self._place[:2]).T)
-        return [int(index) for index in np.flatnonzero(away - self.obstacles[:, 2] < _NEAR)]
+        near: list[int] = np.flatnonzero(away - self.obstacles[:, 2] < _REACH).tolist()
+        return near
 
-    def _feel_ground(self) -> Floats:
+    def _sense_contacts(self) -> Floats:
         links = {point[3] for point in self.bullet.getContactPoints(self.robot_id) if point[9] > 0.0}
         return np.array([float(bool(links & shin)) for shin in self._shins])
 
-    def _fallen(self) -> str:
+    def _find_fall(self) -> str:
         (x, y, z), (qx, qy, _, _) = self._base()
         height, upright = z - self._ground_at(x, y), 1.0 - 2.0 * (qx * qx + qy * qy)
-        if upright < _LEAST_UPRIGHT:
+        if upright < _MIN_UPRIGHT:
             return f"fell: leans by {math.degrees(math.acos(max(-1.0, upright))):.0f}°"
-        if height < _LOWEST:
-            return f"fell: trunk {height:.2f} m above the ground, under {_LOWEST} m"
+        if height < _MIN_HEIGHT:
+            return f"fell: trunk {height:.2f} m above the ground, under {_MIN_HEIGHT} m"
         return ""

@@ -1,4 +1,4 @@
-"""The Ant of the paper: stock Gymnasium physics, any heading at the start, rewarded along either axis."""
+"""The Ant of the paper: Gymnasium's physics, any heading at the start, a reward along either axis."""
 
 from __future__ import annotations
 
@@ -9,55 +9,37 @@ import numpy as np
 from gymnasium.envs.mujoco.ant_v5 import AntEnv
 from numpy.typing import NDArray
 
-from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.attributes import Floats
 from pdtui.robots.geometry import roll_pitch_yaw
-from pdtui.robots.robot_goals import WALKING_GOALS
-from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, model_links, silence_warnings
-from pdtui.robots.training_recipe import TrainingRecipe
+from pdtui.robots.robot import TRUNK_ATTRIBUTES, TrainingRecipe, torque_attributes
+from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, read_model_links, silence_warnings
 
 _LEGS = {"1": "front left", "2": "back left", "3": "back right", "4": "front right"}
 
 
 class Ant(MujocoRobot, AntEnv):
-    """A four-legged torso with eight motors; 0.05 s a control step.
+    """A four-legged torso with eight motors; a control step is 0.05 s.
 
-    Observation (27): height, torso quaternion, 8 joint angles; then the 14 velocities. An episode ends where
-    Gymnasium's does (torso outside 0.2–1.0 m) and also when the torso lies on its back, which stock
-    Ant does not notice.
+    The observation (27) holds the height, the torso's quaternion, 8 joint angles, and the 14 velocities. An
+    episode ends where Gymnasium's does (torso outside 0.2–1.0 m), and also when the torso lies on its back,
+    which Gymnasium's Ant does not notice.
 
     Args:
-        forward: what the forward reward pays: ``"either"`` is ``max(|vx|, |vy|)``, as in the paper; ``"x"``
-            is vx, as in stock Ant (facts differ on which one trains; physics is the same).
+        forward: What is rewarded as moving forward: ``"either"`` is ``max(|vx|, |vy|)``, as in the paper;
+            ``"x"`` is vx, as in Gymnasium's Ant. The physics is the same.
     """
 
     name = "ant"
     title = "Ant (MuJoCo)"
-    goals = WALKING_GOALS
     training_recipe = TrainingRecipe(options={"forward": "x"})
 
     def __init__(self, forward: str = "either") -> None:
         super().__init__(include_cfrc_ext_in_observation=False)
         self._forward = forward
-        self.links = model_links(self.model)
+        self.links = read_model_links(self.model)
         self._motors = GearedMotors(self.model)
-        self.attributes = (
-            Attribute("vx", "m/s"),
-            Attribute("vy", "m/s"),
-            Attribute("speed", "m/s"),
-            Attribute("yaw", "rad", wraps=True),
-            Attribute("yaw rate", "rad/s"),
-            Attribute("roll", "rad", wraps=True),
-            Attribute("pitch", "rad"),
-            Attribute("height", "m"),
-            *(
-                Attribute(f"{_LEGS[joint[-1]]} {joint[:-2]} torque", "N m", scale=1.0 / gear)
-                for joint, gear in zip(self._motors.joints, self._motors.gears, strict=True)
-            ),
-        )
-
-    @property
-    def control_dt(self) -> float:
-        return float(self.dt)
+        names = [f"{_LEGS[joint[-1]]} {joint[:-2]}" for joint in self._motors.joints]
+        self.attributes = (*TRUNK_ATTRIBUTES, *torque_attributes(names, self._motors.gears))
 
     def observe(self) -> Floats:
         observation: Floats = self._get_obs()
@@ -71,10 +53,10 @@ class Ant(MujocoRobot, AntEnv):
         forward = float(velocity[0]) if self._forward == "x" else float(np.abs(velocity).max())
         reward, info = self._get_rew(forward, action)
         info["cost"] = 0.0
-        reason = self._fallen()
-        if reason is not None:
+        reason = self._find_fall()
+        if reason:
             info["reason"] = reason
-        return self.observe(), float(reward), reason is not None, False, info
+        return self.observe(), float(reward), bool(reason), False, info
 
     def reset_model(self) -> Floats:
         silence_warnings(self.data)
@@ -92,17 +74,15 @@ class Ant(MujocoRobot, AntEnv):
         _, _, height, w, x, y, z = self.data.qpos[:7].tolist()
         vx, vy, _, a, b, c = self.data.qvel[:6].tolist()
         roll, pitch, yaw = roll_pitch_yaw(w, x, y, z)
-        # Third row of the rotation matrix: MuJoCo's angular velocity is in the body's frame.
+        # MuJoCo's angular velocity is in the body's frame; this is the third row of the rotation matrix.
         yaw_rate = 2 * (x * z - w * y) * a + 2 * (y * z + w * x) * b + (1 - 2 * (x * x + y * y)) * c
         torques = self._motors.torques(self.data)
         return np.array([vx, vy, math.hypot(vx, vy), yaw, yaw_rate, roll, pitch, height, *torques])
 
-    def _fallen(self) -> str | None:
+    def _find_fall(self) -> str:
         height = float(self.data.qpos[2])
         low, high = self._healthy_z_range
         if not low <= height <= high:
             return f"fell: torso at {height:.2f} m, outside {low}–{high} m"
         _, x, y, _ = self.data.qpos[3:7].tolist()
-        if 1 - 2 * (x * x + y * y) < 0:
-            return "fell: on its back"
-        return None
+        return "fell: on its back" if 1 - 2 * (x * x + y * y) < 0 else ""

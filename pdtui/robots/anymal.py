@@ -1,4 +1,4 @@
-"""ANYmal-C in MuJoCo: a quadruped whose policy follows commands."""
+"""ANYmal-C in MuJoCo: a quadruped whose policy follows commands, and a variant with one command."""
 
 from __future__ import annotations
 
@@ -16,54 +16,64 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.robot_data import CommandRange
 from pdtui.robots.geometry import roll_pitch_yaw, rotate
-from pdtui.robots.legged.legged_rewards import (
+from pdtui.robots.legged.observations_and_rewards import (
     COMMAND_SCALES,
     LeggedMotion,
-    RewardWeights,
-    fallen,
-    legged_observations,
-    legged_rewards,
+    compute_observations,
+    compute_rewards,
+    has_fallen,
 )
-from pdtui.robots.robot_goals import WALKING_GOALS
-from pdtui.robots.simulators.mujoco_robot import MujocoRobot, model_links, silence_warnings
-from pdtui.robots.training_recipe import TrainingRecipe
+from pdtui.robots.robot import ResetResult, StepResult, TrainingRecipe
+from pdtui.robots.simulators.mujoco_robot import MujocoRobot, read_model_links, silence_warnings
 
 MODEL = Path(__file__).parent / "models" / "anymal_c.xml"
 LEGS = ("LF", "LH", "RF", "RH")
-COMMANDS = ("forward", "lateral", "yaw rate")
-DEFAULT = np.array([0.0, 0.4, -0.8, 0.0, -0.4, 0.8] * 2)
-"""Joint angles around which actions move, LF LH RF RH, each hip, thigh, knee; rad."""
+COMMANDS = {"forward": "m/s", "lateral": "m/s", "yaw rate": "rad/s"}
+"""All commands and their units, in the order in which policies observe them."""
+DEFAULT_ANGLES = np.array([0.0, 0.4, -0.8, 0.0, -0.4, 0.8] * 2)
+"""Joint angles at action 0, rad: hip, thigh and knee of each of `LEGS`."""
 ACTION_SCALE = 0.5
+"""Change of a joint's target angle per unit of action, rad."""
 SUBSTEPS = 4
-HEIGHT = 0.52
-"""What training asks of the trunk, m."""
+"""Physics steps per control step."""
+START_HEIGHT, TARGET_HEIGHT = 0.55, 0.52
+"""Height of the trunk at the start, and the height that training rewards, m."""
 _JOINTS = ("hip", "thigh", "knee")
-_MOST = 2.0
+_MAX_ACTION = 2.0
+_MAX_TORQUE = 80.0  # N m
+# Deviations at the start: of the yaw and the joints' angles (rad) and of all velocities (m/s, rad/s).
+_START_NOISE = 0.1
 
 
-def feet_of(model: mujoco.MjModel) -> tuple[slice, slice]:
-    """Where the sensors of the feet are: positions, then velocities."""
+def foot_sensors(model: mujoco.MjModel) -> tuple[slice, slice]:
+    """Return which sensor values are the positions of the feet, and which their velocities."""
     first, second = (int(model.sensor(name).adr[0]) for name in ("LF", "LF_velocity"))
     return slice(first, first + 12), slice(second, second + 12)
 
 
 class Anymal(MujocoRobot):
-    """ANYmal-C on a plane; 0.02 s a control step (4 physics steps).
+    """ANYmal-C on a plane; a control step is 0.02 s.
 
-    Observation (49, or 47 with the forward command alone): see `legged.observations`. The 12 actions move the
-    targets of the joints' PD by 0.5 rad each around the default. Reward is what training pays for following
-    the command (see `legged.rewards`). An episode ends where the trunk is on the ground or on its side.
+    The observation has 49 numbers, or 47 with the forward command alone; see `compute_observations`. The 12
+    actions move the targets of the joints' PD controllers by 0.5 rad each around the default. The reward is
+    that of following the commands; see `compute_rewards`. An episode ends when the trunk is on the ground or
+    on its side.
 
     Attributes:
-        commands: what the policy can be asked for, of `COMMANDS`, m/s and rad/s; it sees no others.
+        commands: Those of `COMMANDS` that the policy observes, m/s and rad/s.
 
     Args:
-        random_commands: for training's scores: every reset draws commands, instead of 1 m/s forward.
+        random_commands: Whether every reset draws the commands, for training's scores, instead of commanding
+            1 m/s forward.
     """
 
     name = "anymal"
     title = "ANYmal-C (MuJoCo)"
-    goals = WALKING_GOALS
+    frame_skip = SUBSTEPS
+    _action: Floats
+    _last_action: Floats
+    _air_time: Floats
+    state_arrays = ("_command", "_action", "_last_action", "_air_time")
     training_recipe = TrainingRecipe(
         options={"random_commands": True},
         settings={
@@ -75,7 +85,7 @@ class Anymal(MujocoRobot):
             "evaluate_every": 1_000_000,
             "evaluate_steps": 500,
         },
-        world_batch="pdtui.training.anymal_worlds:AnymalWorldBatch",
+        robot_batch="pdtui.training.anymal_batch:AnymalBatch",
     )
     commands: Mapping[str, float] = MappingProxyType({"forward": 1.0, "lateral": 0.0, "yaw rate": 0.0})
     command_ranges = MappingProxyType(
@@ -90,14 +100,13 @@ class Anymal(MujocoRobot):
         self._random_commands = random_commands
         self.model = mujoco.MjModel.from_xml_path(str(MODEL))
         self.data = mujoco.MjData(self.model)
-        self.links = model_links(self.model)
-        self.action_space = spaces.Box(-_MOST, _MOST, (12,), np.float32)
+        self.links = read_model_links(self.model)
+        self.action_space = spaces.Box(-_MAX_ACTION, _MAX_ACTION, (12,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (46 + len(self.commands),), np.float64)
-        self._feet, self._feet_velocity = feet_of(self.model)
-        self._weights = RewardWeights()
+        self._feet, self._feet_velocity = foot_sensors(self.model)
         self._command = np.array([1.0, 0.0, 0.0])
-        self._action, self._last_action = np.zeros(12), np.zeros(12)
-        self._air_time = np.zeros((1, 4))
+        self._stand_still()
+        torque_scale = 1.0 / _MAX_TORQUE
         self.attributes = (
             Attribute("vx", "m/s"),
             Attribute("vy", "m/s"),
@@ -109,13 +118,9 @@ class Anymal(MujocoRobot):
             Attribute("roll", "rad", wraps=True),
             Attribute("pitch", "rad"),
             Attribute("height", "m"),
-            *(Attribute(f"{name} command", unit) for name, unit in self._command_units()),
-            *(Attribute(f"{leg} {joint} torque", "N m", scale=1 / 80) for leg in LEGS for joint in _JOINTS),
+            *(Attribute(f"{name} command", COMMANDS[name]) for name in self.commands),
+            *(Attribute(f"{leg} {joint} torque", "N m", torque_scale) for leg in LEGS for joint in _JOINTS),
         )
-
-    @property
-    def control_dt(self) -> float:
-        return SUBSTEPS * float(self.model.opt.timestep)
 
     def set_commands(self, values: Mapping[str, float]) -> bool:
         asked = np.array([values.get(name, 0.0) for name in COMMANDS])
@@ -124,23 +129,20 @@ class Anymal(MujocoRobot):
         self._command = asked
         return True
 
-    def reset(
-        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> tuple[Floats, dict[str, Any]]:
-        """Stand, joints up to 0.1 rad off the default, facing anywhere within ±0.1 rad of +x."""
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> ResetResult:
+        """Stand, with joints up to 0.1 rad off the default and a yaw of up to ±0.1 rad."""
         super().reset(seed=seed)
         del options
         rng = self.np_random
         mujoco.mj_resetData(self.model, self.data)
         silence_warnings(self.data)
-        yaw = rng.uniform(-0.1, 0.1)
-        self.data.qpos[2] = 0.55
+        yaw = rng.uniform(-_START_NOISE, _START_NOISE)
+        self.data.qpos[2] = START_HEIGHT
         self.data.qpos[3:7] = math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)
-        self.data.qpos[7:] = DEFAULT + rng.uniform(-0.1, 0.1, 12)
-        self.data.qvel[:] = rng.uniform(-0.1, 0.1, 18)
-        self.data.ctrl[:] = DEFAULT
-        self._action, self._last_action = np.zeros(12), np.zeros(12)
-        self._air_time = np.zeros((1, 4))
+        self.data.qpos[7:] = DEFAULT_ANGLES + rng.uniform(-_START_NOISE, _START_NOISE, 12)
+        self.data.qvel[:] = rng.uniform(-_START_NOISE, _START_NOISE, 18)
+        self.data.ctrl[:] = DEFAULT_ANGLES
+        self._stand_still()
         if self._random_commands:
             low, high = zip(*((one.low, one.high) for one in self.command_ranges.values()), strict=True)
             drawn = rng.uniform(low, high)
@@ -149,61 +151,54 @@ class Anymal(MujocoRobot):
         return self.observe(), {}
 
     def observe(self) -> Floats:
-        seen: Floats = legged_observations(self._motion(), DEFAULT, len(self.commands))[0]
-        return seen
+        observation: Floats = compute_observations(self._motion(), DEFAULT_ANGLES, len(self.commands))[0]
+        return observation
 
-    def step(self, action: NDArray[np.float32]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+    def step(self, action: NDArray[np.float32]) -> StepResult:
         self._last_action, self._action = self._action, np.array(action, np.float64)
-        self.data.ctrl[:] = DEFAULT + ACTION_SCALE * self._action
+        self.data.ctrl[:] = DEFAULT_ANGLES + ACTION_SCALE * self._action
         mujoco.mj_step(self.model, self.data, SUBSTEPS)
         self._check_finite()
-        motion = self._motion()
-        paid, self._air_time = legged_rewards(
-            motion, self._air_time, self.control_dt, HEIGHT, DEFAULT, self._weights
-        )
+        motion, dt = self._motion(), self.control_dt
+        reward, self._air_time = compute_rewards(motion, self._air_time, dt, TARGET_HEIGHT, DEFAULT_ANGLES)
         info: dict[str, Any] = {"cost": 0.0}
-        fell = bool(fallen(motion)[0])
+        fell = bool(has_fallen(motion)[0])
         if fell:
             info["reason"] = f"fell: trunk at {self.data.qpos[2]:.2f} m"
-        return legged_observations(motion, DEFAULT, len(self.commands))[0], float(paid[0]), fell, False, info
+        observation: Floats = compute_observations(motion, DEFAULT_ANGLES, len(self.commands))[0]
+        return observation, float(reward[0]), fell, False, info
 
     def read_attributes(self) -> Floats:
-        vx, vy, _, a, b, c = self.data.qvel[:6].tolist()
-        w, x, y, z = self.data.qpos[3:7].tolist()
-        roll, pitch, yaw = roll_pitch_yaw(w, x, y, z)
+        vx, vy = self.data.qvel[:2].tolist()
+        roll, pitch, yaw = roll_pitch_yaw(*self.data.qpos[3:7].tolist())
         forward, sideways = math.cos(yaw) * vx + math.sin(yaw) * vy, math.cos(yaw) * vy - math.sin(yaw) * vx
-        yaw_rate = float(rotate(self.data.qpos[3:7], np.array([a, b, c]))[2])
-        commands = [self._command[COMMANDS.index(name)] for name in self.commands]
+        yaw_rate = float(rotate(self.data.qpos[3:7], self.data.qvel[3:6])[2])
+        commands = self._command[[list(COMMANDS).index(name) for name in self.commands]]
         height, torques = float(self.data.qpos[2]), self.data.actuator_force.tolist()
         moves = (vx, vy, math.hypot(vx, vy), forward, sideways, yaw, yaw_rate, roll, pitch, height)
         return np.array([*moves, *commands, *torques])
 
-    def _command_units(self) -> list[tuple[str, str]]:
-        return [(name, "rad/s" if name == "yaw rate" else "m/s") for name in self.commands]
+    def _stand_still(self) -> None:
+        self._action, self._last_action, self._air_time = np.zeros(12), np.zeros(12), np.zeros((1, 4))
 
     def _motion(self) -> LeggedMotion:
         sensors = self.data.sensordata
-        return LeggedMotion(
-            self.data.qpos[None],
-            self.data.qvel[None],
-            self._action[None],
-            self._last_action[None],
-            self._command[None],
-            self.data.actuator_force[None],
-            sensors[self._feet].reshape(1, 4, 3),
-            sensors[self._feet_velocity].reshape(1, 4, 3),
-        )
+        feet = (sensors[part].reshape(1, 4, 3) for part in (self._feet, self._feet_velocity))
+        physics = (self.data.qpos, self.data.qvel, self._action, self._last_action, self._command)
+        rows = (array[None] for array in (*physics, self.data.actuator_force))
+        return LeggedMotion(*rows, *feet)
 
-    def _extras(self) -> tuple[Floats, ...]:
-        derived = (self.data.sensordata.copy(), self.data.actuator_force.copy())
-        return (
-            self._command.copy(),
-            self._action.copy(),
-            self._last_action.copy(),
-            self._air_time.copy(),
-            *derived,
-        )
+    def _copy_arrays(self) -> tuple[Floats, ...]:
+        return (*super()._copy_arrays(), self.data.sensordata.copy(), self.data.actuator_force.copy())
 
-    def _set_extras(self, extras: tuple[Floats, ...]) -> None:
-        self._command, self._action, self._last_action, self._air_time = (one.copy() for one in extras[:4])
-        self.data.sensordata[:], self.data.actuator_force[:] = extras[4], extras[5]
+    def _restore_arrays(self, arrays: tuple[Floats, ...]) -> None:
+        super()._restore_arrays(arrays[:-2])
+        self.data.sensordata[:], self.data.actuator_force[:] = arrays[-2:]
+
+
+class AnymalForward(Anymal):
+    """ANYmal-C whose policy observes the forward command alone: it was never commanded to turn."""
+
+    name = "anymal-forward"
+    title = "ANYmal-C, forward only (MuJoCo)"
+    commands = MappingProxyType({"forward": 1.0})

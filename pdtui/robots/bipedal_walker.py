@@ -15,28 +15,26 @@ from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.core.robot_data import Link
 from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
-from pdtui.robots.robot_goals import WALKING_GOALS
-from pdtui.robots.training_recipe import TrainingRecipe
+from pdtui.robots.robot import TrainingRecipe, torque_attributes
 
 FINISH = (stock.TERRAIN_LENGTH - stock.TERRAIN_GRASS) * stock.TERRAIN_STEP
-_GROUND = 2000.0
+_GROUND_LENGTH = 2000.0  # m
 _JOINTS = ("hip 1", "knee 1", "hip 2", "knee 2")
-_DEPTH = 0.2  # of a leg beside the middle, m: the world is flat, its picture need not be
-# Both hips and knees at their limits, leg 1 in front on its foot, leg 2 behind on its knee: what a flip may
-# end in, and what the shipped policy does not get out of by itself.
+_LEG_OFFSET = 0.2  # of a drawn leg from the middle, m: the world is flat, its picture need not be
+# Angles of a split (rad): hips and knees are at their limits, leg 1 in front on its foot, leg 2 behind on its
+# knee. A flip may end like this, and the shipped policy does not get up by itself.
 _SPLIT_HULL, _SPLIT_HIPS, _SPLIT_KNEES = 0.48, (1.1, -0.8), (-1.6, -1.6)
 
 
 class FlatBipedalWalker(stock.BipedalWalker):
-    """Gymnasium's BipedalWalker on flat ground that goes on behind the finish, with motors as one likes.
+    """Gymnasium's BipedalWalker on flat ground that continues behind the finish, with a choice of motors.
 
-    The ground is one edge: on stock's many short ones, feet catch on the seams.
-
-    Every reset makes a new world: Box2D does not repeat itself in one that was used before.
+    The ground is one edge, because feet catch on the seams between Gymnasium's many short ones. Every reset
+    makes a new world, because Box2D does not repeat itself in a used one.
 
     Args:
-        torque: of the strongest motor command, N m; Gymnasium's is 80. The bodies are made lighter instead
-            of the motors stronger, which is the same motion.
+        torque: Torque of the strongest motor command, N m; Gymnasium's is 80. The bodies are made lighter
+            instead of the motors stronger, which gives the same motion.
     """
 
     def __init__(self, torque: float) -> None:
@@ -63,26 +61,27 @@ class FlatBipedalWalker(stock.BipedalWalker):
         finished = x > FINISH and not self.game_over
         if self.game_over:
             info["reason"] = "fell: the hull touched the ground"
-        elif not 0.0 <= x <= _GROUND:
+        elif not 0.0 <= x <= _GROUND_LENGTH:
             terminated, finished, info["reason"] = True, False, "walked off the end of the ground"
         elif terminated and finished:
-            terminated = False  # stock Gymnasium ends the episode at the finish
+            terminated = False  # Gymnasium's ends the episode at the finish
         return observation, reward, terminated, truncated, {**info, "finished": finished}
 
     def _generate_terrain(self, hardcore: bool) -> None:
         del hardcore
-        self.fd_edge.shape.vertices = [(0.0, stock.TERRAIN_HEIGHT), (_GROUND, stock.TERRAIN_HEIGHT)]
+        surface = [(0.0, stock.TERRAIN_HEIGHT), (_GROUND_LENGTH, stock.TERRAIN_HEIGHT)]
+        self.fd_edge.shape.vertices = surface
         ground = self.world.CreateStaticBody(fixtures=self.fd_edge)
         ground.color1 = ground.color2 = (76, 204, 76)
         self.terrain = [ground]
-        corners = [(0.0, stock.TERRAIN_HEIGHT), (_GROUND, stock.TERRAIN_HEIGHT), (_GROUND, 0.0), (0.0, 0.0)]
+        corners = [*surface, (_GROUND_LENGTH, 0.0), (0.0, 0.0)]
         self.terrain_poly = [(corners, (102, 153, 76))]
 
     def _generate_clouds(self) -> None:
         self.cloud_poly: list[Any] = []
 
     def _split(self) -> Any:
-        """Spread the legs on the ground, a little differently for every seed."""
+        """Spread the legs on the ground, slightly differently for every seed."""
         angle = _SPLIT_HULL + self.np_random.uniform(-0.03, 0.03)
         poses, lowest = [], 0.0
         for hip, knee in zip(_SPLIT_HIPS, _SPLIT_KNEES, strict=True):
@@ -103,24 +102,24 @@ class FlatBipedalWalker(stock.BipedalWalker):
 
 
 class BipedalWalker(GymnasiumRobot):
-    """Gymnasium's BipedalWalker on flat ground; 0.02 s a control step.
+    """Gymnasium's BipedalWalker on flat ground; a control step is 0.02 s.
 
-    Observation (24): hull angle and velocities, angles and speeds of the joints, foot contacts, 10 distances
-    to the ground. Reward is Gymnasium's: about 300 for the way to the finish, less the motors' effort, −100
-    for a fall. The ground goes on for 2 km; ``finished`` in the info says when the finish is passed.
+    The observation (24) holds the hull's angle and velocities, angles and speeds of the joints, foot
+    contacts, and 10 distances to the ground. The reward is Gymnasium's: about 300 for the way to the finish,
+    minus the motors' effort, and −100 for a fall. The ground continues for 2 km; ``finished`` in the info
+    says that the finish is passed.
 
-    Lengths are Box2D's, taken for metres. Pitch is positive leaning forward. It can also start with its legs
-    split on the ground.
+    Box2D's lengths are taken for meters. Pitch is positive when leaning forward. The start ``split`` has the
+    legs spread on the ground.
 
     Args:
-        torque: of the strongest motor command, N m. Gymnasium's is 80, too weak for flips.
+        torque: Torque of the strongest motor command, N m. Gymnasium's is 80, which is too weak for flips.
     """
 
     name = "bipedal_walker"
     title = "BipedalWalker (Box2D)"
-    goals = WALKING_GOALS
     tasks = BIPEDAL_WALKER_TASKS
-    # A fall costs 100, as much as a third of the way earns: rewards are scaled up from PPO's usual 0.02.
+    # A fall costs only a third of what the whole way earns, so rewards are scaled up from PPO's usual 0.02.
     training_recipe = TrainingRecipe(settings={"reward_scale": 0.1, "evaluate_steps": 1600})
     episode_steps = 1600
     starts = ("split",)
@@ -137,7 +136,7 @@ class BipedalWalker(GymnasiumRobot):
             Attribute("pitch", "rad", wraps=True),
             Attribute("pitch rate", "rad/s", scale=2.0 / stock.FPS),
             *(Attribute(f"{joint} angle", "rad") for joint in _JOINTS),
-            *(Attribute(f"{joint} torque", "N m", scale=1.0 / torque) for joint in _JOINTS),
+            *torque_attributes(_JOINTS, (torque,) * 4),
             Attribute("foot 1 contact", ""),
             Attribute("foot 2 contact", ""),
         )
@@ -158,35 +157,20 @@ class BipedalWalker(GymnasiumRobot):
     def read_poses(self) -> Floats:
         poses = np.zeros((5, 7))
         for row, body in zip(poses, (self.world.hull, *self.world.legs), strict=True):
-            half = -body.angle / 2  # about y, which points into the picture
-            row[:] = (*body.position, 0.0, math.cos(half), 0.0, math.sin(half), 0.0)
-        poses[:, 1:3] = np.stack((np.zeros(5), poses[:, 1] - stock.TERRAIN_HEIGHT), axis=1)
+            half, (x, z) = -body.angle / 2, body.position  # about y, which points into the picture
+            row[:] = (x, 0.0, z - stock.TERRAIN_HEIGHT, math.cos(half), 0.0, math.sin(half), 0.0)
         return poses
 
 
 def _links() -> tuple[Link, ...]:
     corners = np.array(stock.HULL_POLY) / stock.SCALE
     (left, bottom), (right, top) = corners.min(0), corners.max(0)
-    width = stock.LEG_W / 2
-    straight = (1.0, 0.0, 0.0, 0.0)
-    hull = Link(
-        "hull",
-        0,
-        "box",
-        ((right - left) / 2, _DEPTH + width, (top - bottom) / 2),
-        ((left + right) / 2, 0.0, (bottom + top) / 2),
-        straight,
-    )
-    legs = [
-        Link(
-            f"{part} {leg + 1}",
-            1 + 2 * leg + joint,
-            "box",
-            (thick, width, stock.LEG_H / 2),
-            (0.0, side, 0.0),
-            straight,
-        )
-        for leg, side in enumerate((_DEPTH, -_DEPTH))
-        for joint, (part, thick) in enumerate((("thigh", width), ("shin", 0.8 * width)))
-    ]
+    width, straight = stock.LEG_W / 2, (1.0, 0.0, 0.0, 0.0)
+    hull_size = ((right - left) / 2, _LEG_OFFSET + width, (top - bottom) / 2)
+    hull = Link("hull", 0, "box", hull_size, ((left + right) / 2, 0.0, (bottom + top) / 2), straight)
+    legs = []
+    for leg, side in enumerate((_LEG_OFFSET, -_LEG_OFFSET)):
+        for joint, (part, thick) in enumerate((("thigh", width), ("shin", 0.8 * width))):
+            size, body = (thick, width, stock.LEG_H / 2), 1 + 2 * leg + joint
+            legs.append(Link(f"{part} {leg + 1}", body, "box", size, (0.0, side, 0.0), straight))
     return (hull, *legs)

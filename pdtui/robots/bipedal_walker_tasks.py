@@ -8,54 +8,50 @@ import numpy as np
 
 from pdtui.robots.task import RunTrace, Task, TaskVerdict
 
-_RISE = 0.5
-_FLIP = 300.0
-_WALKS = 0.5
-_LAST = 60
-_SPEED = 5.0
-"""m/s; walking again is half of what it usually walks, or of this where it did not walk yet."""
+# Control steps of each task.
+_JUMP_STEPS, _FLIP_STEPS, _STAND_STEPS = 200, 200, 300
+# Rise of the hull that counts as a jump (m), and turn that counts as a flip (degrees).
+_JUMP_HEIGHT, _FLIP_ANGLE = 0.5, 300.0
+# Share of the usual speed that counts as walking again, and the speed (m/s) of a robot that did not walk yet.
+_WALK_SHARE, _WALK_SPEED = 0.5, 5.0
+# Control steps over which the speed at the end, and the usual height and speed, are averaged.
+_LAST_STEPS, _USUAL_STEPS = 60, 50
 
 
 def _walks(trace: RunTrace, usual: float, steps: int) -> tuple[bool, float]:
-    """Whether it is up at the end and walks at half its speed, and the speed there."""
-    late = trace["vx"][-_LAST:]
-    speed = float(late.mean()) if len(late) else 0.0
-    return not trace.fell and len(trace) >= steps and speed >= _WALKS * usual, speed
+    """Return whether it is up at the end and walks at half its speed, and the speed there."""
+    speed = trace.mean("vx", slice(-_LAST_STEPS, None))
+    return trace.stays_up(steps) and speed >= _WALK_SHARE * usual, speed
 
 
 def jumps(trace: RunTrace) -> TaskVerdict:
-    """The hull rises half a metre over its usual height; then it lands and walks on."""
-    height = float(trace.before("height")[-50:].mean())
-    usual = float(trace.before("vx")[-50:].mean())
-    rise = float(trace["height"].max()) - height
-    walks, speed = _walks(trace, usual, _JUMP_STEPS)
-    score = 0.5 * min(1.2, rise / _RISE) + (0.6 if walks else 0.25 * len(trace) / _JUMP_STEPS)
+    """Judge whether the hull rises by half a metre, and the robot lands and walks on."""
+    rise = float(trace["height"].max()) - trace.mean_before("height", _USUAL_STEPS)
+    walks, speed = _walks(trace, trace.mean_before("vx", _USUAL_STEPS), _JUMP_STEPS)
+    score = 0.5 * min(1.2, rise / _JUMP_HEIGHT) + (0.6 if walks else 0.25 * len(trace) / _JUMP_STEPS)
     figures = {"rise (m)": rise, "walks on": float(walks), "vx at the end (m/s)": speed}
-    return TaskVerdict(rise >= _RISE and walks, score, figures)
+    return TaskVerdict(rise >= _JUMP_HEIGHT and walks, score, figures)
 
 
 def flips(trace: RunTrace) -> TaskVerdict:
-    """It turns forward by 300° and more; whether it lands is counted beside that."""
+    """Judge whether it turns forward by 300° or more; whether it lands is a figure of its own."""
     pitch = trace["pitch"]
     turned = math.degrees(float(np.max(pitch) - pitch[0]))
-    usual = float(trace.before("vx")[-50:].mean())
-    walks, _ = _walks(trace, usual, _FLIP_STEPS)
-    lands = turned >= _FLIP and not trace.fell and len(trace) >= _FLIP_STEPS
-    score = min(1.2, turned / _FLIP) + (1.0 if lands and walks else 0.2 * len(trace) / _FLIP_STEPS)
+    walks, _ = _walks(trace, trace.mean_before("vx", _USUAL_STEPS), _FLIP_STEPS)
+    lands = turned >= _FLIP_ANGLE and trace.stays_up(_FLIP_STEPS)
+    score = min(1.2, turned / _FLIP_ANGLE) + (1.0 if lands and walks else 0.2 * len(trace) / _FLIP_STEPS)
     figures = {"turned (degrees)": turned, "lands": float(lands), "walks on": float(lands and walks)}
-    return TaskVerdict(turned >= _FLIP, score, figures)
+    return TaskVerdict(turned >= _FLIP_ANGLE, score, figures)
 
 
 def stands_up(trace: RunTrace) -> TaskVerdict:
-    """It walks again by the end."""
-    walks, speed = _walks(trace, _SPEED, _STAND_STEPS)
-    score = 0.5 * len(trace) / _STAND_STEPS + 0.5 * max(0.0, min(1.0, speed / (_WALKS * _SPEED)))
-    return TaskVerdict(
-        walks, score + float(walks), {"vx at the end (m/s)": speed, "steps up": float(len(trace))}
-    )
+    """Judge whether it walks again by the end."""
+    walks, speed = _walks(trace, _WALK_SPEED, _STAND_STEPS)
+    share = max(0.0, min(1.0, speed / (_WALK_SHARE * _WALK_SPEED)))
+    score = 0.5 * len(trace) / _STAND_STEPS + 0.5 * share + float(walks)
+    return TaskVerdict(walks, score, {"vx at the end (m/s)": speed, "steps up": float(len(trace))})
 
 
-_JUMP_STEPS, _FLIP_STEPS, _STAND_STEPS = 200, 200, 300
 BIPEDAL_WALKER_TASKS = (
     Task(
         name="jump",

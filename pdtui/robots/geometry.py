@@ -1,4 +1,4 @@
-"""Rotations and poses, vectorised over leading axes. Quaternions are w x y z, unit length."""
+"""Rotations and poses, vectorised over leading axes. Quaternions are w x y z, of unit length."""
 
 from __future__ import annotations
 
@@ -14,25 +14,21 @@ if TYPE_CHECKING:
 
 
 def multiply_quaternions(a: Floats, b: Floats) -> Floats:
-    """Hamilton product, shapes (..., 4): the rotation b followed by a."""
+    """Return the Hamilton product, shape (..., 4): the rotation b followed by a."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
-    return np.stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ],
-        axis=-1,
-    )
+    w = aw * bw - ax * bx - ay * by - az * bz
+    x = aw * bx + ax * bw + ay * bz - az * by
+    y = aw * by - ax * bz + ay * bw + az * bx
+    z = aw * bz + ax * by - ay * bx + az * bw
+    return np.stack([w, x, y, z], axis=-1)
 
 
 def rotate(quaternion: Floats, vector: Floats) -> Floats:
     """Rotate vectors (..., 3) by quaternions (..., 4): v + w t + u × t with t = 2 u × v, u = (x, y, z)."""
     w, ux, uy, uz = (quaternion[..., part] for part in range(4))
     vx, vy, vz = (vector[..., part] for part in range(3))
-    # numpy.cross takes twice the time for few vectors and for many, numpy.moveaxis half of it for few.
+    # numpy.cross takes twice as long for few vectors and for many; numpy.moveaxis half as long again for few.
     tx, ty, tz = 2.0 * (uy * vz - uz * vy), 2.0 * (uz * vx - ux * vz), 2.0 * (ux * vy - uy * vx)
     rotated = np.empty((*tx.shape, 3))
     rotated[..., 0] = vx + w * tx + (uy * tz - uz * ty)
@@ -42,7 +38,7 @@ def rotate(quaternion: Floats, vector: Floats) -> Floats:
 
 
 def roll_pitch_yaw(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Intrinsic z-y'-x'' Euler angles of one quaternion, rad."""
+    """Return the intrinsic z-y'-x'' Euler angles of one quaternion, rad."""
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = math.asin(min(1.0, max(-1.0, 2 * (w * y - z * x))))
     yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
@@ -50,12 +46,12 @@ def roll_pitch_yaw(w: float, x: float, y: float, z: float) -> tuple[float, float
 
 
 def root_body(links: Sequence[Link]) -> int:
-    """Row of the poses that stands for the robot's place: the body of its first shape."""
+    """Return the row of the poses that stands for the robot's position: the body of its first shape."""
     return links[0].body if links else 0
 
 
 def place_links(links: Sequence[Link], poses: Floats) -> Floats:
-    """World poses of links, shape (..., L, 7), from body poses, shape (..., B, 7)."""
+    """Return the world poses of links, shape (..., L, 7), from body poses, shape (..., B, 7)."""
     bodies = poses[..., [link.body for link in links], :]
     offsets = np.array([link.position for link in links], dtype=np.float64)
     turns = np.array([link.quaternion for link in links], dtype=np.float64)
@@ -64,11 +60,11 @@ def place_links(links: Sequence[Link], poses: Floats) -> Floats:
 
 
 def capsule_ends(links: Sequence[Link], placed: Floats) -> Floats:
-    """Both ends of each link's axis, shape (..., L, 2, 3); a sphere's two ends coincide.
+    """Return both ends of each link's axis, shape (..., L, 2, 3); those of a sphere coincide.
 
     Args:
-        links: the shapes; a box counts as a segment along its longest side.
-        placed: their world poses from `place_links`, shape (..., L, 7).
+        links: The shapes; a box counts as a segment along its longest side.
+        placed: Their world poses from `place_links`, shape (..., L, 7).
     """
     axes = np.zeros((len(links), 3))
     for row, link in enumerate(links):

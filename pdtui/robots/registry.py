@@ -1,15 +1,15 @@
-"""From a robot's name to the robot: pdtui's own, those of other packages, and Gymnasium's environments.
+"""Find and build robots by name: pdtui's own, those of other packages, and Gymnasium's environments.
 
-A name comes from the command line, but also from a map or a session that somebody sent. Building a robot
-runs code that is installed here, and nothing else: a name may choose among it. Gymnasium would import the
-module in front of a colon (``package.module:Thing-v0``); here that happens only for modules that the user
-named: on the command line, or in the environment variable `TRUSTED`. A module that is imported already is
-only looked up.
+A name may come from the command line, but also from a map or a session that somebody sent. It can only choose
+among code that is installed here. Gymnasium would import the module in front of a colon
+(``package.module:Name-v0``). Here, such a module must be imported already, or be named by the user: on the
+command line, or in the environment variable `TRUSTED`.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -29,19 +29,18 @@ TRUSTED = "PDTUI_ENVIRONMENT_MODULES"
 
 
 def own_robots() -> dict[str, str]:
-    """Return the modules of pdtui's own robots by name. None of them is imported.
+    """Return the modules of pdtui's own robots by name, without importing them.
 
-    The robot ``some-name`` is the class in ``some_name.py``, here, that assigns ``"some-name"`` to `name`.
+    A robot is any class, in a module of this package, that assigns its name to ``name``.
     """
-    package, robots = __package__ or "", {}
-    for path in sorted(
-        file for folder in sys.modules[package].__path__ for file in Path(folder).glob("*.py")
-    ):
-        source = path.read_text(encoding="utf-8")
-        for name in (path.stem, path.stem.replace("_", "-")):
-            if f'    name = "{name}"\n' in source:
-                robots[name] = f"{package}.{path.stem}"
-    return robots
+    package = __package__ or ""
+    files = (file for folder in sys.modules[package].__path__ for file in Path(folder).glob("*.py"))
+    names = {
+        name: f"{package}.{file.stem}"
+        for file in files
+        for name in re.findall(r'^    name = "([^"]+)"$', file.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    return dict(sorted(names.items()))
 
 
 def robot_names() -> list[str]:
@@ -50,23 +49,23 @@ def robot_names() -> list[str]:
 
 
 def trust_module(robot: str) -> None:
-    """Let the module in front of the colon of a name be imported, here and in processes started from here.
+    """Allow the import of the module in front of a name's colon, here and in processes started from here.
 
-    Only for names that the user typed.
+    Call it only for names that the user typed.
     """
     module, colon, _ = robot.rpartition(":")
     if colon:
-        os.environ[TRUSTED] = ",".join([*_trusted(), module])
+        os.environ[TRUSTED] = ",".join([*_trusted_modules(), module])
 
 
 def check_robot(name: str) -> str:
     """Return the name of a robot that can be built here.
 
     Raises:
-        RobotError: there is none of that name; the message has close matches.
+        RobotError: There is no robot of that name; the message lists close matches.
     """
-    if name not in own_robots() and _entry_of(name) is None:
-        _registered(name)
+    if name not in own_robots() and _find_entry_point(name) is None:
+        _find_environment(name)
     return name
 
 
@@ -74,24 +73,23 @@ def make_robot(name: str, **options: Any) -> Robot:
     """Build a robot in its own simulator.
 
     Args:
-        name: of one of pdtui's own robots, of an entry point of group `GROUP`, or of an environment that is
-            registered with Gymnasium; the first that has it.
-        options: for the robot's class; environments have none.
+        name: Name of one of pdtui's own robots, of an entry point of group `GROUP`, or of an environment that
+            is registered with Gymnasium, in this order.
+        options: Arguments of the robot's class; environments have none.
 
     Raises:
-        RobotError: no robot has that name, or what it needs is not installed.
+        RobotError: No robot has that name, or what it needs is not installed.
     """
-    if name in own_robots():
-        return _own(name, options)
-    entry = _entry_of(name)
-    if entry is not None:
-        return _from_entry(entry, options)
-    return _from_environment(_registered(name), name)
+    module = own_robots().get(name)
+    if module is not None:
+        return _build_own(name, module, options)
+    entry = _find_entry_point(name)
+    return _build_environment(name) if entry is None else _build_from_entry(entry, options)
 
 
 @contextmanager
 def open_robot(robot: str | Robot) -> Iterator[Robot]:
-    """Yield a robot; one that is given by its name is built here, and closed when the block ends.
+    """Yield a robot; if it is given by name, it is built here and closed when the block ends.
 
     Raises:
         RobotError: As `make_robot` does.
@@ -104,25 +102,25 @@ def open_robot(robot: str | Robot) -> Iterator[Robot]:
 
 
 def file_stem(name: str) -> str:
-    """A robot's name as part of a file's name: an environment's id may hold ``/`` and ``:``."""
-    return "".join(letter if letter.isalnum() or letter in "-_." else "-" for letter in name)
+    """Return a robot's name as part of a file name: an environment's id may contain ``/`` and ``:``."""
+    return re.sub(r"[^\w.-]", "-", name)
 
 
-def _own(name: str, options: dict[str, Any]) -> Robot:
+def _build_own(name: str, module: str, options: dict[str, Any]) -> Robot:
     try:
-        module = import_module(own_robots()[name])
+        classes = vars(import_module(module)).values()
     except ImportError as error:
         raise RobotError(f"robot '{name}' needs a package that is not installed: {error}") from error
-    classes = (one for one in vars(module).values() if isinstance(one, type))
-    robot: Robot = next(one for one in classes if vars(one).get("name") == name)(**options)
+    kind = next(one for one in classes if isinstance(one, type) and vars(one).get("name") == name)
+    robot: Robot = kind(**options)
     return robot
 
 
-def _entry_of(name: str) -> EntryPoint | None:
+def _find_entry_point(name: str) -> EntryPoint | None:
     return next(iter(entry_points(group=GROUP, name=name)), None)
 
 
-def _from_entry(entry: EntryPoint, options: dict[str, Any]) -> Robot:
+def _build_from_entry(entry: EntryPoint, options: dict[str, Any]) -> Robot:
     from pdtui.robots.robot import Robot
 
     package = f" of {entry.dist.name}" if entry.dist is not None else ""
@@ -140,32 +138,31 @@ def _from_entry(entry: EntryPoint, options: dict[str, Any]) -> Robot:
     return robot
 
 
-def _from_environment(environment: str, name: str) -> Robot:
+def _build_environment(name: str) -> Robot:
     from pdtui.robots.environments.gymnasium_robot import make_environment
     from pdtui.robots.environments.mujoco_gymnasium_robot import MujocoGymnasiumRobot, is_mujoco
     from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
-    from pdtui.robots.simulators.mujoco_robot import ignored_warnings
+    from pdtui.robots.simulators.mujoco_robot import suppress_warnings
 
-    with ignored_warnings():
-        env = make_environment(environment)
-    kind = MujocoGymnasiumRobot if is_mujoco(env) else PlainGymnasiumRobot
-    env.close()
+    environment = _find_environment(name)
+    with suppress_warnings(), closing(make_environment(environment)) as env:
+        kind = MujocoGymnasiumRobot if is_mujoco(env) else PlainGymnasiumRobot
     return kind(name, environment=environment)
 
 
-def _registered(name: str) -> str:
-    """The registered id behind a name, without its module.
+def _find_environment(name: str) -> str:
+    """Return the registered id behind a name, without its module.
 
     Raises:
-        RobotError: nothing is registered by that name, or its module may not be imported.
+        RobotError: No environment is registered by that name, or its module may not be imported.
     """
     import gymnasium
 
     if not name.isprintable():
         raise RobotError(f"unknown robot {name!r}")
     module, colon, environment = name.rpartition(":")
-    if colon:
-        _import(module, name)
+    if colon and module not in sys.modules:
+        _import_trusted(module, name)
     if environment in gymnasium.registry:
         return environment
     robots = robot_names()
@@ -175,10 +172,8 @@ def _registered(name: str) -> str:
     raise RobotError(f"unknown robot '{name}'; {hint}, and every environment registered with Gymnasium")
 
 
-def _import(module: str, name: str) -> None:
-    if module in sys.modules:
-        return
-    if module not in _trusted():
+def _import_trusted(module: str, name: str) -> None:
+    if module not in _trusted_modules():
         raise RobotError(
             f"robot '{name}': the module '{module}' is not imported because a map or a session says so; "
             f"name robot and map on the command line (drive {name} --map FILE), or the module in {TRUSTED}"
@@ -189,5 +184,5 @@ def _import(module: str, name: str) -> None:
         raise RobotError(f"module '{module}' cannot be imported: {type(error).__name__}: {error}") from error
 
 
-def _trusted() -> list[str]:
+def _trusted_modules() -> list[str]:
     return [module for module in os.environ.get(TRUSTED, "").split(",") if module]

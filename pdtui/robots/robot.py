@@ -1,9 +1,10 @@
-"""What every robot offers, whichever simulator it lives in."""
+"""The base class of all robots, whatever their simulator, and how their policies are trained."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
@@ -16,7 +17,26 @@ from pdtui.core.errors import RobotError
 from pdtui.core.robot_data import NO_OBSTACLES, CommandRange, Link, RobotState
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
 from pdtui.robots.task import Task, find_task
-from pdtui.robots.training_recipe import TrainingRecipe
+
+ResetResult = tuple[Floats, dict[str, Any]]
+StepResult = tuple[Floats, float, bool, bool, dict[str, Any]]
+TRUNK_ATTRIBUTES = (
+    Attribute("vx", "m/s"),
+    Attribute("vy", "m/s"),
+    Attribute("speed", "m/s"),
+    Attribute("yaw", "rad", wraps=True),
+    Attribute("yaw rate", "rad/s"),
+    Attribute("roll", "rad", wraps=True),
+    Attribute("pitch", "rad"),
+    Attribute("height", "m"),
+)
+"""What can be measured of a trunk that moves freely."""
+
+
+def torque_attributes(joints: Iterable[str], limits: Iterable[float]) -> list[Attribute]:
+    """Return the torque attributes of joints, scaled by their largest torques, N m."""
+    names = (f"{joint} torque" for joint in joints)
+    return [Attribute(name, "N m", 1.0 / limit) for name, limit in zip(names, limits, strict=True)]
 
 
 def is_fall(terminated: bool, info: Mapping[str, Any]) -> bool:
@@ -24,8 +44,26 @@ def is_fall(terminated: bool, info: Mapping[str, Any]) -> bool:
     return bool(terminated) and not info.get("finished", False)
 
 
+@dataclass(frozen=True)
+class TrainingRecipe:
+    """How a robot's policy is trained unless the command line says otherwise; `pdtui.training` reads it.
+
+    Attributes:
+        options: Arguments of the robot's class during training.
+        settings: Changes to the algorithm's configuration. Settings that an algorithm lacks are ignored.
+        robot_batch: Class that steps all robots of a run at once, ``package.module:Class``, called with a
+            robot, the number of robots and a seed. If it is empty, robots are stepped one by one.
+        initial_policy: Name of the shipped policy that PPO starts from; empty for an untrained one.
+    """
+
+    options: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    robot_batch: str = ""
+    initial_policy: str = ""
+
+
 class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
-    """A Gymnasium environment with named attributes, link poses and a snapshot.
+    """A Gymnasium environment with named attributes, link poses and snapshots.
 
     `step` puts ``cost`` (float) into its info and, when the episode ends, ``reason`` (str). An episode that
     terminates ends with a fall, unless ``finished`` (bool) in the info says that the robot's task is done. A
@@ -33,20 +71,20 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     episode that is truncated has run out of time. Nobody steps a robot past the end of its episode.
 
     Attributes:
-        name: as maps, sessions and the command line call it.
-        title: for people.
-        attributes: what `read_attributes` measures.
-        links: what there is to draw.
-        starts: states besides the usual one in which `reset` can start, by its option ``start``.
-        commands: what a policy can be asked for and what it is asked for by default, by name; most robots
-            have none.
-        command_ranges: in which the policy was trained to follow them.
-        goals: what a dissection looks for.
-        tasks: what `pdtui pursue` can look for, and how to tell whether it was done.
-        training_recipe: how `pdtui train` trains a policy for it.
-        episode_steps: control steps after which training and scores end an episode.
-        obstacles: upright cylinders in its way, shape (N, 3): x, y and radius, m. They stay where they are
-            until the next `reset` or `restore`; other obstacles are another array.
+        name: Name in maps, in sessions and on the command line.
+        title: Name for people.
+        attributes: What `read_attributes` measures.
+        links: Shapes to draw.
+        starts: States besides the usual one in which `reset` can start, by its option ``start``.
+        commands: What a policy can be commanded, and its default, by name; empty for most robots.
+        command_ranges: Ranges in which the policy was trained to follow the commands.
+        goals: What a dissection looks for.
+        tasks: What `pdtui pursue` can look for, with the judge that tells whether it was done.
+        training_recipe: How `pdtui train` trains a policy for the robot.
+        episode_steps: Control steps after which training and scores end an episode.
+        obstacles: Upright cylinders in the robot's way, shape (N, 3): x, y and radius, m. The array stays the
+            same until the next `reset` or `restore`, which may replace it by another array.
+        state_arrays: Names of the Python attributes, all of them arrays, that belong to a robot's state.
     """
 
     name: str
@@ -61,6 +99,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     training_recipe: TrainingRecipe = TrainingRecipe()
     episode_steps: int = 1000
     obstacles: Floats = NO_OBSTACLES
+    state_arrays: tuple[str, ...] = ()
 
     @property
     @abstractmethod
@@ -69,15 +108,15 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
 
     @abstractmethod
     def observe(self) -> Floats:
-        """The observation of the present state, as `step` last returned it."""
+        """Return the observation of the current state, as `step` last returned it."""
 
     @abstractmethod
     def read_attributes(self) -> Floats:
-        """Values of `attributes` in the present state, shape (J,)."""
+        """Return the values of `attributes` in the current state, shape (J,)."""
 
     @abstractmethod
     def read_poses(self) -> Floats:
-        """World pose of every body, shape (B, 7): x y z in m, then a quaternion w x y z."""
+        """Return the world pose of every body, shape (B, 7): x y z in m, then a quaternion w x y z."""
 
     @abstractmethod
     def snapshot(self) -> RobotState:
@@ -88,18 +127,18 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         """Return to a snapshot, bit-exactly.
 
         Raises:
-            RobotError: the snapshot is of another robot or has another size.
+            RobotError: The snapshot is of another robot or has another size.
         """
 
     @abstractmethod
     def digest(self) -> int:
-        """A 63-bit digest of the simulator's state: equal states have equal digests."""
+        """Return a 63-bit digest of the simulator's state: equal states have equal digests."""
 
     def set_commands(self, values: Mapping[str, float]) -> bool:
-        """Ask the policy for something, from what it observes next on; returns whether that is new.
+        """Command the policy, from its next observation on, and return whether that is new.
 
         Args:
-            values: one for each of `commands`.
+            values: A value for each of `commands`.
         """
         del values
         return False
@@ -108,7 +147,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         """Return the name of a start state, empty for the usual one.
 
         Raises:
-            RobotError: the robot has no such start.
+            RobotError: The robot has no such start.
         """
         if start and start not in self.starts:
             known = f"there are {', '.join(self.starts)}" if self.starts else "it has only the usual one"
@@ -119,14 +158,25 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         """Return the task of a name.
 
         Raises:
-            MapError: the robot has no such task.
+            MapError: The robot has no such task.
         """
         return find_task(name, self.tasks, self.name)
 
     def attribute_index(self, name: str) -> int:
-        """Column of an attribute in `read_attributes`.
+        """Return the column of an attribute in `read_attributes`.
 
         Raises:
-            RobotError: the robot has no such attribute.
+            RobotError: The robot has no such attribute.
         """
         return column_of(name, self.attributes, self.name)
+
+    def _check_snapshot(self, snapshot: RobotState) -> None:
+        if snapshot.robot != self.name:
+            raise RobotError(f"{self.name}: expected a snapshot of {self.name}, got one of {snapshot.robot}")
+
+    def _copy_arrays(self) -> tuple[Floats, ...]:
+        return tuple(getattr(self, name).copy() for name in self.state_arrays)
+
+    def _restore_arrays(self, arrays: tuple[Floats, ...]) -> None:
+        for name, array in zip(self.state_arrays, arrays, strict=True):
+            setattr(self, name, array.copy())

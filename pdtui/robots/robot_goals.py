@@ -15,11 +15,11 @@ class BehaviorGoal:
     """A behavior to look for.
 
     Attributes:
-        name: name of the behavior.
-        key: key that latches it.
-        says: one sentence on what one sees.
-        aim: the attribute and where it is to go.
-        enough: effect that counts as reached, in the attribute's unit; for a stop, the share of the
+        name: Name of the behavior.
+        key: Key that latches it.
+        says: What one sees, in one sentence.
+        aim: The attribute, and where it should go.
+        enough: Effect that counts as reached, in the attribute's unit; for a stop, the share of the
             attribute's mean that has to go.
     """
 
@@ -35,13 +35,13 @@ class HoldGoal:
     """A behavior to look for that holds an attribute at a target, which the arrow keys set.
 
     Attributes:
-        name: name of the behavior.
-        key: key that latches it.
-        says: one sentence on what one sees.
-        attribute: the attribute to hold.
-        targets: where controllers are tried: offsets from the attribute's value at the start, in its unit, or
-            shares of its mean without stimulation.
-        relative_to: which of the two.
+        name: Name of the behavior.
+        key: Key that latches it.
+        says: What one sees, in one sentence.
+        attribute: The attribute to hold.
+        targets: Targets at which controllers are tried: offsets from the attribute's value at the start, in
+            its unit, or shares of its mean without stimulation.
+        relative_to: Which of the two the targets are.
     """
 
     name: str
@@ -57,9 +57,9 @@ class RobotGoals:
     """Everything that a dissection looks for on a robot. Goals for attributes that it lacks are skipped.
 
     Attributes:
-        behaviors: behaviors, in the order in which they are searched for.
-        holds: behaviors that hold an attribute, in the order in which they are searched for.
-        primitives: names of the motor primitives, by the attribute that each of them steers; a robot with
+        behaviors: Behaviors, in the order in which they are searched for.
+        holds: Behaviors that hold an attribute, in the order in which they are searched for.
+        primitives: Names of the motor primitives, by the attribute that each of them steers. A robot with
             none of these attributes gets a primitive for every attribute that can be moved.
     """
 
@@ -68,38 +68,29 @@ class RobotGoals:
     primitives: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
 
+_UP, _DOWN = BehaviorAim("vy", "increase"), BehaviorAim("vy", "decrease")
+_LEFT, _RIGHT = BehaviorAim("yaw rate", "increase"), BehaviorAim("yaw rate", "decrease")
+_HEADINGS = (-0.8, -0.4, 0.4, 0.8)  # rad from the heading at the start
+_PRIMITIVES = {
+    "vx": "forward",
+    "vy": "sidestep",
+    "speed": "pace",
+    "yaw": "heading",
+    "yaw rate": "turn",
+    "height": "height",
+}
 WALKING_GOALS = RobotGoals(
     behaviors=(
         BehaviorGoal("stop", "x", "stops and stands", BehaviorAim("speed", "stop"), 0.8),
-        BehaviorGoal("up", "w", "walks on and drifts to +y", BehaviorAim("vy", "increase"), 0.7),
-        BehaviorGoal("down", "s", "walks on and drifts to −y", BehaviorAim("vy", "decrease"), 0.7),
-        BehaviorGoal(
-            "spin left", "a", "turns left on the spot, or nearly", BehaviorAim("yaw rate", "increase"), 0.5
-        ),
-        BehaviorGoal(
-            "spin right", "d", "turns right on the spot, or nearly", BehaviorAim("yaw rate", "decrease"), 0.5
-        ),
+        BehaviorGoal("up", "w", "walks on and drifts to +y", _UP, 0.7),
+        BehaviorGoal("down", "s", "walks on and drifts to −y", _DOWN, 0.7),
+        BehaviorGoal("spin left", "a", "turns left on the spot, or nearly", _LEFT, 0.5),
+        BehaviorGoal("spin right", "d", "turns right on the spot, or nearly", _RIGHT, 0.5),
     ),
     holds=(
-        HoldGoal(
-            "hold heading",
-            "h",
-            "keeps the heading that the arrow keys set",
-            "yaw",
-            (-0.8, -0.4, 0.4, 0.8),
-            "start",
-        ),
+        HoldGoal("hold heading", "h", "keeps the heading that the arrow keys set", "yaw", _HEADINGS, "start"),
         HoldGoal("hold speed", "g", "keeps the speed that the arrow keys set", "speed", (0.4, 0.7), "mean"),
     ),
-    primitives=MappingProxyType(
-        {
-            "vx": "forward",
-            "vy": "sidestep",
-            "speed": "pace",
-            "yaw": "heading",
-            "yaw rate": "turn",
-            "height": "height",
-        }
-    ),
+    primitives=MappingProxyType(_PRIMITIVES),
 )
-"""For a robot that walks about as fast as the Ant, and for one whose class declares nothing else."""
+"""For a robot that walks about as fast as the Ant, and the default for every robot."""

@@ -1,4 +1,4 @@
-"""A task: from which state, for how long, and how to tell whether it was done."""
+"""A task of a robot: its start state, its duration, and the judge that tells whether it was done."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from pdtui.core.errors import MapError
 
 @dataclass(frozen=True)
 class RunTrace:
-    """What one run showed.
+    """The attributes during one run of a task.
 
     Attributes:
-        attributes: of the robot.
-        walked: their values at each control step before the behavior was latched, shape (W, J).
-        values: from then on, shape (T, J), angles unwrapped; it ends where the episode did.
-        fell: whether it fell.
+        attributes: The robot's attributes.
+        walked: Their values at each control step before the behavior was latched, shape (W, J).
+        values: Their values from then on, shape (T, J), angles unwrapped, up to the end of the episode.
+        fell: Whether the robot fell.
     """
 
     attributes: Sequence[Attribute]
@@ -28,27 +28,40 @@ class RunTrace:
     fell: bool
 
     def before(self, name: str) -> Floats:
-        """An attribute before the behavior, shape (W,)."""
+        """Return an attribute before the behavior, shape (W,)."""
         column: Floats = self.walked[:, column_of(name, self.attributes, "task")]
         return column
 
     def __getitem__(self, name: str) -> Floats:
-        """An attribute from the behavior on, shape (T,)."""
+        """Return an attribute from the behavior on, shape (T,)."""
         column: Floats = self.values[:, column_of(name, self.attributes, "task")]
         return column
 
     def __len__(self) -> int:
         return len(self.values)
 
+    def mean_before(self, name: str, steps: int) -> float:
+        """Return the mean of an attribute over the last steps before the behavior."""
+        return float(self.before(name)[-steps:].mean())
+
+    def mean(self, name: str, window: slice, missing: float = 0.0) -> float:
+        """Return the mean of an attribute in a window of steps, or `missing` if the run ends before it."""
+        values = self[name][window]
+        return float(values.mean()) if len(values) else missing
+
+    def stays_up(self, steps: int) -> bool:
+        """Return whether the run has that many steps and no fall."""
+        return not self.fell and len(self) >= steps
+
 
 @dataclass(frozen=True)
 class TaskVerdict:
-    """How a run went.
+    """The judgement of one run of a task.
 
     Attributes:
-        success: whether the task was done.
-        score: how nearly, for searches: 1 and more where it was done.
-        figures: what was measured, by name with its unit.
+        success: Whether the task was done.
+        score: How nearly it was done, for searches: 1 or more for a success.
+        figures: Measured values by name with unit.
     """
 
     success: bool
@@ -57,7 +70,7 @@ class TaskVerdict:
 
 
 def mean_figures(verdicts: Iterable[TaskVerdict]) -> dict[str, float]:
-    """Mean of each figure over the verdicts that have it."""
+    """Return the mean of each figure over the verdicts that have it."""
     found: dict[str, list[float]] = {}
     for verdict in verdicts:
         for name, value in verdict.figures.items():
@@ -67,19 +80,19 @@ def mean_figures(verdicts: Iterable[TaskVerdict]) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Task:
-    """Something to accomplish.
+    """Something for a robot to accomplish.
 
     Attributes:
-        name: as maps name it.
-        key: that a map binds it to.
-        says: one sentence on what one sees.
-        wanted: what counts as done, for tables.
-        walk: fewest and most control steps before the behavior; each seed draws its own number, so that the
-            behavior meets other phases of the gait.
-        steps: control steps that are watched from the behavior on.
-        judge: the verdict on a run.
-        start: state in which the robot starts, empty for the usual one.
-        period: longest time that the behavior may last, in control steps; None where it goes on.
+        name: Name in maps.
+        key: Key to which a map binds it.
+        says: What one sees, in one sentence.
+        wanted: What counts as done, for tables.
+        walk: Fewest and most control steps before the behavior. Each seed draws its own number, so that the
+            behavior meets different phases of the gait.
+        steps: Control steps that are judged from the behavior on.
+        judge: Gives the verdict on a run.
+        start: State in which the robot starts; empty for the usual one.
+        period: Longest duration of the behavior, in control steps; None for no limit.
     """
 
     name: str
@@ -94,10 +107,10 @@ class Task:
 
 
 def find_task(name: str, tasks: Sequence[Task], owner: str) -> Task:
-    """Return the task of a name; `owner` is named where there is none.
+    """Return the task of a name.
 
     Raises:
-        MapError: there is no such task.
+        MapError: There is no such task; the message names `owner`.
     """
     for task in tasks:
         if task.name == name:

@@ -11,48 +11,49 @@ from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
-from pdtui.robots.robot_goals import WALKING_GOALS
-from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, model_links, silence_warnings
+from pdtui.robots.robot import TrainingRecipe, torque_attributes
+from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, read_model_links, silence_warnings
 from pdtui.robots.task import RunTrace, Task, TaskVerdict
-from pdtui.robots.training_recipe import TrainingRecipe
 
-_LONGEST_STRIDE = 0.4
-"""s"""
 _FEET = {"right": "foot_geom", "left": "foot_left_geom"}
-_SLOWED = 0.25
-_WITHIN, _UPRIGHT = 100, 200
-_HOP_FROM, _HOP_STEPS, _HOP_SHARE, _FORWARD = 50, 150, 0.8, 0.3
+# Longest time that a foot may be off the ground in training, s.
+_MAX_STRIDE_TIME = 0.4
+# Slowing down: share of its speed, and control steps to slow down in and to stay up for afterwards.
+_SLOW_SHARE, _SLOWING_STEPS, _SLOW_STEPS = 0.25, 100, 200
+# Hopping: control steps to begin in and to hop for, share of these with a foot up, and slowest speed, m/s.
+_HOP_FROM, _HOP_STEPS, _HOP_SHARE, _HOP_SPEED = 50, 150, 0.8, 0.3
 
 
 def slows_down(trace: RunTrace) -> TaskVerdict:
-    """Under a quarter of its speed from step 100 on, on average over 200 steps in which it stays up."""
-    usual = float(trace.before("vx")[-100:].mean())
-    whole = _WITHIN + _UPRIGHT
-    lived = len(trace) / whole
-    late = trace["vx"][_WITHIN:whole]
+    """Judge whether it has less than a quarter of its speed from step 100 on and stays up for 200 steps."""
+    usual = trace.mean_before("vx", 100)
+    steps = _SLOWING_STEPS + _SLOW_STEPS
+    late = trace["vx"][_SLOWING_STEPS:steps]
     left = float(np.abs(late).mean()) / usual if len(late) else 1.0
-    up = not trace.fell and len(trace) >= whole
-    # A fall is worth no more than the time before it.
-    score = (1.0 - left) / (1.0 - _SLOWED) if up else 0.5 * lived * min(1.0, max(0.0, 1.0 - left))
-    return TaskVerdict(up and left < _SLOWED, score, {"share of speed left": left, "steps up": len(trace)})
+    up = trace.stays_up(steps)
+    # A fall scores no more than the time before it.
+    fallen_score = 0.5 * len(trace) / steps * min(1.0, max(0.0, 1.0 - left))
+    score = (1.0 - left) / (1.0 - _SLOW_SHARE) if up else fallen_score
+    figures = {"share of speed left": left, "steps up": len(trace)}
+    return TaskVerdict(up and left < _SLOW_SHARE, score, figures)
 
 
 def hops(trace: RunTrace) -> TaskVerdict:
-    """One foot stays off the ground for 80 % of 150 steps, in one stretch, while it moves forward.
+    """Judge whether one foot stays off the ground for 80 % of 150 steps in a row while it moves forward.
 
-    In one stretch, because each foot of a fast runner is off the ground for 80 % of the time, too.
+    In a row, because each foot of a fast runner is off the ground for 80 % of the time, too.
     """
     end = _HOP_FROM + _HOP_STEPS
     window = slice(_HOP_FROM, end)
     off = [trace[f"{side} foot clearance"][window] > 0.0 for side in ("right", "left")]
-    speed = float(trace["vx"][window].mean()) if len(trace) > _HOP_FROM else 0.0
+    speed = trace.mean("vx", window)
     stretch = max(_longest(foot) for foot in off) / _HOP_STEPS
-    up = not trace.fell and len(trace) >= end
-    done = up and stretch >= _HOP_SHARE and speed > _FORWARD
+    up = trace.stays_up(end)
+    done = up and stretch >= _HOP_SHARE and speed > _HOP_SPEED
     score = stretch / _HOP_SHARE
     if not up:
         score = 0.5 * score * len(trace) / end
-    elif speed <= _FORWARD:
+    elif speed <= _HOP_SPEED:
         score *= 0.6
     figures = {
         "longest stretch with one foot up (of 1)": stretch,
@@ -63,7 +64,7 @@ def hops(trace: RunTrace) -> TaskVerdict:
 
 
 def _longest(flags: NDArray[np.bool_]) -> int:
-    """Length of the longest run of true values."""
+    """Return the length of the longest run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
@@ -75,7 +76,7 @@ WALKER_TASKS = (
         says="slows down to a stand and stays up",
         wanted="under 25 % of its speed after 100 steps, up for 200 more",
         walk=(200, 300),
-        steps=_WITHIN + _UPRIGHT,
+        steps=_SLOWING_STEPS + _SLOW_STEPS,
         judge=slows_down,
     ),
     Task(
@@ -91,31 +92,31 @@ WALKER_TASKS = (
 
 
 class Walker(MujocoRobot, Walker2dEnv):
-    """Gymnasium's Walker2d with the feet of the paper's: friction 0.9 right and 1.9 left; 0.008 s a step.
+    """Gymnasium's Walker2d with the paper's foot friction, 0.9 right and 1.9 left; a control step is 0.008 s.
 
-    Observation (17): height, pitch, 6 joint angles; then the 9 velocities, clipped at ±10. Reward is
-    Gymnasium's: 1 for being up, vx, less 0.001 times the squared action. An episode ends where the torso
-    leaves 0.8–2.0 m or leans by more than 1 rad.
+    The observation (17) holds the height, the pitch, 6 joint angles, and the 9 velocities, clipped at ±10.
+    The reward is Gymnasium's: 1 for being up, plus vx, minus 0.001 times the squared action. An episode ends
+    when the torso leaves 0.8–2.0 m or leans by more than 1 rad.
 
-    Clearance is how far the lowest point of a foot is above the ground: under 0 it stands.
+    The clearance of a foot is the height of its lowest point above the ground; below 0, the foot stands.
 
     Args:
-        alternate: for training: reward is 1 less at each step at which a foot has been off the ground for
-            more than 0.4 s. Without that, policies hop on one leg.
-        top_speed: for training: m/s beyond which going faster pays nothing.
+        alternate: For training: whether a step costs 1 if a foot has been off the ground for more than 0.4 s.
+            Without that, policies hop on one leg.
+        top_speed: For training: speed beyond which going faster is not rewarded, m/s.
     """
 
     name = "walker"
     title = "Walker (MuJoCo)"
-    goals = WALKING_GOALS
     tasks = WALKER_TASKS
+    state_arrays = ("_in_air",)
     training_recipe = TrainingRecipe({"alternate": True, "top_speed": 3.4}, {"discount": 0.995})
 
     def __init__(self, alternate: bool = False, top_speed: float = math.inf) -> None:
         super().__init__(xml_file="walker2d.xml")
         self._alternate, self._top_speed = alternate, top_speed
         self._in_air = np.zeros(len(_FEET))
-        self.links = model_links(self.model)
+        self.links = read_model_links(self.model)
         self._feet = [self.model.geom(geom).id for geom in _FEET.values()]
         self._motors = GearedMotors(self.model)
         self.attributes = (
@@ -125,15 +126,8 @@ class Walker(MujocoRobot, Walker2dEnv):
             Attribute("pitch", "rad", wraps=True),
             Attribute("pitch rate", "rad/s"),
             *(Attribute(f"{side} foot clearance", "m") for side in _FEET),
-            *(
-                Attribute(f"{_side(joint.removesuffix('_joint'))} torque", "N m", scale=1.0 / gear)
-                for joint, gear in zip(self._motors.joints, self._motors.gears, strict=True)
-            ),
+            *torque_attributes(map(_label_joint, self._motors.joints), self._motors.gears),
         )
-
-    @property
-    def control_dt(self) -> float:
-        return float(self.dt)
 
     def observe(self) -> Floats:
         observation: Floats = self._get_obs()
@@ -145,7 +139,7 @@ class Walker(MujocoRobot, Walker2dEnv):
         info["cost"] = 0.0
         reward -= max(0.0, float(info["x_velocity"]) - self._top_speed)
         if self._alternate:
-            reward -= self._drags()
+            reward -= self._long_strides()
         if terminated:
             height, pitch = self.data.qpos[1:3].tolist()
             low, high = self._healthy_z_range
@@ -172,24 +166,19 @@ class Walker(MujocoRobot, Walker2dEnv):
         observation: Floats = super().reset_model()
         return observation
 
-    def _drags(self) -> float:
-        """1 where a foot is off the ground for too long, else 0."""
+    def _long_strides(self) -> float:
+        """Return 1 if a foot has been off the ground for too long, else 0."""
         mujoco.mj_kinematics(self.model, self.data)
         for index, foot in enumerate(self._feet):
             self._in_air[index] = self._in_air[index] + self.dt if self._clearance(foot) > 0.0 else 0.0
-        return float((self._in_air > _LONGEST_STRIDE).any())
-
-    def _extras(self) -> tuple[Floats, ...]:
-        return (self._in_air.copy(),)
-
-    def _set_extras(self, extras: tuple[Floats, ...]) -> None:
-        self._in_air = extras[0].copy()
+        return float((self._in_air > _MAX_STRIDE_TIME).any())
 
     def _clearance(self, geom: int) -> float:
         radius, half = self.model.geom_size[geom, :2].tolist()
-        # A capsule's axis is its local z: the rotation's last number says how far its ends differ in height.
+        # A capsule's axis is its local z, and the last number of its rotation is the cosine of the tilt.
         return float(self.data.geom_xpos[geom, 2] - abs(self.data.geom_xmat[geom, 8]) * half - radius)
 
 
-def _side(joint: str) -> str:
+def _label_joint(name: str) -> str:
+    joint = name.removesuffix("_joint")
     return f"left {joint.removesuffix('_left')}" if joint.endswith("_left") else f"right {joint}"

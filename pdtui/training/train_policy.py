@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pdtui.core.errors import TrainingError
 from pdtui.robots import make_robot, robot_names
+from pdtui.training.training_config import PpoConfig, SacConfig
 
 
 def train_policy(
@@ -20,11 +21,11 @@ def train_policy(
     folder: Path,
     progress: Callable[..., None] | None,
 ) -> Path:
-    """Train, or go on training, in a folder; returns the best weights.
+    """Train a policy in a folder, or continue there, and return the path of the best weights.
 
     Raises:
-        TrainingError: the extra ``train`` is not installed, the robot is an
-            environment of Gymnasium or has no such reward, or the folder holds something else.
+        TrainingError: The extra ``train`` is not installed, the robot is an environment of Gymnasium or has
+            no choice of a forward reward, or the folder holds another run.
     """
     if robot not in robot_names():
         raise TrainingError(
@@ -35,35 +36,31 @@ def train_policy(
     if forward is not None and "forward" not in recipe.options:
         raise TrainingError(f"--forward chooses the Ant's reward; '{robot}' has only one")
     try:
-        from pdtui.training.ppo import PpoConfig
-        from pdtui.training.ppo_run import PpoTrainingRun
-        from pdtui.training.sac import SacConfig
-        from pdtui.training.sac_run import SacTrainingRun
-        from pdtui.training.training_run import TrainingReport, TrainingRun
+        from pdtui.training.policy_trainer import ActorScore, PolicyTrainer
+        from pdtui.training.ppo_trainer import PpoTrainer
+        from pdtui.training.sac_trainer import SacTrainer
     except ImportError as error:
         raise TrainingError(f"training needs the extra: pip install 'pdtui[train]' ({error})") from error
     options = dict(recipe.options) | ({"forward": forward} if forward else {})
-    known = PpoConfig if algorithm == "ppo" else SacConfig
-    changes = {name: value for name, value in recipe.settings.items() if name in known.__dataclass_fields__}
-    if steps is not None:
-        changes["total_steps"] = steps
-    if learning_rate is not None:
-        changes["learning_rate"] = learning_rate
-    config = replace(known(), **changes)
+    defaults = PpoConfig() if algorithm == "ppo" else SacConfig()
+    given = {"total_steps": steps, "learning_rate": learning_rate}
+    changes = {name: value for name, value in recipe.settings.items() if hasattr(defaults, name)}
+    config = replace(
+        defaults, **changes | {name: value for name, value in given.items() if value is not None}
+    )
     command = (
         f"pdtui train {robot} --algorithm {algorithm} --seed {seed} --steps {config.total_steps} "
         f"--learning-rate {config.learning_rate:g}" + (f" --forward {forward}" if forward else "")
     )
 
-    def report(state: TrainingReport) -> None:
+    def report(taken: int, _: ActorScore | None, best: ActorScore | None) -> None:
         if progress is not None:
-            best = state.best
             note = f"best return {best.mean_return:.0f}, {best.mean_speed:.2f} m/s" if best else ""
-            progress(state.steps, state.total_steps, note)
+            progress(taken, config.total_steps, note)
 
-    run: TrainingRun
+    trainer: PolicyTrainer[PpoConfig] | PolicyTrainer[SacConfig]
     if isinstance(config, PpoConfig):
-        run = PpoTrainingRun(robot, seed, folder, config, command, **options)
+        trainer = PpoTrainer(robot, seed, folder, config, command, **options)
     else:
-        run = SacTrainingRun(robot, seed, folder, config, command, **options)
-    return run.run(report)
+        trainer = SacTrainer(robot, seed, folder, config, command, **options)
+    return trainer.run(report)

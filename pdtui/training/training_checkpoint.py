@@ -1,4 +1,4 @@
-"""Training state on disk: arrays in safetensors, the rest as JSON beside them, replaced in one step."""
+"""Checkpoints of training runs: safetensors files with JSON in their metadata, replaced atomically."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from safetensors.numpy import save_file
 from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import TrainingError
 from pdtui.core.robot_data import RobotState
-from pdtui.training.world_batch import WorldBatch, WorldBatchState
+from pdtui.training.robot_batch import RobotBatch, RobotBatchState
 
 _KEY = "pdtui-training"
 Arrays = dict[str, NDArray[Any]]
@@ -25,51 +25,43 @@ Arrays = dict[str, NDArray[Any]]
 def save_checkpoint(
     path: Path,
     learner: Any,
-    worlds: Sequence[WorldBatch],
+    batches: Sequence[RobotBatch],
     rng: np.random.Generator,
     progress: dict[str, Any],
-    memory: Arrays,
+    further: Arrays,
 ) -> None:
-    """Write all that a later `load_checkpoint` needs to go on bit for bit.
+    """Write everything that `load_checkpoint` needs to continue bit for bit.
 
     Args:
-        path: of the file.
-        learner: a tree of arrays.
-        worlds: groups of robots.
-        rng: of the run.
-        progress: what else the run remembers, JSON-able.
-        memory: further arrays by name, such as a replay buffer.
+        path: The file.
+        learner: State of the learner, a tree of arrays.
+        batches: The robots.
+        rng: Random generator of the run.
+        progress: Further JSON data.
+        further: Further arrays by name, such as a replay buffer.
     """
-    arrays: Arrays = {
-        f"learner.{index}": np.asarray(leaf) for index, leaf in enumerate(jax.tree.leaves(learner))
-    }
-    arrays |= {f"memory.{name}": array for name, array in memory.items()}
-    groups = []
-    for number, group in enumerate(worlds):
-        state = group.state()
+    arrays: Arrays = {f"learner.{n}": np.asarray(leaf) for n, leaf in enumerate(jax.tree.leaves(learner))}
+    arrays |= {f"memory.{name}": array for name, array in further.items()}
+    worlds = []
+    for number, batch in enumerate(batches):
+        state = batch.state()
         for index, snapshot in enumerate(state.snapshots):
             arrays[f"states.{number}.{index}"] = np.ascontiguousarray(snapshot.state)
-            extras = {f"worlds.{number}.{index}.{k}": extra for k, extra in enumerate(snapshot.extras)}
-            arrays |= extras
-        groups.append(
-            {
-                "robot": state.snapshots[0].robot,
-                "ages": state.ages,
-                "rng": [dict(snapshot.rng) for snapshot in state.snapshots],
-            }
-        )
-    record = {"progress": progress, "rng": rng.bit_generator.state, "worlds": groups}
+            arrays |= {f"worlds.{number}.{index}.{k}": extra for k, extra in enumerate(snapshot.extras)}
+        rngs = [dict(snapshot.rng) for snapshot in state.snapshots]
+        worlds.append({"robot": state.snapshots[0].robot, "ages": state.ages, "rng": rngs})
+    record = {"progress": progress, "rng": rng.bit_generator.state, "worlds": worlds}
     with replace_file(path, TrainingError) as partial:
         save_file(arrays, partial, metadata={_KEY: json.dumps(record)})
 
 
 def load_checkpoint(
-    path: Path, learner: Any, worlds: Sequence[WorldBatch], rng: np.random.Generator
+    path: Path, learner: Any, batches: Sequence[RobotBatch], rng: np.random.Generator
 ) -> tuple[Any, dict[str, Any], Arrays]:
-    """Fill worlds and rng; return the learner's state, the progress and the further arrays.
+    """Restore robots and generator; return the learner's state, the progress and the further arrays.
 
     Raises:
-        TrainingError: the file is not a checkpoint of this run's settings.
+        TrainingError: The file is not a checkpoint of a run with the same settings.
     """
     try:
         with safe_open(str(path), framework="numpy") as handle:
@@ -85,17 +77,19 @@ def load_checkpoint(
                 f"{path}: array {index} of the learner: expected shape {leaf.shape}, "
                 f"found {None if new is None else new.shape}; was it made with other settings?"
             )
-    for number, (group, kept) in enumerate(zip(worlds, record["worlds"], strict=True)):
+    for number, (batch, kept) in enumerate(zip(batches, record["worlds"], strict=True)):
         snapshots = []
-        for index, world_rng in enumerate(kept["rng"]):
-            prefix = f"worlds.{number}.{index}."
-            places = sorted(int(name.removeprefix(prefix)) for name in arrays if name.startswith(prefix))
-            extras = tuple(arrays[f"{prefix}{place}"] for place in places)
-            state = arrays[f"states.{number}.{index}"]
-            snapshots.append(RobotState(kept["robot"], state, extras, world_rng))
-        group.restore(WorldBatchState(snapshots, kept["ages"]))
+        for index, robot_rng in enumerate(kept["rng"]):
+            extras = _numbered_arrays(arrays, f"worlds.{number}.{index}.")
+            snapshots.append(RobotState(kept["robot"], arrays[f"states.{number}.{index}"], extras, robot_rng))
+        batch.restore(RobotBatchState(snapshots, kept["ages"]))
     rng.bit_generator.state = record["rng"]
-    memory = {
+    further = {
         name.removeprefix("memory."): array for name, array in arrays.items() if name.startswith("memory.")
     }
-    return jax.tree.unflatten(tree, [jax.numpy.asarray(new) for new in saved]), record["progress"], memory
+    return jax.tree.unflatten(tree, [jax.numpy.asarray(new) for new in saved]), record["progress"], further
+
+
+def _numbered_arrays(arrays: Arrays, prefix: str) -> tuple[NDArray[Any], ...]:
+    numbers = sorted(int(name.removeprefix(prefix)) for name in arrays if name.startswith(prefix))
+    return tuple(arrays[f"{prefix}{number}"] for number in numbers)

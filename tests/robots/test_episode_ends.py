@@ -134,9 +134,10 @@ def test_a_drive_counts_falls_and_begins_the_next_episode(robot: Sprinter) -> No
 
 def test_training_starts_over_and_scores_falls(robot: Sprinter) -> None:
     pytest.importorskip("jax", reason="the extra 'train' is not installed")
-    from pdtui.training.world_batch import WorldBatch, score_actor
+    from pdtui.training.policy_trainer import score_actor
+    from pdtui.training.robot_batch import RobotBatch
 
-    worlds = WorldBatch(lambda: Sprinter(robot.end), 1, 0)
+    worlds = RobotBatch(lambda: Sprinter(robot.end), 1, 0)
     rows = [(worlds.step(np.zeros((1, 1), np.float32)), bool(worlds.restarted[0])) for _ in range(LAST + 1)]
     assert [restarted for _, restarted in rows] == [False] * (LAST - 1) + [True, False]
     assert rows[LAST - 1][0].discount == (1.0 if robot.end == "out of time" else 0.0)

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.robots.environments.space_conversion import as_vector
+from pdtui.robots.environments.gymnasium_spaces import action_to_vector
 from pdtui.robots.robot import Robot
 
 
@@ -17,7 +17,7 @@ def random_actions(name: str, count: int, seed: int = 0) -> list[NDArray[np.floa
     """Seeded actions of an environment, as a policy gives them."""
     env: gymnasium.Env[Any, Any] = gymnasium.make(name)
     env.action_space.seed(seed)
-    return [as_vector(env.action_space, env.action_space.sample()) for _ in range(count)]
+    return [action_to_vector(env.action_space, env.action_space.sample()) for _ in range(count)]
 
 
 def follow(robot: Robot, actions: Iterable[NDArray[np.float32]]) -> list[tuple[Any, ...]]:

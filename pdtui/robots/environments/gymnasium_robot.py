@@ -1,4 +1,4 @@
-"""A robot made of any Gymnasium environment: base of the generic robots, and of those in other packages."""
+"""A robot made from any Gymnasium environment: the base of generic robots and of those in other packages."""
 
 from __future__ import annotations
 
@@ -15,73 +15,71 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.core.robot_data import RobotState
-from pdtui.robots.environments.space_conversion import (
-    action_for,
-    as_vector,
-    flat_observations,
-    known_actions,
-    number_of,
-    numbers_of,
+from pdtui.robots.environments.actions_since_reset import ActionsSinceReset
+from pdtui.robots.environments.gymnasium_spaces import (
+    action_to_vector,
+    check_action_space,
+    flatten_observation_space,
+    numeric_entries,
+    to_number,
+    vector_to_action,
 )
-from pdtui.robots.robot import Robot
-from pdtui.robots.simulators.actions_since_reset import ActionsSinceReset
+from pdtui.robots.robot import ResetResult, Robot, StepResult
 from pdtui.robots.simulators.python_state import (
-    digest_of,
-    layers_of,
-    plain_of,
-    recall,
-    remember,
-    unknown_parts,
+    copy_python_state,
+    digest_values,
+    find_uncopyable_attributes,
+    plain_attributes,
+    restore_python_state,
+    wrapper_layers,
 )
 
-_USUAL_DT = 1.0 / 30.0
-_SEEDS = 2**31
-_ENDED = "the environment ended the episode"
+# Control step of an environment that does not tell its own, and the longest that is believed, s.
+_DEFAULT_DT, _MAX_DT = 1.0 / 30.0, 60.0
+_MAX_SEED = 2**31
+# Steps that tell whether a copy of an environment goes on like the original, and those before the copy.
+_TRIAL_STEPS, _STEPS_BEFORE_COPY = 24, 4
 
 
 def make_environment(name: str) -> gymnasium.Env[Any, Any]:
     """Build a registered environment with the wrappers of its registration, but without a time limit.
 
-    Whoever drives decides how long: a time limit is the training's, and would end a drive without a reason
-    that one sees.
+    A time limit serves training; it would end a drive for no visible reason.
 
     Raises:
-        RobotError: a package is missing, or the environment cannot be built.
+        RobotError: A package is missing, or the environment cannot be built.
     """
+    cause: Exception
     with warnings.catch_warnings():
-        # Advice to trainers ("there is a newer version"), printed over the screen.
+        # Advice to trainers ("there is a newer version") would be printed over the screen.
         warnings.simplefilter("ignore")
         try:
             return gymnasium.make(name, max_episode_steps=-1, disable_env_checker=True)
         except (ImportError, gymnasium.error.DependencyNotInstalled) as error:
-            raise RobotError(
-                f"environment '{name}' needs a package that is not installed: {error}"
-            ) from error
+            reason, cause = f"needs a package that is not installed: {error}", error
         except Exception as error:  # whatever a third party's constructor raises
-            raise RobotError(
-                f"environment '{name}' cannot be built: {str(error) or type(error).__name__}"
-            ) from error
+            reason, cause = f"cannot be built: {str(error) or type(error).__name__}", error
+    raise RobotError(f"environment '{name}' {reason}") from cause
 
 
 class GymnasiumRobot(Robot):
-    """Drives a Gymnasium environment as it is: its observation, its reward, its end of an episode.
+    """A Gymnasium environment as it is: its observation, its reward, its end of an episode.
 
-    A reset without a seed draws one from the robot's own generator, so that every episode is a function of
-    a seed and its actions. Where the environment's Python side is all there is, a snapshot is a copy of it.
-    Where a library keeps state that no copy reaches (Box2D, an emulator), it is the seed and the actions
-    since the reset, which a fresh environment repeats. Which of the two holds is tried before the first
-    reset.
+    A reset without a seed draws one from the robot's own generator, so every episode is a function of a seed
+    and its actions. If all of the environment's state is plain Python data, a snapshot is a copy of it. If a
+    library holds state that cannot be copied (Box2D, an emulator), a snapshot consists of the seed and the
+    actions since the reset, which a new environment repeats. A trial before the first reset decides which.
 
-    Observations and actions: a Box is passed as it is, whatever its shape; Discrete, MultiDiscrete and
-    MultiBinary actions are whole numbers counted from 0, in a vector of floats; any other observation is
-    flattened with `gymnasium.spaces.flatten`.
+    A Box is passed as it is, whatever its shape. Discrete, MultiDiscrete and MultiBinary actions are integers
+    counted from 0, in a vector of floats. Any other observation is flattened with `gymnasium.spaces.flatten`.
 
     Args:
-        name: of the robot: what maps and sessions call it.
-        title: for people.
+        name: Name of the robot in maps and sessions.
+        title: Name for people; by default `name`.
+        environment: Registered id of the environment; by default `name`.
 
     Raises:
-        RobotError: the environment cannot be built, or its spaces cannot be used.
+        RobotError: The environment cannot be built, or its spaces cannot be used.
     """
 
     def __init__(self, name: str, title: str = "", environment: str = "") -> None:
@@ -89,8 +87,8 @@ class GymnasiumRobot(Robot):
         self._environment = environment or name
         self.env = self.make_world()
         self._flattened = not isinstance(self.env.observation_space, spaces.Box)
-        self.observation_space: Any = flat_observations(self.env.observation_space, self.name)
-        self.action_space = known_actions(self.env.action_space, self.name)
+        self.observation_space: Any = flatten_observation_space(self.env.observation_space, self.name)
+        self.action_space = check_action_space(self.env.action_space, self.name)
         self.links, self.attributes = (), ()
         self.reward = 0.0
         self.info: Mapping[str, Any] = {}
@@ -101,7 +99,7 @@ class GymnasiumRobot(Robot):
         self._repeats: bool | None = None
 
     def make_world(self) -> gymnasium.Env[Any, Any]:
-        """A new environment; a class of its own may build another than Gymnasium has registered."""
+        """Build a new environment; subclasses may build one that is not registered with Gymnasium."""
         return make_environment(self._environment)
 
     @property
@@ -111,12 +109,12 @@ class GymnasiumRobot(Robot):
 
     @property
     def control_dt(self) -> float:
-        """The environment's ``dt``, or the time between the frames that it would render, or 1/30 s."""
+        """The environment's ``dt``, or the time between its rendered frames, or 1/30 s."""
         dt = getattr(self.world, "dt", None)
-        if isinstance(dt, float) and 0.0 < dt < 60.0:
+        if isinstance(dt, float) and 0.0 < dt < _MAX_DT:
             return dt
         rate = self.world.metadata.get("render_fps")
-        return 1.0 / float(rate) if isinstance(rate, int | float) and rate > 0 else _USUAL_DT
+        return 1.0 / float(rate) if isinstance(rate, int | float) and rate > 0 else _DEFAULT_DT
 
     def close(self) -> None:
         self.env.close()
@@ -127,43 +125,41 @@ class GymnasiumRobot(Robot):
     def read_poses(self) -> Floats:
         return np.empty((0, 7))
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Floats, dict[str, Any]]:
-        self._settle()
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> ResetResult:
+        self._choose_snapshots()
         super().reset(seed=seed)
-        self._seed = int(self.np_random.integers(_SEEDS)) if seed is None else seed
-        if self._repeats:
-            self._renew()
+        self._seed = int(self.np_random.integers(_MAX_SEED)) if seed is None else seed
+        if self._repeats:  # a used world may not repeat itself; Box2D's does not
+            self.env.close()
+            self.env = self.make_world()
         self._start = self.check_start(str((options or {}).get("start", ""))) if self.starts else ""
         self._actions, self.reward = ActionsSinceReset(int(np.prod(self.action_space.shape or (1,)))), 0.0
         observation, self.info = self.env.reset(seed=self._seed, options=options)
         self._see(observation)
         return self.observe(), dict(self.info)
 
-    def step(self, action: NDArray[np.float32]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
-        """Advance the environment.
+    def step(self, action: NDArray[np.float32]) -> StepResult:
+        """Step the environment.
 
-        An environment that truncates by itself is taken at its word, since it may not go on; the time limits
-        of registrations are not applied (see `make_environment`). It has finished where its info says so by
-        ``finished`` or by ``is_success``, as many environments do.
+        If the environment truncates an episode by itself, the episode ends; the time limits of registrations
+        do not apply (see `make_environment`). The robot has finished if the info says so by ``finished`` or,
+        as in many environments, by ``is_success``.
 
         Raises:
-            RobotError: the action is not one of the environment's.
-            SimulationDiverged: the observation is not finite.
+            RobotError: The action is not one of the environment's.
+            SimulationDiverged: The observation or the reward is not finite.
         """
         if self._repeats:
             self._actions.append(action)
-        observation, reward, terminated, truncated, info = self.env.step(
-            action_for(self.env.action_space, action, self.name)
-        )
+        taken = vector_to_action(self.env.action_space, action, self.name)
+        observation, reward, terminated, truncated, info = self.env.step(taken)
         self.reward, self.info = float(reward), info
         self._see(observation)
         self._check_finite()
-        details = {**info, "cost": number_of(info.get("cost", 0.0)) or 0.0}
+        details = {**info, "cost": to_number(info.get("cost", 0.0)) or 0.0}
         details["finished"] = bool(info.get("finished", info.get("is_success", False)))
         if terminated or truncated:
-            details["reason"] = str(info.get("reason", _ENDED))
+            details["reason"] = str(info.get("reason", "the environment ended the episode"))
         return self.observe(), self.reward, bool(terminated), bool(truncated), details
 
     def snapshot(self) -> RobotState:
@@ -172,24 +168,23 @@ class GymnasiumRobot(Robot):
         mark = np.array([digest, self._seed, start], np.int64).view(np.float64)
         if self._repeats:
             return RobotState(self.name, self._actions.so_far(), (mark,), self.np_random.bit_generator.state)
-        memory = {
-            "environment": remember(self.env),
-            "robot": {"reward": self.reward, "info": numbers_of(self.info), "seen": self._observation.copy()},
-        }
+        mine = {"reward": self.reward, "info": numeric_entries(self.info), "seen": self._observation.copy()}
+        memory = {"environment": copy_python_state(self.env), "robot": mine}
         state, extras = self._simulator_state()
         return RobotState(self.name, state, (mark, *extras), self.np_random.bit_generator.state, memory)
 
     def restore(self, snapshot: RobotState) -> None:
-        if snapshot.robot != self.name:
-            raise RobotError(f"{self.name}: expected a snapshot of {self.name}, got one of {snapshot.robot}")
-        self._settle()
+        self._check_snapshot(snapshot)
+        self._choose_snapshots()
         digest, self._seed, start = (int(value) for value in snapshot.extras[0].view(np.int64))
         self._start = self.starts[start - 1] if start else ""
         if snapshot.memory is None:
-            self._repeat(snapshot.state.astype(np.float32))
+            self.reset(seed=self._seed, options={"start": self._start} if self._start else None)
+            for action in snapshot.state.astype(np.float32):
+                self.step(action)
         else:
             self._set_simulator_state(snapshot.state, snapshot.extras[1:])
-            recall(self.env, snapshot.memory["environment"])
+            restore_python_state(self.env, snapshot.memory["environment"])
             mine = snapshot.memory["robot"]
             self.reward, self.info, self._observation = mine["reward"], mine["info"], mine["seen"].copy()
         self.np_random.bit_generator.state = snapshot.rng
@@ -201,16 +196,16 @@ class GymnasiumRobot(Robot):
 
     def digest(self) -> int:
         if self._repeats:
-            return digest_of(self._seed, len(self._actions), self._observation, self.reward)
-        memory = [sorted(plain_of(layer).items()) for layer in layers_of(self.env)]
-        return digest_of(memory, self._observation, self.reward)
+            return digest_values(self._seed, len(self._actions), self._observation, self.reward)
+        memory = [sorted(plain_attributes(layer).items()) for layer in wrapper_layers(self.env)]
+        return digest_values(memory, self._observation, self.reward)
 
     def _restored_apart(self) -> tuple[type, ...]:
-        """Types of attributes whose state `_simulator_state` has, or that have none."""
+        """Return types of attributes that have no state, or whose state `_simulator_state` returns."""
         return ()
 
     def _simulator_state(self) -> tuple[Floats, tuple[Floats, ...]]:
-        """What a snapshot needs beside the Python side."""
+        """Return the part of a snapshot that is not Python data."""
         return np.empty(0), ()
 
     def _set_simulator_state(self, state: Floats, extras: tuple[Floats, ...]) -> None:
@@ -225,46 +220,38 @@ class GymnasiumRobot(Robot):
     def _see(self, observation: Any) -> None:
         if self._flattened:
             observation = spaces.flatten(self.env.observation_space, observation)
-        # A copy: some environments fill the same array again.
+        # Some environments reuse the same array, so copy it.
         self._observation = np.array(observation)
 
-    def _renew(self) -> None:
-        """A new world: one that is used again may not repeat itself (Box2D's does not)."""
-        self.env.close()
-        self.env = self.make_world()
-
-    def _repeat(self, actions: NDArray[np.float32]) -> None:
-        self.reset(seed=self._seed, options={"start": self._start} if self._start else None)
-        for action in actions:
-            self.step(action)
-
-    def _settle(self) -> None:
+    def _choose_snapshots(self) -> None:
         """Find out, once, how snapshots of this environment are made."""
         if self._repeats is None:
             self._repeats = False
             handled = self._restored_apart()
-            self._repeats = bool(unknown_parts(self.env, handled)) or not self._copies_restore()
+            self._repeats = bool(find_uncopyable_attributes(self.env, handled)) or not self._copies_restore()
 
     def _copies_restore(self) -> bool:
-        """Whether a restored copy goes on exactly like the original, for a few random actions."""
+        """Return whether a restored copy goes on exactly like the original, for a few random actions."""
         try:
-            self.env.action_space.seed(0)
-            actions = [as_vector(self.env.action_space, self.env.action_space.sample()) for _ in range(24)]
+            space = self.env.action_space
+            space.seed(0)
+            actions = [action_to_vector(space, space.sample()) for _ in range(_TRIAL_STEPS)]
+            before, after = actions[:_STEPS_BEFORE_COPY], actions[_STEPS_BEFORE_COPY:]
             self.reset(seed=0)
-            if self._follow(actions[:4])[1]:
+            if self._digest_steps(before)[1]:
                 self.reset(seed=0)
-            snapshot, first = self.snapshot(), self._follow(actions[4:])
+            snapshot, first = self.snapshot(), self._digest_steps(after)
             self.restore(snapshot)
-            return self._follow(actions[4:]) == first
+            return self._digest_steps(after) == first
         except Exception:  # whatever an environment raises that cannot be copied
             return False
 
-    def _follow(self, actions: list[NDArray[np.float32]]) -> tuple[list[int], bool]:
-        """A digest of each step, up to the end of the episode, and whether it ended."""
+    def _digest_steps(self, actions: list[NDArray[np.float32]]) -> tuple[list[int], bool]:
+        """Return a digest of each step, up to the end of the episode, and whether it ended."""
         digests = []
         for action in actions:
             _, _, terminated, truncated, _ = self.step(action)
-            digests.append(digest_of(self._observation, self.reward, terminated, truncated))
+            digests.append(digest_values(self._observation, self.reward, terminated, truncated))
             if terminated or truncated:
                 return digests, True
         return digests, False

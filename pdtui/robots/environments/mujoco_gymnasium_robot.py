@@ -1,4 +1,4 @@
-"""Any Gymnasium environment on MuJoCo: attributes, links, poses and snapshots come from its model."""
+"""Any Gymnasium environment on MuJoCo: its model gives attributes, links, poses and snapshots."""
 
 from __future__ import annotations
 
@@ -10,23 +10,22 @@ import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
-from pdtui.robots.simulators.mujoco_attributes import model_attributes
+from pdtui.robots.robot import ResetResult
+from pdtui.robots.simulators.mujoco_attributes import find_model_attributes
 from pdtui.robots.simulators.mujoco_robot import (
     body_poses,
     check_finite,
     digest_state,
-    ignored_warnings,
-    model_links,
-    set_state,
+    read_model_links,
+    read_state,
     silence_warnings,
-    state_of,
+    suppress_warnings,
+    write_state,
 )
-
-REWARD = Attribute("reward", "")
 
 
 def is_mujoco(env: gymnasium.Env[Any, Any]) -> bool:
-    """Whether an environment shows its MuJoCo model and data, as Gymnasium's `MujocoEnv` does."""
+    """Return whether an environment exposes its MuJoCo model and data, as Gymnasium's `MujocoEnv` does."""
     world: Any = env.unwrapped
     return isinstance(getattr(world, "model", None), mujoco.MjModel) and isinstance(
         getattr(world, "data", None), mujoco.MjData
@@ -34,48 +33,45 @@ def is_mujoco(env: gymnasium.Env[Any, Any]) -> bool:
 
 
 class MujocoGymnasiumRobot(GymnasiumRobot):
-    """An environment whose ``unwrapped`` has ``model`` and ``data`` of MuJoCo.
+    """An environment whose ``unwrapped`` has a ``model`` and ``data`` of MuJoCo.
 
     The last attribute is the environment's reward. A snapshot holds what the next physics step reads, the
-    quantities that MuJoCo derived in the last one (observations and rewards read them as they are, a physics
-    step old), and the Python side. Contacts are computed anew by a restore.
+    quantities that MuJoCo derived in the last one (observations and rewards read them one physics step old),
+    and the Python state. Restoring computes the contacts anew.
     """
 
     def __init__(self, name: str, title: str = "", environment: str = "") -> None:
         super().__init__(name, title, environment)
         model = self.world.model
-        self._measured = model_attributes(model)
-        self.attributes = (*(one.attribute for one in self._measured), REWARD)
-        self.links = model_links(model)
+        self._measured = find_model_attributes(model)
+        self.attributes = (*(one.attribute for one in self._measured), Attribute("reward", ""))
+        self.links = read_model_links(model)
         fresh = mujoco.MjData(model)
         self._derived = tuple(name for name in dir(fresh) if _is_derived(getattr(fresh, name)))
         self._posed = fresh
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Floats, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> ResetResult:
         first = super().reset(seed=seed, options=options)
         silence_warnings(self.world.data)
         return first
 
     def make_world(self) -> gymnasium.Env[Any, Any]:
-        with ignored_warnings():  # advice to the model's author
+        with suppress_warnings():  # they are advice to the model's author
             return super().make_world()
 
     @property
     def control_dt(self) -> float:
-        world: Any = self.world
-        dt = getattr(world, "dt", None)
+        dt = getattr(self.world, "dt", None)
         if isinstance(dt, float):
             return dt
-        return float(world.model.opt.timestep) * int(getattr(world, "frame_skip", 1))
+        return float(self.world.model.opt.timestep) * int(getattr(self.world, "frame_skip", 1))
 
     def read_attributes(self) -> Floats:
         data = self.world.data
         return np.array([*(one.read(data) for one in self._measured), self.reward], np.float64)
 
     def read_poses(self) -> Floats:
-        # On other data: environments take velocities from poses a physics step old, which must stay so.
+        # Environments derive velocities from poses that are one physics step old, so compute in other data.
         world, posed = self.world, self._posed
         posed.qpos[:], posed.mocap_pos[:] = world.data.qpos, world.data.mocap_pos
         posed.mocap_quat[:] = world.data.mocap_quat
@@ -85,19 +81,21 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
     def digest(self) -> int:
         if self._repeats:
             return super().digest()
-        return digest_state(state_of(self.world.model, self.world.data))
+        return digest_state(read_state(self.world.model, self.world.data))
 
     def _restored_apart(self) -> tuple[type, ...]:
-        return (mujoco.MjModel, mujoco.MjData, _renderer_type())
+        from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
+
+        return (mujoco.MjModel, mujoco.MjData, MujocoRenderer)
 
     def _simulator_state(self) -> tuple[Floats, tuple[Floats, ...]]:
         data = self.world.data
         derived = np.concatenate([getattr(data, name).ravel() for name in self._derived])
-        return state_of(self.world.model, data), (derived,)
+        return read_state(self.world.model, data), (derived,)
 
     def _set_simulator_state(self, state: Floats, extras: tuple[Floats, ...]) -> None:
         data = self.world.data
-        set_state(self.world.model, data, state, self.name)
+        write_state(self.world.model, data, state, self.name)
         done = 0
         for name in self._derived:
             values = getattr(data, name)
@@ -110,11 +108,5 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
 
 
 def _is_derived(values: object) -> bool:
-    """Whether a field of fresh data has a fixed count of numbers; those of contacts have none."""
+    """Return whether a field of new data holds numbers of a fixed count; fields of contacts do not."""
     return isinstance(values, np.ndarray) and values.dtype == np.float64 and values.size > 0
-
-
-def _renderer_type() -> type:
-    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
-
-    return MujocoRenderer

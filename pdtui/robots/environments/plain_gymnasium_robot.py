@@ -6,39 +6,37 @@ import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
-from pdtui.robots.environments.space_conversion import as_vector, numbers_of
+from pdtui.robots.environments.gymnasium_spaces import action_to_vector, numeric_entries
 
-_MOST_OBSERVED = 1000
+_MAX_OBSERVED = 1000
 
 
 class PlainGymnasiumRobot(GymnasiumRobot):
     """An environment whose attributes are ``obs 0``, ``obs 1``, …, then ``reward``, then numbers of its info.
 
-    An observation that is no vector (an image), or one of more than 1000 numbers, gives no attributes: its
-    pixels are no quantities that one would steer. Units are not known, so they are empty; scales are 1, as
-    the policy observes these very numbers. Numbers of the info are those that a reset and the first step
-    report; where a later step leaves one out it is NaN. There are no poses and no links.
+    An observation that is not a vector (an image), or one of more than 1000 numbers, gives no attributes,
+    since nobody would steer a pixel. Units are unknown and therefore empty; scales are 1, because the policy
+    observes these very numbers. Numbers of the info are those that a reset and the first step report, and NaN
+    at a step that leaves them out. There are no poses and no links.
     """
 
     def __init__(self, name: str, title: str = "", environment: str = "") -> None:
         super().__init__(name, title, environment)
         shape: tuple[int, ...] = self.observation_space.shape or ()
-        observed = shape[0] if len(shape) == 1 and shape[0] <= _MOST_OBSERVED else 0
-        self._observed = observed
+        self._observed = shape[0] if len(shape) == 1 and shape[0] <= _MAX_OBSERVED else 0
         self._reported = self._find_reported()
-        names = (*(f"obs {index}" for index in range(observed)), "reward", *self._reported)
+        names = (*(f"obs {index}" for index in range(self._observed)), "reward", *self._reported)
         self.attributes = tuple(Attribute(name, "") for name in names)
 
     def read_attributes(self) -> Floats:
-        numbers = numbers_of(self.info)
+        numbers = numeric_entries(self.info)
         reported = [numbers.get(name, float("nan")) for name in self._reported]
         observed = self._observation[: self._observed] if self._observed else ()
         return np.array([*observed, self.reward, *reported], np.float64)
 
     def _find_reported(self) -> tuple[str, ...]:
         self.reset(seed=0)
-        names = set(numbers_of(self.info))
+        names = set(numeric_entries(self.info))
         self.env.action_space.seed(0)
-        self.step(as_vector(self.env.action_space, self.env.action_space.sample()))
-        names |= set(numbers_of(self.info))
-        return tuple(sorted(names - {"reward"}))
+        self.step(action_to_vector(self.env.action_space, self.env.action_space.sample()))
+        return tuple(sorted((names | set(numeric_entries(self.info))) - {"reward"}))

@@ -1,4 +1,4 @@
-"""Uneven ground and trees, drawn from a random generator; no simulator."""
+"""Uneven ground and trees, drawn from a random generator, without a simulator."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from pdtui.core.attributes import Floats
 
 CELL = 0.25
-"""Distance between two heights, m."""
+"""Distance between neighboring heights, m."""
 AHEAD = 60.0
-"""How far rough ground and forest reach along x, m."""
-_BEHIND, _BESIDE = 4.0, 10.0
-_CLEARING = 0.75
-_TRUNKS = (0.15, 0.35)
-_GAP = 0.9
-_FIRST_TREE = 2.5
-_TRIES = 30
+"""Extent of rough ground and forest ahead of the start, m."""
+_BEHIND, _BESIDE = 4.0, 10.0  # extent of rough ground behind the start and to each side, m
+_CLEARING = 0.75  # radius of level ground around the start, m
+_TRUNK_RADII = (0.15, 0.35)  # m
+_MIN_GAP = 0.9  # between two trunks, m: wide enough for the robot
+_FIRST_TREE = 2.5  # distance of the first tree from the start, m
+_TRIES_PER_TREE = 30
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class RoughGround:
     """Heights on a grid around the start, at (0, 0); the grid's edges are level with the plane around it.
 
     Attributes:
-        heights: m, shape (X, Y), `CELL` apart.
+        heights: Heights, m, shape (X, Y), `CELL` apart.
         corner: x and y of the first height, m.
     """
 
@@ -33,7 +33,7 @@ class RoughGround:
     corner: tuple[float, float]
 
     def height(self, x: float, y: float) -> float:
-        """Of the ground at a place, between the heights around it; 0 outside the grid, m."""
+        """Return the height at a point, m: interpolated within the grid, 0 outside."""
         column, row = (x - self.corner[0]) / CELL, (y - self.corner[1]) / CELL
         i, j = int(np.floor(column)), int(np.floor(row))
         if not (0 <= i < self.heights.shape[0] - 1 and 0 <= j < self.heights.shape[1] - 1):
@@ -43,8 +43,8 @@ class RoughGround:
         return float((1 - u) * ((1 - v) * a + v * b) + u * ((1 - v) * c + v * d))
 
 
-def rough_ground(rng: np.random.Generator, roughness: float) -> RoughGround:
-    """Heights uniform between 0 and `roughness` m, on 64 × 20 m; level where the robot starts."""
+def draw_rough_ground(rng: np.random.Generator, roughness: float) -> RoughGround:
+    """Draw heights uniformly from 0 to `roughness` m, on 64 × 20 m; level where the robot starts."""
     x = np.arange(-_BEHIND, AHEAD + CELL / 2, CELL)
     y = np.arange(-_BESIDE, _BESIDE + CELL / 2, CELL)
     heights = rng.uniform(0.0, roughness, (len(x), len(y)))
@@ -54,22 +54,22 @@ def rough_ground(rng: np.random.Generator, roughness: float) -> RoughGround:
 
 
 def scatter_trees(rng: np.random.Generator, density: float) -> Floats:
-    """Trees on the rough ground from 2.5 m ahead of the start on, with at least 0.9 m between any two.
+    """Draw trees on the rough ground from 2.5 m ahead of the start on, at least 0.9 m apart.
 
     Args:
-        rng: draws them.
-        density: trees a square metre, as far as there is room.
+        rng: The random generator.
+        density: Trees per square metre, as far as there is room.
 
     Returns:
         x, y and radius of each, m, shape (N, 3), sorted by x.
     """
     low, high = np.array([_FIRST_TREE, -_BESIDE + 1.0]), np.array([AHEAD - 1.0, _BESIDE - 1.0])
-    wanted = round(density * float(np.prod(high - low)))
+    count = round(density * float(np.prod(high - low)))
     trees = np.empty((0, 3))
-    for _ in range(_TRIES * wanted):
-        if len(trees) == wanted:
+    for _ in range(_TRIES_PER_TREE * count):
+        if len(trees) == count:
             break
-        place, radius = rng.uniform(low, high), rng.uniform(*_TRUNKS)
-        if (np.hypot(*(trees[:, :2] - place).T) - trees[:, 2] - radius >= _GAP).all():
+        place, radius = rng.uniform(low, high), rng.uniform(*_TRUNK_RADII)
+        if (np.hypot(*(trees[:, :2] - place).T) - trees[:, 2] - radius >= _MIN_GAP).all():
             trees = np.vstack([trees, [*place, radius]])
     return trees[np.argsort(trees[:, 0])]

@@ -1,4 +1,4 @@
-"""What PyBullet robots share: a world of their own, built anew at every reset, and snapshots of it."""
+"""What PyBullet robots share: a world that every reset builds anew, snapshots of it, and its scenery."""
 
 from __future__ import annotations
 
@@ -19,15 +19,16 @@ from pdtui.core.errors import RobotError
 from pdtui.core.robot_data import RobotState
 from pdtui.robots.legged.terrain import CELL, RoughGround
 from pdtui.robots.robot import Robot
-from pdtui.robots.simulators.python_state import digest_of
+from pdtui.robots.simulators.python_state import digest_values
 
-_TREE_HEIGHT = 1.2
-_BELOW = 0.02
+_TREE_HEIGHT = 1.2  # m
+# Depth of the plane around rough ground and of the trees' roots, m.
+_DEPTH = 0.02
 
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Keep what a library writes in C, past Python's streams, off the screen."""
+    """Keep off the screen what a C library writes past Python's streams."""
     flush = ctypes.CDLL(None).fflush
     flush(None)
     kept, nowhere = [os.dup(1), os.dup(2)], os.open(os.devnull, os.O_WRONLY)
@@ -43,22 +44,8 @@ def _silence() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _new_client() -> Any:
-    try:
-        with _silence():  # it prints when it was built, and its arguments
-            from pybullet_utils.bullet_client import BulletClient
-
-            return BulletClient()
-    except ImportError as error:
-        running = f"{sys.version_info.major}.{sys.version_info.minor}"
-        raise RobotError(
-            f"this robot needs PyBullet, which is not installed in this Python {running} ({error}); it has "
-            "wheels for Python 3.11 and older: install pdtui there, or build it with 'pip install pybullet'"
-        ) from error
-
-
 def data_folder() -> Path:
-    """Where the models of ``pybullet_data`` are."""
+    """Return the folder of the models of ``pybullet_data``."""
     import pybullet_data
 
     return Path(pybullet_data.getDataPath())
@@ -67,40 +54,43 @@ def data_folder() -> Path:
 class BulletRobot(Robot):
     """A robot in a PyBullet world without a screen.
 
-    A world that is used again does not repeat itself, so that every reset builds it from nothing: it is a
-    function of the world's seed and of the start. A snapshot is the file that PyBullet saves. It restores bit
-    for bit into a world that was built alike, as long as the order of contacts is not left to chance. Ground
-    of heights is saved only where it is a rigid body (PyBullet's ``useMaximalCoordinates``), so it is one.
+    A used world does not repeat itself, so every reset builds it from nothing, as a function of the world's
+    seed and the start. A snapshot is the file that PyBullet saves. It restores bit for bit into a world that
+    was built in the same way, as long as the order of contacts is fixed. PyBullet saves a height field only
+    if it is a rigid body (``useMaximalCoordinates``), so it is one.
 
     Raises:
         RobotError: PyBullet is not installed.
     """
 
     def __init__(self) -> None:
-        self.bullet = _new_client()
+        try:
+            with _silence():  # PyBullet prints its build time and arguments
+                from pybullet_utils.bullet_client import BulletClient
+
+                self.bullet: Any = BulletClient()
+        except ImportError as error:
+            running = f"{sys.version_info.major}.{sys.version_info.minor}"
+            raise RobotError(
+                f"this robot needs PyBullet, which is not installed in this Python {running} ({error}); it "
+                "has wheels for Python 3.11 and older: install pdtui there, or build PyBullet by "
+                "'pip install pybullet'"
+            ) from error
         self.robot_id = -1
         self._world: tuple[int, str] | None = None
 
     @abstractmethod
     def build_world(self, seed: int, start: str) -> int:
-        """Fill an empty world; returns the robot's number."""
-
-    @abstractmethod
-    def memory(self) -> tuple[Floats, ...]:
-        """What the Python side remembers."""
-
-    @abstractmethod
-    def recall(self, memory: tuple[Floats, ...]) -> None:
-        """Take back copies of what `memory` gave."""
+        """Fill an empty world and return the robot's body number."""
 
     @abstractmethod
     def simulator_numbers(self) -> tuple[Any, ...]:
-        """The simulator's positions and velocities, plain numbers."""
+        """Return the simulator's positions and velocities as plain numbers."""
 
-    def renew(self, seed: int, start: str) -> None:
+    def rebuild_world(self, seed: int, start: str) -> None:
         """Build the world of a seed and a start."""
         self.bullet.resetSimulation()
-        # Else the solver meets contacts in the order in which they came about, which no snapshot has.
+        # Otherwise the solver meets contacts in the order in which they arose, which no snapshot holds.
         self.bullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
         self.robot_id = self.build_world(seed, start)
         self._world = (seed, start)
@@ -115,29 +105,28 @@ class BulletRobot(Robot):
         seed, start = self._world
         mark = np.array([len(saved), seed, self.starts.index(start)], np.float64)
         state = np.frombuffer(saved + bytes(-len(saved) % 8)).copy()
-        extras = tuple(array.copy() for array in self.memory())
-        return RobotState(self.name, state, (mark, *extras), self.np_random.bit_generator.state)
+        extras = (mark, *self._copy_arrays())
+        return RobotState(self.name, state, extras, self.np_random.bit_generator.state)
 
     def restore(self, snapshot: RobotState) -> None:
-        if snapshot.robot != self.name:
-            raise RobotError(f"{self.name}: expected a snapshot of {self.name}, got one of {snapshot.robot}")
+        self._check_snapshot(snapshot)
         length, seed, start = (int(value) for value in snapshot.extras[0])
         if not 0 <= length <= snapshot.state.nbytes < length + 8:
             raise RobotError(f"{self.name}: expected a state of {length} bytes, got {snapshot.state.nbytes}")
         if self._world != (seed, self.starts[start]):
-            self.renew(seed, self.starts[start])
+            self.rebuild_world(seed, self.starts[start])
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "world.bullet"
             path.write_bytes(snapshot.state.tobytes()[:length])
-            # Contacts are restored only where the bodies touch already, which the first time brings about.
+            # Contacts are restored only where the bodies touch already, which the first call brings about.
             self.bullet.restoreState(fileName=str(path))
             self.bullet.performCollisionDetection()
             self.bullet.restoreState(fileName=str(path))
-        self.recall(tuple(array.copy() for array in snapshot.extras[1:]))
+        self._restore_arrays(snapshot.extras[1:])
         self.np_random.bit_generator.state = snapshot.rng
 
     def digest(self) -> int:
-        return digest_of(self._world, self.simulator_numbers(), list(self.memory()))
+        return digest_values(self._world, self.simulator_numbers(), list(self._copy_arrays()))
 
     def close(self) -> None:
         if self.bullet is not None:
@@ -146,16 +135,15 @@ class BulletRobot(Robot):
 
 
 def add_plane(bullet: Any, friction: dict[str, float], level: float = 0.0) -> None:
-    """An endless plane."""
-    plane = bullet.createMultiBody(
-        0, bullet.createCollisionShape(bullet.GEOM_PLANE), basePosition=[0, 0, level]
-    )
+    """Add an endless plane at a level, m."""
+    shape = bullet.createCollisionShape(bullet.GEOM_PLANE)
+    plane = bullet.createMultiBody(0, shape, basePosition=[0, 0, level])
     bullet.changeDynamics(plane, -1, **friction)
 
 
 def add_ground(bullet: Any, ground: RoughGround, friction: dict[str, float]) -> None:
-    """Uneven ground, and a plane around it."""
-    add_plane(bullet, friction, -_BELOW)
+    """Add uneven ground and a plane around it."""
+    add_plane(bullet, friction, -_DEPTH)
     rows, columns = ground.heights.shape
     shape = bullet.createCollisionShape(
         bullet.GEOM_HEIGHTFIELD,
@@ -172,10 +160,10 @@ def add_ground(bullet: Any, ground: RoughGround, friction: dict[str, float]) -> 
 
 
 def add_trees(bullet: Any, trees: Floats) -> list[int]:
-    """Upright cylinders; returns their numbers."""
+    """Add upright cylinders and return their body numbers."""
     bodies = []
     for x, y, radius in trees.tolist():
         shape = bullet.createCollisionShape(bullet.GEOM_CYLINDER, radius=radius, height=_TREE_HEIGHT)
-        place = [x, y, _TREE_HEIGHT / 2 - _BELOW]
+        place = [x, y, _TREE_HEIGHT / 2 - _DEPTH]
         bodies.append(bullet.createMultiBody(0, shape, basePosition=place, useMaximalCoordinates=True))
     return bodies

@@ -1,4 +1,4 @@
-"""What MuJoCo robots share: links from the model, poses, snapshots and digests from its data."""
+"""What MuJoCo robots share: links from the model; poses, snapshots and digests from its data."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from pdtui.robots.robot import Robot
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _SHAPES = {
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): ("capsule", 2),
-    # A cylinder's rim rounds off; what is no primitive is drawn as the box around it.
+    # A cylinder is drawn with round ends, and a shape that is no primitive as the box around it.
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): ("capsule", 2),
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", 1),
     int(mujoco.mjtGeom.mjGEOM_BOX): ("box", 3),
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): ("box", 3),
     int(mujoco.mjtGeom.mjGEOM_MESH): ("box", 3),
 }
+# MuJoCo prints and logs only the first warning of a kind: a count above 0 keeps it silent.
 _SILENT = 1_000_000
-"""Count that tells MuJoCo it warned before: it prints and logs only the first warning of a kind."""
-_DIVERGED = (
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
-)
+_DIVERGENCE_WARNINGS = {
+    "qpos": mujoco.mjtWarning.mjWARN_BADQPOS,
+    "qvel": mujoco.mjtWarning.mjWARN_BADQVEL,
+    "qacc": mujoco.mjtWarning.mjWARN_BADQACC,
+}
 
 
-def model_links(model: mujoco.MjModel) -> tuple[Link, ...]:
-    """The model's visible geoms that belong to a body, as primitive shapes."""
+def read_model_links(model: mujoco.MjModel) -> tuple[Link, ...]:
+    """Return the visible geoms of all bodies but the world, as primitive shapes."""
     links = []
     for index in range(model.ngeom):
         geom = model.geom(index)
@@ -47,43 +47,41 @@ def model_links(model: mujoco.MjModel) -> tuple[Link, ...]:
         size = model.geom_aabb[index, 3:] if kind == mujoco.mjtGeom.mjGEOM_MESH else geom.size
         links.append(
             Link(
-                name=geom.name or f"{model.body(body).name or f'body {body}'} {index}",
-                body=body - 1,
-                shape=cast(Any, shape),
-                size=tuple(float(value) for value in size[:sizes]),
-                position=cast(Any, tuple(float(value) for value in geom.pos)),
-                quaternion=cast(Any, tuple(float(value) for value in geom.quat)),
+                geom.name or f"{model.body(body).name or f'body {body}'} {index}",
+                body - 1,
+                cast(Any, shape),
+                *(tuple(values.tolist()) for values in (size[:sizes], geom.pos, geom.quat)),
             )
         )
     return tuple(links)
 
 
-def state_of(model: mujoco.MjModel, data: mujoco.MjData) -> Floats:
-    """All that the next physics step reads, shape (S,)."""
+def read_state(model: mujoco.MjModel, data: mujoco.MjData) -> Floats:
+    """Return everything that the next physics step reads, shape (S,)."""
     state = np.empty(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, state, _STATE)
     return state
 
 
-def set_state(model: mujoco.MjModel, data: mujoco.MjData, state: Floats, owner: str) -> None:
-    """Return to what `state_of` gave, bit-exactly.
+def write_state(model: mujoco.MjModel, data: mujoco.MjData, state: Floats, owner: str) -> None:
+    """Restore what `read_state` returned, bit-exactly.
 
     Raises:
-        RobotError: the state has another size; the message names `owner`.
+        RobotError: The state has another size; the message names `owner`.
     """
     size = mujoco.mj_stateSize(model, _STATE)
     if state.shape != (size,):
         raise RobotError(f"{owner}: expected a state of {size} numbers, got {state.size}")
     mujoco.mj_setState(model, data, state, _STATE)
     mujoco.mj_forward(model, data)
-    # mj_forward moves the solver's warm start, which the next step reads: put it back.
+    # mj_forward changes the solver's warm start, which the next step reads.
     mujoco.mj_setState(model, data, state, _STATE)
     silence_warnings(data)
 
 
 @contextmanager
-def ignored_warnings() -> Iterator[None]:
-    """Take MuJoCo's warnings away from the process's handler of them while the block runs."""
+def suppress_warnings() -> Iterator[None]:
+    """Drop MuJoCo's warnings while the block runs, instead of passing them to the process's handler."""
     handler = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda *_: None)
     try:
@@ -95,34 +93,33 @@ def ignored_warnings() -> Iterator[None]:
 def silence_warnings(data: mujoco.MjData) -> None:
     """Keep MuJoCo from printing warnings about this data until it is reset; `check_finite` reports them.
 
-    The handler of warnings is the process's, and stays as it is.
+    The process's handler of warnings stays as it is.
     """
     for index in range(len(data.warning)):
         data.warning[index].number = _SILENT
 
 
 def body_poses(data: mujoco.MjData) -> Floats:
-    """World poses of all bodies but the world, from up-to-date kinematics, shape (B, 7)."""
+    """Return the poses of all bodies but the world, from up-to-date kinematics, shape (B, 7)."""
     poses: Floats = np.concatenate((data.xpos[1:], data.xquat[1:]), axis=1)
     return poses
 
 
 def digest_state(state: Floats) -> int:
-    """A 63-bit digest of what `state_of` gave."""
+    """Return a 63-bit digest of what `read_state` returned."""
     return int.from_bytes(blake2b(state.data, digest_size=8).digest(), "little") >> 1
 
 
 def check_finite(data: mujoco.MjData, owner: str) -> None:
-    """Raise where MuJoCo met a number it could not integrate.
+    """Check that the simulation did not diverge.
 
-    MuJoCo resets a diverged state by itself, so only its counters of warnings remember what happened.
+    MuJoCo resets a diverged state by itself, so only its warning counters tell.
 
     Raises:
-        SimulationDiverged: the last steps were not finite; the message names `owner`.
+        SimulationDiverged: The last steps were not finite; the message names `owner`.
     """
-    for warning in _DIVERGED:
+    for quantity, warning in _DIVERGENCE_WARNINGS.items():
         if data.warning[int(warning)].number not in (0, _SILENT):
-            quantity = warning.name.removeprefix("mjWARN_BAD").lower()
             raise SimulationDiverged(
                 f"{owner}: the simulation diverged at {data.time:.2f} s "
                 f"({quantity} is not finite or too large)"
@@ -130,11 +127,11 @@ def check_finite(data: mujoco.MjData, owner: str) -> None:
 
 
 class GearedMotors:
-    """Motors that turn joints, commanded between −1 and 1: a command's torque is the motor's gear times it.
+    """Motors that turn joints: the torque is the gear times a command between −1 and 1.
 
     Attributes:
-        joints: names of the joints, in the order of the motors.
-        gears: largest torques, N m.
+        joints: Names of the joints, in the order of the motors.
+        gears: Largest torques, N m.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -143,52 +140,48 @@ class GearedMotors:
         self.gears = [float(motor.gear[0]) for motor in motors]
 
     def torques(self, data: mujoco.MjData) -> list[float]:
-        """Of the present commands, N m."""
-        return [
-            gear * min(1.0, max(-1.0, command))
-            for gear, command in zip(self.gears, data.ctrl.tolist(), strict=True)
-        ]
+        """Return the torques of the current commands, N m."""
+        commands = (min(1.0, max(-1.0, command)) for command in data.ctrl.tolist())
+        return [gear * command for gear, command in zip(self.gears, commands, strict=True)]
 
 
 class MujocoRobot(Robot):
-    """A robot whose simulator is a pair of `MjModel` and `MjData`."""
+    """A robot whose simulator is a pair of `MjModel` and `MjData`.
+
+    Attributes:
+        frame_skip: Physics steps per control step.
+    """
 
     model: mujoco.MjModel
     data: mujoco.MjData
+    frame_skip: int
+
+    @property
+    def control_dt(self) -> float:
+        return float(self.model.opt.timestep) * self.frame_skip
 
     def read_poses(self) -> Floats:
-        # After a step MuJoCo's poses are those of the state before its last substep.
+        # After a step, MuJoCo's poses are those of the state before the last physics step.
         mujoco.mj_kinematics(self.model, self.data)
         return body_poses(self.data)
 
     def snapshot(self) -> RobotState:
-        state = state_of(self.model, self.data)
-        return RobotState(self.name, state, self._extras(), self.np_random.bit_generator.state)
+        state = read_state(self.model, self.data)
+        return RobotState(self.name, state, self._copy_arrays(), self.np_random.bit_generator.state)
 
     def restore(self, snapshot: RobotState) -> None:
-        if snapshot.robot != self.name:
-            raise RobotError(f"{self.name}: expected a snapshot of {self.name}, got one of {snapshot.robot}")
-        set_state(self.model, self.data, snapshot.state, self.name)
-        self._set_extras(snapshot.extras)
+        self._check_snapshot(snapshot)
+        write_state(self.model, self.data, snapshot.state, self.name)
+        self._restore_arrays(snapshot.extras)
         self.np_random.bit_generator.state = snapshot.rng
 
     def digest(self) -> int:
-        return digest_state(self._state())
-
-    def _state(self) -> Floats:
-        """The state vector, in an array that the next call overwrites."""
         mujoco.mj_getState(self.model, self.data, self._state_buffer, _STATE)
-        return self._state_buffer
+        return digest_state(self._state_buffer)
 
     @cached_property
     def _state_buffer(self) -> Floats:
         return np.empty(mujoco.mj_stateSize(self.model, _STATE))
-
-    def _extras(self) -> tuple[Floats, ...]:
-        return ()
-
-    def _set_extras(self, extras: tuple[Floats, ...]) -> None:
-        del extras
 
     def _check_finite(self) -> None:
         check_finite(self.data, self.name)

@@ -1,8 +1,8 @@
-"""What Python objects remember, as plain data: copied, put back, and digested.
+"""The state that Python objects hold, as plain data: copied, restored and digested.
 
 Plain are numbers, text, arrays, random generators, containers of those, and objects of importable classes
-whose attributes are plain. Handles of libraries (a Box2D body, a window) are not: a copy of one is
-no copy of its state.
+whose attributes are plain. Handles of libraries (a Box2D body, a window) are not: copying one does not copy
+its state.
 """
 
 from __future__ import annotations
@@ -13,35 +13,32 @@ import sys
 import types
 from collections import deque
 from hashlib import blake2b
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium
 import numpy as np
 
-Memory = dict[str, dict[str, Any]]
+PythonState = dict[str, dict[str, Any]]
 """Attributes by name, for each layer of an environment by its number, the outermost first."""
 
 _ATOMS = (type(None), bool, int, float, complex, str, bytes, enum.Enum, np.generic)
 _SEQUENCES = (list, tuple, set, frozenset, deque)
 _FIXED = (type, types.FunctionType, types.BuiltinFunctionType, types.MethodType, types.ModuleType)
-_OWN_COPYING = ("__reduce__", "__reduce_ex__", "__getstate__", "__deepcopy__", "__slots__")
+_OWN_COPYING = {"__reduce__", "__reduce_ex__", "__getstate__", "__deepcopy__", "__slots__"}
+_HEAP_TYPE = 1 << 9  # Py_TPFLAGS_HEAPTYPE: made by a class statement, not by an extension module
 _FIXED_NAMES = {"env", "spec", "metadata", "observation_space", "action_space", "_cached_spec"}
 
 
-class _Hash(Protocol):
-    def update(self, data: bytes, /) -> None: ...
-
-
-def layers_of(env: gymnasium.Env[Any, Any]) -> list[Any]:
-    """The environment's wrappers from the outermost in, then the environment itself."""
+def wrapper_layers(env: gymnasium.Env[Any, Any]) -> list[Any]:
+    """Return the environment's wrappers, the outermost first, then the environment itself."""
     layers: list[Any] = [env]
     while isinstance(layers[-1], gymnasium.Wrapper):
         layers.append(layers[-1].env)
     return layers
 
 
-def is_plain(value: Any, seen: frozenset[int] = frozenset()) -> bool:
-    """Whether a copy of a value is a copy of everything that it remembers; a cycle is not."""
+def is_plain_data(value: Any, seen: frozenset[int] = frozenset()) -> bool:
+    """Return whether a copy of a value copies all of its state; that of a cycle does not."""
     if isinstance(value, _ATOMS) or type(value) is np.random.Generator:
         return True
     if isinstance(value, np.ndarray):
@@ -50,18 +47,18 @@ def is_plain(value: Any, seen: frozenset[int] = frozenset()) -> bool:
         return False
     seen |= {id(value)}
     if isinstance(value, _SEQUENCES):
-        return all(is_plain(item, seen) for item in value)
+        return all(is_plain_data(item, seen) for item in value)
     if isinstance(value, dict):
-        return all(is_plain(item, seen) for pair in value.items() for item in pair)
-    return _is_simple(type(value)) and is_plain(vars(value), seen)
+        return all(is_plain_data(item, seen) for pair in value.items() for item in pair)
+    return _is_simple(type(value)) and is_plain_data(vars(value), seen)
 
 
 def _is_simple(kind: type) -> bool:
-    """Whether objects of a class are their attributes and no more, and can travel to another process."""
+    """Return whether objects of a class consist of their attributes, and can travel to another process."""
     bases = kind.__mro__[:-1]
-    if issubclass(kind, gymnasium.Env | gymnasium.Space) or not all(_is_python(base) for base in bases):
+    if issubclass(kind, gymnasium.Env | gymnasium.Space):
         return False
-    if any(name in vars(base) for base in bases for name in _OWN_COPYING):
+    if any(not base.__flags__ & _HEAP_TYPE or vars(base).keys() & _OWN_COPYING for base in bases):
         return False
     found: Any = sys.modules.get(getattr(kind, "__module__", ""))
     for part in kind.__qualname__.split("."):
@@ -69,48 +66,42 @@ def _is_simple(kind: type) -> bool:
     return found is kind
 
 
-def _is_python(kind: type) -> bool:
-    """Whether a class was made by a class statement, not by an extension module."""
-    heap_type = 1 << 9  # Py_TPFLAGS_HEAPTYPE
-    return bool(kind.__flags__ & heap_type)
-
-
-def unknown_parts(env: gymnasium.Env[Any, Any], ignored: tuple[type, ...] = ()) -> list[str]:
-    """Names of attributes that are neither plain nor fixed: what is kept where no copy reaches."""
+def find_uncopyable_attributes(env: gymnasium.Env[Any, Any], ignored: tuple[type, ...] = ()) -> list[str]:
+    """Return the names of attributes that are neither plain nor fixed, so that copies miss their state."""
     return [
         f"{type(layer).__name__}.{name}"
-        for layer in layers_of(env)
+        for layer in wrapper_layers(env)
         for name, value in vars(layer).items()
-        if not _is_fixed(name, value) and not isinstance(value, ignored) and not is_plain(value)
+        if not _is_fixed(name, value) and not isinstance(value, ignored) and not is_plain_data(value)
     ]
 
 
-def remember(env: gymnasium.Env[Any, Any]) -> Memory:
-    """A copy of every plain attribute of an environment and its wrappers."""
-    # Copied together: what two attributes share, their copies share too.
-    return copy.deepcopy({str(number): plain_of(layer) for number, layer in enumerate(layers_of(env))})
+def copy_python_state(env: gymnasium.Env[Any, Any]) -> PythonState:
+    """Return a copy of every plain attribute of an environment and its wrappers."""
+    # Copied together, so that copies share what two attributes share.
+    layers = enumerate(wrapper_layers(env))
+    return copy.deepcopy({str(number): plain_attributes(layer) for number, layer in layers})
 
 
-def recall(env: gymnasium.Env[Any, Any], memory: Memory) -> None:
-    """Put remembered attributes back; plain ones that came since then go."""
-    # A copy of the copy, or the next step would change what the snapshot holds.
-    kept = copy.deepcopy(memory)
-    for number, layer in enumerate(layers_of(env)):
+def restore_python_state(env: gymnasium.Env[Any, Any], state: PythonState) -> None:
+    """Put copied attributes back, and delete plain ones that were added since."""
+    # Copy again, or the next step would change what the snapshot holds.
+    kept = copy.deepcopy(state)
+    for number, layer in enumerate(wrapper_layers(env)):
         mine = kept.get(str(number), {})
-        for name in plain_of(layer).keys() - mine.keys():
+        for name in plain_attributes(layer).keys() - mine.keys():
             delattr(layer, name)
         vars(layer).update(mine)
 
 
-def plain_of(layer: Any) -> dict[str, Any]:
-    """The plain attributes of one layer, by name."""
-    return {
-        name: value for name, value in vars(layer).items() if not _is_fixed(name, value) and is_plain(value)
-    }
+def plain_attributes(layer: Any) -> dict[str, Any]:
+    """Return the plain attributes of one layer by name."""
+    state = {name: value for name, value in vars(layer).items() if not _is_fixed(name, value)}
+    return {name: value for name, value in state.items() if is_plain_data(value)}
 
 
-def digest_of(*parts: Any) -> int:
-    """A 63-bit digest of plain values: equal values have equal digests."""
+def digest_values(*parts: Any) -> int:
+    """Return a 63-bit digest of plain values: equal values have equal digests."""
     hasher = blake2b(digest_size=8)
     for part in parts:
         _absorb(hasher, part)
@@ -118,7 +109,7 @@ def digest_of(*parts: Any) -> int:
 
 
 def _is_fixed(name: str, value: Any) -> bool:
-    """Whether an attribute is no state: part of the definition, or a view into a simulator's own memory."""
+    """Return whether an attribute is no state, but a definition or a view into a simulator's memory."""
     if isinstance(value, np.ndarray):
         while isinstance(value, np.ndarray) and value.base is not None:
             value = value.base
@@ -126,7 +117,7 @@ def _is_fixed(name: str, value: Any) -> bool:
     return name in _FIXED_NAMES or isinstance(value, (*_FIXED, gymnasium.Space))
 
 
-def _absorb(hasher: _Hash, value: Any) -> None:
+def _absorb(hasher: blake2b, value: Any) -> None:
     hasher.update(type(value).__name__.encode())
     if isinstance(value, np.ndarray):
         hasher.update(f"{value.dtype.str}{value.shape}".encode())
@@ -134,12 +125,12 @@ def _absorb(hasher: _Hash, value: Any) -> None:
     elif isinstance(value, np.generic):
         hasher.update(value.tobytes())
     elif isinstance(value, _ATOMS):
-        # repr tells floats apart to the last bit.
+        # repr distinguishes floats to the last bit.
         hasher.update(f"{value!r};".encode())
     elif isinstance(value, np.random.Generator):
         _absorb(hasher, value.bit_generator.state)
     elif isinstance(value, set | frozenset):
-        _absorb(hasher, sorted(digest_of(item) for item in value))
+        _absorb(hasher, sorted(digest_values(item) for item in value))
     elif isinstance(value, dict):
         _absorb(hasher, list(value.items()))
     elif isinstance(value, _SEQUENCES):

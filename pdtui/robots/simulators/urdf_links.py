@@ -1,11 +1,11 @@
-"""What a URDF file says of a robot's shapes."""
+"""A robot's shapes, read from a URDF file."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, cast
 from xml.etree import ElementTree
 
 import numpy as np
@@ -16,13 +16,14 @@ from pdtui.robots.geometry import multiply_quaternions
 
 
 def read_urdf_links(path: Path, bodies: Sequence[str]) -> tuple[Link, ...]:
-    """The collision shapes of a robot; links on fixed joints belong to the body that they are fixed to.
+    """Return the boxes, spheres and cylinders among the collision shapes of a robot.
 
-    A cylinder is drawn as a capsule of the same radius and length.
+    A link on a fixed joint belongs to the body that it is fixed to. A cylinder becomes a capsule of the same
+    radius and length.
 
     Args:
-        path: of the file; only boxes, spheres and cylinders in it are drawn.
-        bodies: names of the links that have a pose, in the order of the poses.
+        path: The file.
+        bodies: Names of the links that have a pose, in the order of the poses.
     """
     root = ElementTree.parse(path).getroot()
     fixed = {
@@ -41,18 +42,15 @@ def read_urdf_links(path: Path, bodies: Sequence[str]) -> tuple[Link, ...]:
         if carrier not in bodies:
             continue
         for shape in link.findall("collision"):
-            drawn = _primitive(cast(Any, shape.find("geometry"))[0])
-            if drawn is None:
-                continue
-            offset, turn = _origin(shape)
-            place, quaternion = (cast(Any, tuple(values.tolist())) for values in (position + offset, turn))
-            links.append(Link(name, bodies.index(carrier), *drawn, place, quaternion))
+            primitive = _read_primitive(cast(Any, shape.find("geometry"))[0])
+            if primitive is not None:
+                offset, turn = _origin(shape)
+                pose: Any = (tuple(values.tolist()) for values in (position + offset, turn))
+                links.append(Link(name, bodies.index(carrier), *primitive, *pose))
     return tuple(links)
 
 
-def _primitive(
-    geometry: ElementTree.Element,
-) -> tuple[Literal["box", "sphere", "capsule"], tuple[float, ...]] | None:
+def _read_primitive(geometry: ElementTree.Element) -> tuple[Any, tuple[float, ...]] | None:
     if geometry.tag == "box":
         return "box", tuple(float(side) / 2 for side in geometry.attrib["size"].split())
     if geometry.tag == "sphere":
@@ -64,7 +62,7 @@ def _primitive(
 
 
 def _origin(element: ElementTree.Element) -> tuple[Floats, Floats]:
-    """Place, and rotation as a quaternion, of an element's ``origin``."""
+    """Return the position of an element's ``origin``, and its rotation as a quaternion."""
     origin = element.find("origin")
     given = {} if origin is None else origin.attrib
     position = np.array([float(value) for value in given.get("xyz", "0 0 0").split()])

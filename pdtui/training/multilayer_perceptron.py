@@ -2,33 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 MlpParameters = list[dict[str, jax.Array]]
+"""One dictionary per layer: weight ``w``, shape (inputs, outputs), bias ``b`` and, for LayerNorm, ``scale``
+and ``shift``."""
 
 
 def init_mlp(key: jax.Array, widths: tuple[int, ...], layer_norm: bool) -> MlpParameters:
-    """Weights uniform in ±1/√inputs, biases zero."""
+    """Draw weights uniformly from ±1/√inputs; biases are zero."""
     layers = []
     for fan_in, fan_out in pairwise(widths):
         key, sub_key = jax.random.split(key)
         bound = 1.0 / np.sqrt(fan_in)
-        layer = {
-            "w": jax.random.uniform(sub_key, (fan_in, fan_out), minval=-bound, maxval=bound),
-            "b": jnp.zeros(fan_out),
-        }
+        weight = jax.random.uniform(sub_key, (fan_in, fan_out), minval=-bound, maxval=bound)
+        layer = {"w": weight, "b": jnp.zeros(fan_out)}
         if layer_norm:
             layer |= {"scale": jnp.ones(fan_out), "shift": jnp.zeros(fan_out)}
         layers.append(layer)
     return layers
 
 
-def tanh_mlp(params: MlpParameters, x: jax.Array) -> jax.Array:
-    """Hidden layers with tanh, the last one linear."""
+def tanh_mlp(params: MlpParameters, x: Any, tanh: Callable[[Any], Any] = jnp.tanh) -> Any:
+    """Apply the hidden layers with tanh and the last layer without.
+
+    On parameters in NumPy, give NumPy's tanh.
+    """
     for layer in params[:-1]:
-        x = jnp.tanh(x @ layer["w"] + layer["b"])
+        x = tanh(x @ layer["w"] + layer["b"])
     return x @ params[-1]["w"] + params[-1]["b"]

@@ -15,12 +15,12 @@ from pdtui.policies.weights.weights_file import load_network
 pytest.importorskip("jax", reason="the extra 'train' is not installed")
 
 from pdtui.policies.weights.policy_loading import load_policy
-from pdtui.training.ppo import PpoConfig
-from pdtui.training.ppo_run import PpoTrainingRun
-from pdtui.training.replay_buffer import ReplayBuffer
-from pdtui.training.sac import SacConfig, SacLearner, TransitionBatch, actor_forward
-from pdtui.training.sac_run import SacTrainingRun
-from pdtui.training.training_run import TrainingReport, TrainingRun
+from pdtui.training.policy_trainer import ActorScore, PolicyTrainer
+from pdtui.training.ppo_trainer import PpoTrainer
+from pdtui.training.robot_batch import TransitionBatch
+from pdtui.training.sac_learner import SacLearner, actor_forward
+from pdtui.training.sac_trainer import ReplayBuffer, SacTrainer
+from pdtui.training.training_config import PpoConfig, SacConfig
 
 SMALL_PPO = PpoConfig(
     total_steps=640,
@@ -55,15 +55,15 @@ def _compile_once(tmp_path_factory: pytest.TempPathFactory) -> None:
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
 
-def _make(folder: Path, config: SacConfig | PpoConfig) -> TrainingRun:
+def _make(folder: Path, config: SacConfig | PpoConfig) -> PolicyTrainer[PpoConfig] | PolicyTrainer[SacConfig]:
     if isinstance(config, PpoConfig):
-        return PpoTrainingRun("ant", 3, folder, config, "pdtui train ant --seed 3")
-    return SacTrainingRun("ant", 3, folder, config, "pdtui train ant --seed 3")
+        return PpoTrainer("ant", 3, folder, config, "pdtui train ant --seed 3")
+    return SacTrainer("ant", 3, folder, config, "pdtui train ant --seed 3")
 
 
 def _train(folder: Path, config: SacConfig | PpoConfig = SMALL, stop_at: int | None = None) -> Path:
-    def report(state: TrainingReport) -> None:
-        if stop_at is not None and state.score is not None and state.steps >= stop_at:
+    def report(steps: int, score: ActorScore | None, _: ActorScore | None) -> None:
+        if stop_at is not None and score is not None and steps >= stop_at:
             raise KeyboardInterrupt
 
     trainer = _make(folder, config)

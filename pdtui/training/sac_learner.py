@@ -1,12 +1,12 @@
-"""Soft Actor-Critic on a jitted JAX learner.
+"""The learner of Soft Actor-Critic, compiled by JAX.
 
-Haarnoja et al., "Soft Actor-Critic Algorithms and Applications" (2018), with what made the paper's robots
-walk on two cores: LayerNorm in the critics, the actor updated every second time, several updates in one call.
+It follows Haarnoja et al., "Soft Actor-Critic Algorithms and Applications" (2018). Three additions make the
+paper's robots walk on two cores: LayerNorm in the critics, an update of the actor at every second update of
+the critics, and several updates in one call.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -14,33 +14,13 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from pdtui.training.jax_mlp import MlpParameters, init_mlp, tanh_mlp
-
-
-@dataclass(frozen=True)
-class SacConfig:
-    """Hyper-parameters; `total_steps` counts control steps over all worlds."""
-
-    total_steps: int = 1_200_000
-    worlds: int = 16
-    chunk: int = 8
-    steps_per_update: int = 4
-    batch: int = 128
-    layers: tuple[int, ...] = (256, 256)
-    learning_rate: float = 3e-4
-    final_rate: float = 0.1
-    discount: float = 0.99
-    tau: float = 0.005
-    average_rate: float = 0.0005
-    random_steps: int = 10_000
-    capacity: int = 1_000_000
-    evaluate_every: int = 100_000
-    evaluate_episodes: int = 32
-    evaluate_steps: int = 1000
+from pdtui.training.multilayer_perceptron import MlpParameters, init_mlp, tanh_mlp
+from pdtui.training.robot_batch import TransitionBatch
+from pdtui.training.training_config import SacConfig
 
 
 class SacState(NamedTuple):
-    """All that learning changes; a tree of arrays."""
+    """Everything that learning changes, as a tree of arrays; `average` is the moving average of the actor."""
 
     actor: MlpParameters
     critics: MlpParameters
@@ -51,21 +31,10 @@ class SacState(NamedTuple):
     alpha_opt: Any
     key: jax.Array
     average: MlpParameters
-    """Moving average of the actor: it walks more steadily than any single actor, so it is what is kept."""
-
-
-class TransitionBatch(NamedTuple):
-    """Transitions, NumPy or JAX, float32; those to learn from have leading axes (pairs, 2, batch)."""
-
-    observation: Any
-    action: Any
-    reward: Any
-    discount: Any
-    following: Any
 
 
 def actor_forward(params: MlpParameters, observation: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Mean and log standard deviation before squashing, each (..., actions)."""
+    """Return mean and log standard deviation before squashing, each (..., actions)."""
     mean, log_std = jnp.split(tanh_mlp(params, observation), 2, axis=-1)
     return mean, jnp.clip(log_std, -5.0, 2.0)
 
@@ -85,7 +54,7 @@ _both_critics = jax.vmap(_critic_forward, in_axes=(0, None, None))
 
 
 def _sample(params: MlpParameters, observation: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """A squashed action and its log probability."""
+    """Draw a squashed action and return it with its log probability."""
     mean, log_std = actor_forward(params, observation)
     noise = jax.random.normal(key, mean.shape)
     raw = mean + jnp.exp(log_std) * noise
@@ -95,40 +64,34 @@ def _sample(params: MlpParameters, observation: jax.Array, key: jax.Array) -> tu
 
 
 class SacLearner:
-    """Builds the first state and the jitted update."""
+    """Makes the untrained state and the compiled `update`."""
 
     def __init__(self, config: SacConfig, observations: int, actions: int) -> None:
         self.config, self.observations, self.actions = config, observations, actions
-        updates = config.total_steps // config.steps_per_update
-        rate = optax.schedules.linear_schedule(
-            config.learning_rate, config.learning_rate * config.final_rate, updates
+        updates, first = config.total_steps // config.steps_per_update, config.learning_rate
+        self._critic_tx, self._actor_tx, self._alpha_tx = (
+            optax.adam(optax.schedules.linear_schedule(first, first * config.final_rate, count))
+            for count in (updates, max(updates // 2, 1), max(updates // 2, 1))
         )
-        half = optax.schedules.linear_schedule(
-            config.learning_rate, config.learning_rate * config.final_rate, max(updates // 2, 1)
-        )
-        self._critic_tx, self._actor_tx = optax.adam(rate), optax.adam(half)
-        self._alpha_tx = optax.adam(half)
         self.update = jax.jit(self._update)
 
     def init(self, seed: int) -> SacState:
-        """The untrained state."""
+        """Return the untrained state."""
         config = self.config
         key, actor_key, *critic_keys = jax.random.split(jax.random.PRNGKey(seed), 4)
         actor = init_mlp(actor_key, (self.observations, *config.layers, 2 * self.actions), False)
         widths = (self.observations + self.actions, *config.layers, 1)
         critics = jax.vmap(partial(init_mlp, widths=widths, layer_norm=True))(jnp.stack(critic_keys))
-        log_alpha = jnp.zeros(())
-        return SacState(
-            actor,
-            critics,
-            jax.tree.map(jnp.copy, critics),
-            log_alpha,
+        targets, average, log_alpha = (
+            *(jax.tree.map(jnp.copy, one) for one in (critics, actor)),
+            jnp.zeros(()),
+        )
+        optimisers = (
             self._actor_tx.init(actor),
             self._critic_tx.init(critics),
             self._alpha_tx.init(log_alpha),
-            key,
-            jax.tree.map(jnp.copy, actor),
         )
+        return SacState(actor, critics, targets, log_alpha, *optimisers, key, average)
 
     def _critic_step(self, state: SacState, batch: TransitionBatch) -> SacState:
         key, action_key = jax.random.split(state.key)
@@ -173,7 +136,7 @@ class SacLearner:
         )
 
     def _update(self, state: SacState, batches: TransitionBatch) -> SacState:
-        """Run `updates` critic updates and half as many actor updates; leading axes (pairs, 2, batch)."""
+        """Update the critics for each batch and the actor for each pair; leading axes (pairs, 2, batch)."""
 
         def pair(state: SacState, batch: TransitionBatch) -> tuple[SacState, None]:
             state = self._critic_step(state, TransitionBatch(*(leaf[0] for leaf in batch)))

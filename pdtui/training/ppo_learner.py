@@ -1,14 +1,13 @@
-"""Proximal Policy Optimisation on a jitted JAX learner.
+"""The learner of Proximal Policy Optimisation, compiled by JAX.
 
-Schulman et al., "Proximal Policy Optimization Algorithms" (2017): clipped surrogate, generalised
-advantages, and a learning rate that follows the divergence between updates. The policy is a Gaussian squashed
-by tanh, as in SAC, so that both end in the same network; since the squashing is the same before and after an
-update, ratios are those of the Gaussians.
+It follows Schulman et al., "Proximal Policy Optimization Algorithms" (2017): a clipped surrogate, generalised
+advantages, and a learning rate that adapts to the divergence between updates. The policy is a Gaussian
+squashed by tanh, as in SAC, so that both algorithms end in the same network. The squashing is the same before
+and after an update, so probability ratios are those of the Gaussians.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import jax
@@ -16,41 +15,22 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from pdtui.training.jax_mlp import MlpParameters, init_mlp, tanh_mlp
+from pdtui.training.multilayer_perceptron import MlpParameters, init_mlp, tanh_mlp
+from pdtui.training.training_config import PpoConfig
 
-
-@dataclass(frozen=True)
-class PpoConfig:
-    """Hyper-parameters; `total_steps` counts control steps over all worlds.
-
-    In the second half, the divergence aimed at falls linearly to `final_divergence` of itself. `processes`
-    puts the worlds into processes of their own, which simulators need that do not let go of Python.
-    """
-
-    total_steps: int = 2_000_000
-    worlds: int = 64
-    processes: bool = False
-    chunk: int = 32
-    epochs: int = 4
-    minibatch: int = 512
-    layers: tuple[int, ...] = (256, 256)
-    learning_rate: float = 3e-4
-    divergence: float = 0.012
-    final_divergence: float = 0.2
-    average_rate: float = 0.002
-    clip: float = 0.2
-    discount: float = 0.99
-    gae: float = 0.95
-    entropy: float = 0.001
-    log_std: float = -0.5
-    reward_scale: float = 0.02
-    evaluate_every: int = 200_000
-    evaluate_episodes: int = 32
-    evaluate_steps: int = 1000
+_EPSILON = 1e-8
+# Rows after which the running mean and variance stop slowing down, so that they follow the policy.
+_MAX_ROWS_SEEN = 2_000_000.0
+# Bounds of the learning rate and its factor per gradient step when the divergence is off by a factor of 2.
+_MIN_RATE, _MAX_RATE, _RATE_FACTOR = 1e-6, 2e-3, 1.05
+_MIN_LOG_STD, _MAX_LOG_STD = -3.0, 0.5
 
 
 class PpoState(NamedTuple):
-    """All that learning changes; a tree of arrays."""
+    """Everything that learning changes, as a tree of arrays.
+
+    `mean`, `variance` and `rows_seen` normalise observations; `average` is the moving average of the actor.
+    """
 
     actor: MlpParameters
     log_std: jax.Array
@@ -63,11 +43,10 @@ class PpoState(NamedTuple):
     rows_seen: jax.Array
     iterations: jax.Array
     average: MlpParameters
-    """Moving average of the actor: it walks more steadily than any single actor, so it is what is kept."""
 
 
 class PpoRollout(NamedTuple):
-    """What was collected, leading axes (steps, worlds); observations are raw, actions before tanh."""
+    """Collected steps, leading axes (steps, worlds); observations are raw, actions are before tanh."""
 
     observation: Any
     action: Any
@@ -83,12 +62,11 @@ class _Sample(NamedTuple):
     log_prob: jax.Array
     advantage: jax.Array
     value_goal: jax.Array
-    old_mean: jax.Array
 
 
 def normalise(state: PpoState, observation: jax.Array) -> jax.Array:
-    """Observations by the running mean and deviation."""
-    return (observation - state.mean) / jnp.sqrt(state.variance + 1e-8)
+    """Return observations normalised by the running mean and deviation."""
+    return (observation - state.mean) / jnp.sqrt(state.variance + _EPSILON)
 
 
 def _log_prob(mean: jax.Array, log_std: jax.Array, action: jax.Array) -> jax.Array:
@@ -96,7 +74,7 @@ def _log_prob(mean: jax.Array, log_std: jax.Array, action: jax.Array) -> jax.Arr
 
 
 class PpoLearner:
-    """Builds the first state and the jitted update."""
+    """Makes the untrained state and the compiled `update`."""
 
     def __init__(self, config: PpoConfig, observations: int, actions: int) -> None:
         self.config, self.observations, self.actions = config, observations, actions
@@ -104,44 +82,28 @@ class PpoLearner:
         self.update = jax.jit(self._update)
 
     def init(self, seed: int) -> PpoState:
-        """The untrained state."""
+        """Return the untrained state."""
         config = self.config
         key, actor_key, critic_key = jax.random.split(jax.random.PRNGKey(seed), 3)
         actor = init_mlp(actor_key, (self.observations, *config.layers, self.actions), False)
         actor[-1] = jax.tree.map(lambda leaf: 0.01 * leaf, actor[-1])
         critic = init_mlp(critic_key, (self.observations, *config.layers, 1), False)
         log_std = jnp.full(self.actions, config.log_std)
-        return PpoState(
-            actor,
-            log_std,
-            critic,
-            self._tx.init((actor, log_std, critic)),
-            jnp.asarray(config.learning_rate),
-            key,
-            jnp.zeros(self.observations),
-            jnp.ones(self.observations),
-            jnp.asarray(1e-4),
-            jnp.zeros(()),
-            jax.tree.map(jnp.copy, actor),
-        )
+        optimiser, rate = self._tx.init((actor, log_std, critic)), jnp.asarray(config.learning_rate)
+        mean, variance, rows_seen = jnp.zeros(self.observations), jnp.ones(self.observations), 1e-4
+        seen = (mean, variance, jnp.asarray(rows_seen), jnp.zeros(()), jax.tree.map(jnp.copy, actor))
+        return PpoState(actor, log_std, critic, optimiser, rate, key, *seen)
 
     def folded_actor(self, state: PpoState) -> MlpParameters:
-        """The actor on raw observations, with log standard deviations as constant outputs."""
-        deviation = jnp.sqrt(state.variance + 1e-8)
-        first = state.average[0]
-        weight = first["w"] / deviation[:, None]
-        head = state.average[-1]
-        return [
-            {"w": weight, "b": first["b"] - state.mean @ weight},
-            *state.average[1:-1],
-            {
-                "w": jnp.concatenate([head["w"], jnp.zeros_like(head["w"])], axis=1),
-                "b": jnp.concatenate([head["b"], state.log_std]),
-            },
-        ]
+        """Return the averaged actor on raw observations, with log deviations as constant outputs."""
+        first, *middle, last = state.average
+        weight = first["w"] / jnp.sqrt(state.variance + _EPSILON)[:, None]
+        head_weight = jnp.concatenate([last["w"], jnp.zeros_like(last["w"])], axis=1)
+        head = {"w": head_weight, "b": jnp.concatenate([last["b"], state.log_std])}
+        return [{"w": weight, "b": first["b"] - state.mean @ weight}, *middle, head]
 
     def _update(self, state: PpoState, rollout: PpoRollout) -> tuple[PpoState, jax.Array]:
-        """One iteration on a roll-out; also returns the mean divergence."""
+        """Learn from a roll-out once; also returns the mean divergence."""
         state = self._observe(state, rollout.observation.reshape(-1, self.observations))
         samples = self._samples(state, rollout)
         total = samples.advantage.shape[0]
@@ -159,7 +121,7 @@ class PpoLearner:
         return state._replace(iterations=state.iterations + 1), divergences.mean()
 
     def _observe(self, state: PpoState, rows: jax.Array) -> PpoState:
-        """Merge a batch into the running mean and variance (Chan et al. 1979)."""
+        """Merge a batch into the running mean and variance (Chan et al., 1979)."""
         mean, variance, count = rows.mean(0), rows.var(0), rows.shape[0]
         total = state.rows_seen + count
         delta = mean - state.mean
@@ -169,7 +131,7 @@ class PpoLearner:
         return state._replace(
             mean=state.mean + delta * count / total,
             variance=merged,
-            rows_seen=jnp.minimum(total, 2_000_000.0),
+            rows_seen=jnp.minimum(total, _MAX_ROWS_SEEN),
         )
 
     def _samples(self, state: PpoState, rollout: PpoRollout) -> _Sample:
@@ -189,18 +151,10 @@ class PpoLearner:
         )
         mean = tanh_mlp(state.actor, observation)
 
-        def flat(leaf: jax.Array) -> jax.Array:
-            return leaf.reshape(-1, *leaf.shape[2:])
-
-        scaled = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
-        return _Sample(
-            flat(observation),
-            flat(rollout.action),
-            flat(_log_prob(mean, state.log_std, rollout.action)),
-            flat(scaled),
-            flat(advantage + value),
-            flat(mean),
-        )
+        scaled = (advantage - advantage.mean()) / (advantage.std() + _EPSILON)
+        log_prob = _log_prob(mean, state.log_std, rollout.action)
+        parts = (observation, rollout.action, log_prob, scaled, advantage + value)
+        return _Sample(*(part.reshape(-1, *part.shape[2:]) for part in parts))
 
     def _step(self, state: PpoState, batch: _Sample) -> tuple[PpoState, jax.Array]:
         config = self.config
@@ -225,27 +179,25 @@ class PpoLearner:
         share = state.iterations * config.worlds * config.chunk / config.total_steps
         late = jnp.clip(2.0 * share - 1.0, 0.0, 1.0)
         aim = config.divergence * (1.0 - (1.0 - config.final_divergence) * late)
-        rate = jnp.where(divergence > 2.0 * aim, state.rate / 1.05, state.rate)
-        rate = jnp.where(divergence < 0.5 * aim, rate * 1.05, rate)
+        rate = jnp.where(divergence > 2.0 * aim, state.rate / _RATE_FACTOR, state.rate)
+        rate = jnp.where(divergence < 0.5 * aim, rate * _RATE_FACTOR, rate)
         average = jax.tree.map(lambda old, new: old + config.average_rate * (new - old), state.average, actor)
         return (
             state._replace(
                 actor=actor,
-                log_std=jnp.clip(log_std, -3.0, 0.5),
+                log_std=jnp.clip(log_std, _MIN_LOG_STD, _MAX_LOG_STD),
                 critic=critic,
                 optimiser=optimiser,
-                rate=jnp.clip(rate, 1e-6, 2e-3),
+                rate=jnp.clip(rate, _MIN_RATE, _MAX_RATE),
                 average=average,
             ),
             divergence,
         )
 
 
-def act(state: PpoState, observation: Any, rng: np.random.Generator) -> Any:
-    """Sampled actions before tanh, in NumPy."""
-    x = (observation - np.asarray(state.mean)) / np.sqrt(np.asarray(state.variance) + 1e-8)
-    for layer in state.actor[:-1]:
-        x = np.tanh(x @ np.asarray(layer["w"]) + np.asarray(layer["b"]))
-    mean = x @ np.asarray(state.actor[-1]["w"]) + np.asarray(state.actor[-1]["b"])
+def sample_actions(state: PpoState, observation: Any, rng: np.random.Generator) -> Any:
+    """Draw actions before tanh, in NumPy."""
+    x = (observation - np.asarray(state.mean)) / np.sqrt(np.asarray(state.variance) + _EPSILON)
+    mean = tanh_mlp(jax.tree.map(np.asarray, state.actor), x, np.tanh)
     noise = rng.standard_normal(mean.shape, np.float32)
     return (mean + np.exp(np.asarray(state.log_std)) * noise).astype(np.float32)

@@ -12,12 +12,11 @@ from pdtui.robots import make_robot
 
 pytest.importorskip("jax", reason="the extra 'train' is not installed")
 
-from pdtui.training.remote_worlds import RemoteWorldBatch
-from pdtui.training.world_batch import WorldBatch
+from pdtui.training.robot_batch import RemoteRobotBatch, RobotBatch
 
 
 def test_they_step_alike_and_go_on_from_a_kept_state() -> None:
-    here, there = WorldBatch(partial(make_robot, "ant"), 2, 5), RemoteWorldBatch("ant", {}, 2, 5)
+    here, there = RobotBatch(partial(make_robot, "ant"), 2, 5), RemoteRobotBatch("ant", {}, 2, 5)
     actions = np.random.default_rng(0).uniform(-1, 1, (12, 2, 8)).astype(np.float32)
     for action in actions[:6]:
         for mine, theirs in zip(here.step(action), there.step(action), strict=True):
@@ -35,9 +34,11 @@ def test_they_step_alike_and_go_on_from_a_kept_state() -> None:
 
 def test_what_goes_wrong_there_is_heard_here() -> None:
     with pytest.raises(RobotError, match="unknown robot 'nobody'"):
-        RemoteWorldBatch("nobody", {}, 1, 0)
-    worlds = RemoteWorldBatch("ant", {}, 1, 0)
+        RemoteRobotBatch("nobody", {}, 1, 0)
+    worlds = RemoteRobotBatch("ant", {}, 1, 0)
     worlds.worker.process.kill()
     worlds.worker.process.join()
-    with pytest.raises(TrainingError, match=r"worlds of ant: .* SIGKILL.*goes on from its last checkpoint"):
+    with pytest.raises(
+        TrainingError, match=r"worlds of ant: .* SIGKILL.*continue the run from its last checkpoint"
+    ):
         worlds.step(np.zeros((1, 8), np.float32))

@@ -9,9 +9,10 @@ import torch
 
 from pdtui.core.errors import TrainingError
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
-from pdtui.training.policy_graft import actor_of, graft_policy
-from pdtui.training.ppo import PpoConfig, PpoLearner, act
-from pdtui.training.training_run import actor_to_network, numpy_actor
+from pdtui.training.policy_trainer import actor_to_network, numpy_actor
+from pdtui.training.ppo_learner import PpoLearner, sample_actions
+from pdtui.training.ppo_trainer import network_to_actor, warm_start_policy
+from pdtui.training.training_config import PpoConfig
 
 
 def _network(layers: tuple[int, ...] = (8, 6)) -> PolicyNetwork:
@@ -23,11 +24,11 @@ def _network(layers: tuple[int, ...] = (8, 6)) -> PolicyNetwork:
 def test_it_acts_the_same_whatever_the_new_inputs_are() -> None:
     learner, network = PpoLearner(PpoConfig(layers=(8, 6)), 5, 2), _network()
     seen = (np.random.default_rng(0).normal(size=(200, 5)) * [1, 20, 0.0, 3, 1] + 2).astype(np.float32)
-    state = graft_policy(learner, learner.init(1), actor_of(network), seen)
+    state = warm_start_policy(learner, learner.init(1), network_to_actor(network), seen)
     mean = np.tanh(network(torch.from_numpy(seen[:, :3])).detach().numpy()[:, :2])
     assert np.abs(numpy_actor(learner.folded_actor(state), None)(seen) - mean).max() < 1e-4
     still = state._replace(log_std=jnp.full(2, -30.0))
-    assert np.abs(np.tanh(act(still, seen, np.random.default_rng(0))) - mean).max() < 1e-4
+    assert np.abs(np.tanh(sample_actions(still, seen, np.random.default_rng(0))) - mean).max() < 1e-4
     spec = NetworkSpec("x", 5, (8, 6), "tanh", 2, "squashed_gaussian", (-1.0, -1.0), (1.0, 1.0))
     saved = actor_to_network(learner.folded_actor(state), spec)
     assert np.abs(np.tanh(saved(torch.from_numpy(seen)).detach().numpy()[:, :2]) - mean).max() < 1e-4
@@ -36,4 +37,6 @@ def test_it_acts_the_same_whatever_the_new_inputs_are() -> None:
 def test_it_refuses_a_policy_of_other_layers() -> None:
     learner = PpoLearner(PpoConfig(layers=(8, 6)), 5, 2)
     with pytest.raises(TrainingError, match="expected a policy of layers"):
-        graft_policy(learner, learner.init(1), actor_of(_network((8, 8))), np.zeros((4, 5), np.float32))
+        warm_start_policy(
+            learner, learner.init(1), network_to_actor(_network((8, 8))), np.zeros((4, 5), np.float32)
+        )

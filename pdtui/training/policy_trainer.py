@@ -1,0 +1,223 @@
+"""What every training run does: evaluate, keep the best weights, write checkpoints, continue after a kill."""
+
+from __future__ import annotations
+
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Generic, TypeVar
+
+import jax
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from pdtui.core.errors import SimulationDiverged
+from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
+from pdtui.policies.weights.weights_file import save_network
+from pdtui.robots import make_robot
+from pdtui.robots.robot import Robot, is_fall
+from pdtui.training.multilayer_perceptron import MlpParameters, tanh_mlp
+from pdtui.training.robot_batch import RobotBatch
+from pdtui.training.training_checkpoint import load_checkpoint, save_checkpoint
+from pdtui.training.training_config import TrainingConfig
+
+# First seeds of the episodes that select the best weights, and of those that its published score comes from.
+SELECTION_SEEDS, REPORT_SEEDS = 1_000_000, 2_000_000
+_ITERATIONS_PER_REPORT = 16
+Actor = Callable[[NDArray[np.float32]], NDArray[np.float32]]
+Config = TypeVar("Config", bound=TrainingConfig)
+
+
+@dataclass(frozen=True)
+class ActorScore:
+    """What an actor reaches: means over episodes, and the number of falls."""
+
+    episodes: int
+    mean_return: float
+    std_return: float
+    mean_speed: float
+    falls: int
+
+    @property
+    def steadiness(self) -> float:
+        """Return less its deviation, so that rare falls weigh against speed."""
+        return self.mean_return - self.std_return
+
+
+def score_actor(make: Callable[[], Robot], actor: Actor, seeds: range, steps: int) -> ActorScore:
+    """Run one episode per seed with an actor, all at once."""
+    robots = [make() for _ in seeds]
+    observations = np.array([robot.reset(seed=s)[0] for robot, s in zip(robots, seeds, strict=True)])
+    speed_column = robots[0].attribute_index("speed")
+    returns, speeds, lengths = np.zeros(len(robots)), np.zeros(len(robots)), np.zeros(len(robots))
+    fallen, over = np.zeros(len(robots), bool), np.zeros(len(robots), bool)
+    for _ in range(steps):
+        actions = actor(observations.astype(np.float32))
+        for index in np.flatnonzero(~over):
+            robot = robots[index]
+            try:
+                observation, reward, terminated, truncated, info = robot.step(actions[index])
+            except SimulationDiverged:
+                fallen[index] = over[index] = True
+                continue
+            observations[index] = observation
+            returns[index] += float(reward)
+            speeds[index] += float(robot.read_attributes()[speed_column])
+            lengths[index] += 1
+            fallen[index] = is_fall(terminated, info)
+            over[index] = terminated or truncated or info.get("finished", False)
+    mean_speed = float(np.mean(speeds / np.maximum(lengths, 1)))
+    return ActorScore(len(robots), float(returns.mean()), float(returns.std()), mean_speed, int(fallen.sum()))
+
+
+def numpy_actor(params: MlpParameters, rng: np.random.Generator | None) -> Actor:
+    """Return a squashed Gaussian actor in NumPy: its mean actions, or samples where a generator is given."""
+    params = jax.tree.map(np.asarray, params)
+
+    def act(observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        mean, log_std = np.split(tanh_mlp(params, observation, np.tanh), 2, axis=-1)
+        if rng is not None:
+            noise = rng.standard_normal(mean.shape, np.float32)
+            mean = mean + np.exp(np.clip(log_std, -5.0, 2.0)) * noise
+        action: NDArray[np.float32] = np.tanh(mean)
+        return action
+
+    return act
+
+
+def actor_to_network(params: MlpParameters, spec: NetworkSpec) -> PolicyNetwork:
+    """Return the actor as the network that the policy runtime loads."""
+    network = PolicyNetwork(spec)
+    tensors = dict(network.state_dict())
+    for index, layer in enumerate(params):
+        name = "head" if index == len(params) - 1 else f"hidden.{index}"
+        tensors[f"{name}.weight"] = torch.from_numpy(np.array(layer["w"]).T.copy())
+        tensors[f"{name}.bias"] = torch.from_numpy(np.array(layer["b"]).copy())
+    network.load_tensors(tensors)
+    return network
+
+
+class PolicyTrainer(ABC, Generic[Config]):
+    """One training run in a folder, which continues from its last checkpoint if there is one.
+
+    The seed fixes the order of everything: a run that was killed and resumed ends with the same weights as
+    one that was not.
+    """
+
+    algorithm: ClassVar[str]
+    state: Any
+    batches: Sequence[RobotBatch]
+
+    def __init__(
+        self, robot: str, seed: int, folder: Path, config: Config, command: str, **robot_options: Any
+    ) -> None:
+        self.seed, self.folder, self.config, self.command = seed, folder, config, command
+        self.robot, self.robot_options = robot, robot_options
+        self.make: Callable[[], Robot] = lambda: make_robot(robot, **robot_options)
+        self.sample = self.make()
+        bounds = self.sample.action_space
+        self.observations = int(np.prod(self.sample.observation_space.shape or ()))
+        self.actions = int(np.prod(bounds.shape or ()))
+        self._low, self._high = (np.asarray(getattr(bounds, side), np.float64) for side in ("low", "high"))
+        self.rng = np.random.default_rng(seed)
+        self.steps = 0
+        self.best: dict[str, Any] | None = None
+        self.checkpoint, self.best_weights = (folder / f"{n}.safetensors" for n in ("checkpoint", "best"))
+        folder.mkdir(parents=True, exist_ok=True)
+        self.build()
+        if self.checkpoint.exists():
+            self.state, progress, arrays = load_checkpoint(
+                self.checkpoint, self.state, self.batches, self.rng
+            )
+            self.steps, self.best = int(progress["steps"]), progress["best"]
+            self.restore_further(arrays, progress)
+
+    @abstractmethod
+    def build(self) -> None:
+        """Make the robots, the learner and the untrained state."""
+
+    @abstractmethod
+    def advance(self) -> int:
+        """Collect and learn once; return the number of control steps taken."""
+
+    @abstractmethod
+    def averaged_actor(self) -> MlpParameters:
+        """Return the actor to evaluate and save: on raw observations, with means and log deviations."""
+
+    def further_arrays(self) -> dict[str, NDArray[Any]]:
+        """Return further arrays that a checkpoint must hold."""
+        return {}
+
+    def progress(self) -> dict[str, Any]:
+        """Return further JSON data that a checkpoint must hold."""
+        return {"steps": self.steps, "best": self.best}
+
+    def restore_further(self, arrays: dict[str, NDArray[Any]], progress: dict[str, Any]) -> None:
+        """Take back what `further_arrays` and `progress` returned."""
+        del arrays, progress
+
+    def run(self, report: Callable[[int, ActorScore | None, ActorScore | None], None]) -> Path:
+        """Train to the end and return the path of the best weights, scored on fresh seeds.
+
+        Args:
+            report: Called with the control steps so far, the score if there was an evaluation, and the best.
+        """
+        config, iterations = self.config, 0
+        while self.steps < config.total_steps:
+            taken = self.advance()
+            self.steps += taken
+            score = None
+            if self.steps % config.evaluate_every < taken or self.steps >= config.total_steps:
+                score = self._evaluate()
+                jax.block_until_ready(self.state)
+                further = self.progress(), self.further_arrays()
+                save_checkpoint(self.checkpoint, self.state, self.batches, self.rng, *further)
+            iterations += 1
+            if score is not None or iterations % _ITERATIONS_PER_REPORT == 0:
+                report(self.steps, score, self._best_score())
+        return self.best_weights
+
+    def to_robot(self, squashed: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Rescale actions from (−1, 1) to the robot's bounds."""
+        scaled = self._low + (squashed + 1.0) * 0.5 * (self._high - self._low)
+        return scaled.astype(np.float32)
+
+    def _score(self, actor: Actor, first_seed: int) -> ActorScore:
+        seeds = range(first_seed, first_seed + self.config.evaluate_episodes)
+        steps = self.config.evaluate_steps
+        return score_actor(self.make, lambda seen: self.to_robot(actor(seen)), seeds, steps)
+
+    def _evaluate(self) -> ActorScore:
+        params = self.averaged_actor()
+        actor = numpy_actor(params, None)
+        score, best = self._score(actor, SELECTION_SEEDS), self._best_score()
+        line = {"steps": self.steps, **asdict(score)}
+        with (self.folder / "log.jsonl").open("a") as log:
+            log.write(json.dumps(line) + "\n")
+        if best is None or score.steadiness > best.steadiness:
+            self.best = line
+            self._save_best(params, self._score(actor, REPORT_SEEDS))
+        return score
+
+    def _save_best(self, params: MlpParameters, score: ActorScore) -> None:
+        spec = NetworkSpec(
+            robot=self.robot,
+            observations=self.observations,
+            layers=self.config.layers,
+            activation="tanh",
+            actions=self.actions,
+            head="squashed_gaussian",
+            action_low=tuple(self._low.tolist()),
+            action_high=tuple(self._high.tolist()),
+            command=self.command,
+            score={"steps": self.steps, **asdict(score)},
+        )
+        save_network(self.best_weights, actor_to_network(params, spec))
+
+    def _best_score(self) -> ActorScore | None:
+        if self.best is None:
+            return None
+        return ActorScore(**{name: self.best[name] for name in ActorScore.__dataclass_fields__})

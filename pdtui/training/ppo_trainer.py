@@ -1,0 +1,136 @@
+"""Training by Proximal Policy Optimisation: many robots, stepped by two threads, and a warm start.
+
+MuJoCo releases Python's lock while it steps. For a simulator that does not, each thread waits for a process.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.errors import TrainingError
+from pdtui.policies.weights.policy_network import PolicyNetwork
+from pdtui.policies.weights.weights_file import find_weights_file, load_network
+from pdtui.training.multilayer_perceptron import MlpParameters
+from pdtui.training.policy_trainer import PolicyTrainer, numpy_actor
+from pdtui.training.ppo_learner import PpoLearner, PpoRollout, PpoState, sample_actions
+from pdtui.training.robot_batch import RemoteRobotBatch, RobotBatch, TransitionBatch
+from pdtui.training.training_config import PpoConfig
+
+THREADS = 2
+# Control steps of the initial policy from which the observations are normalised.
+_WARM_START_STEPS = 200
+# A smaller deviation than this would blow up inputs that hardly change.
+_MIN_DEVIATION = 0.01
+
+
+class PpoTrainer(PolicyTrainer[PpoConfig]):
+    """Trains a policy by PPO; see `PolicyTrainer`."""
+
+    algorithm: ClassVar[str] = "ppo"
+
+    def build(self) -> None:
+        share, recipe = self.config.worlds // THREADS, self.sample.training_recipe
+        seeds = [self.seed * 10 + 1 + n for n in range(THREADS)]
+        if recipe.robot_batch:
+            batch = pkgutil.resolve_name(recipe.robot_batch)
+            self.batches = [batch(self.sample, self.config.worlds, seeds[0])]
+        elif self.config.processes:
+            self.batches = [RemoteRobotBatch(self.robot, self.robot_options, share, seed) for seed in seeds]
+        else:
+            self.batches = [RobotBatch(self.make, share, seed) for seed in seeds]
+        self.learner = PpoLearner(self.config, self.observations, self.actions)
+        self.state = self.learner.init(self.seed)
+        self._threads = ThreadPoolExecutor(THREADS)
+        if recipe.initial_policy and not self.checkpoint.exists():
+            self._warm_start(find_weights_file(recipe.initial_policy))
+
+    def advance(self) -> int:
+        on_host: PpoState = jax.tree.map(np.asarray, self.state)
+        rows = [self._collect(on_host) for _ in range(self.config.chunk)]
+        rollout = PpoRollout(*(np.stack(column) for column in zip(*rows, strict=True)))
+        self.state, _ = self.learner.update(self.state, rollout)
+        return self.config.worlds * self.config.chunk
+
+    def averaged_actor(self) -> MlpParameters:
+        return self.learner.folded_actor(self.state)
+
+    def _warm_start(self, weights: Path) -> None:
+        actor = network_to_actor(load_network(weights))
+        act, inputs = numpy_actor(actor, None), actor[0]["w"].shape[0]
+        seen = []
+        for _ in range(_WARM_START_STEPS):
+            observations = self._observations()
+            seen.append(observations)
+            self._step(act(observations[:, :inputs]))
+        self.state = warm_start_policy(self.learner, self.state, actor, np.concatenate(seen))
+
+    def _collect(self, state: PpoState) -> PpoRollout:
+        observation = self._observations()
+        action = sample_actions(state, observation, self.rng)
+        rows = TransitionBatch(*map(np.concatenate, zip(*self._step(np.tanh(action)), strict=True)))
+        restarted = np.concatenate([batch.restarted for batch in self.batches]).astype(np.float32)
+        return PpoRollout(observation, action, rows.reward, rows.discount, rows.following, restarted)
+
+    def _observations(self) -> NDArray[np.float32]:
+        return np.concatenate([batch.observations for batch in self.batches])
+
+    def _step(self, squashed: NDArray[np.float32]) -> list[TransitionBatch]:
+        shares = np.split(self.to_robot(squashed), len(self.batches))
+        return list(self._threads.map(lambda batch, actions: batch.step(actions), self.batches, shares))
+
+
+def network_to_actor(network: PolicyNetwork) -> MlpParameters:
+    """Return the network's layers on raw observations, in the form of `PpoLearner.folded_actor`."""
+    return [
+        {"w": jnp.asarray(layer.weight.detach().numpy().T), "b": jnp.asarray(layer.bias.detach().numpy())}
+        for layer in (*network.hidden, network.head)
+    ]
+
+
+def warm_start_policy(
+    learner: PpoLearner, state: PpoState, actor: MlpParameters, seen: NDArray[np.float32]
+) -> PpoState:
+    """Return an untrained state that acts as a trained policy does; its critic stays untrained.
+
+    Args:
+        learner: Learner of the run.
+        state: Untrained state.
+        actor: Trained actor on raw observations, which returns means and log deviations. It observes the
+            first columns of what the run observes.
+        seen: Raw observations while the policy acts, shape (T, observations), to normalise by.
+
+    Raises:
+        TrainingError: The policy has other layers or actions, or observes more.
+    """
+    mine, theirs = ([layer["w"].shape for layer in layers] for layers in (state.actor, actor))
+    observed, actions = theirs[0][0], mine[-1][1]
+    if mine[1:-1] != theirs[1:-1] or mine[0][1] != theirs[0][1] or theirs[-1][1] != 2 * actions:
+        raise TrainingError(f"expected a policy of layers {mine}, found {theirs}")
+    if observed > learner.observations:
+        raise TrainingError(f"expected a policy of at most {learner.observations} inputs, found {observed}")
+    mean, deviation = seen.mean(axis=0), np.maximum(seen.std(axis=0), _MIN_DEVIATION)
+    weight = np.asarray(actor[0]["w"])
+    scaled = np.zeros((learner.observations, weight.shape[1]), np.float32)
+    scaled[:observed] = weight * deviation[:observed, None]
+    head = actor[-1]
+    layers = [
+        {"w": jnp.asarray(scaled), "b": actor[0]["b"] + mean[:observed] @ weight},
+        *actor[1:-1],
+        {"w": head["w"][:, :actions], "b": head["b"][:actions]},
+    ]
+    return state._replace(
+        actor=layers,
+        average=[dict(layer) for layer in layers],
+        log_std=head["b"][actions:],
+        mean=jnp.asarray(mean),
+        variance=jnp.asarray(deviation**2),
+        rows_seen=jnp.asarray(float(len(seen))),
+    )

@@ -1,0 +1,136 @@
+"""Several copies of a robot that are stepped together, in this process or in another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.errors import SimulationDiverged, TrainingError, WorkerError
+from pdtui.core.robot_data import RobotState
+from pdtui.core.worker_pool import WorkerProcess
+from pdtui.robots import make_robot
+from pdtui.robots.robot import Robot
+
+
+class TransitionBatch(NamedTuple):
+    """Transitions, float32 arrays of NumPy or JAX that share their leading axes.
+
+    `discount` is 0 where the episode terminated, else 1; `following` is the observation after the step.
+    """
+
+    observation: Any
+    action: Any
+    reward: Any
+    discount: Any
+    following: Any
+
+
+@dataclass
+class RobotBatchState:
+    """The states of all robots of a batch, and the control steps that each has taken in its episode."""
+
+    snapshots: list[RobotState]
+    ages: list[int]
+
+
+class RobotBatch:
+    """A batch of robots, each of which begins a new episode when the last one is over.
+
+    Attributes:
+        observations: Current observations, shape (robots, observations), float32.
+        restarted: Whether the last step of each robot ended its episode, shape (robots,).
+
+    Args:
+        make: Builds one robot.
+        count: Number of robots.
+        seed: Seed of their episodes.
+    """
+
+    def __init__(self, make: Callable[[], Robot], count: int, seed: int) -> None:
+        self.robots = [make() for _ in range(count)]
+        self.ages = [0] * count
+        self.restarted = np.zeros(count, bool)
+        # The factor keeps the seeds of different batches apart.
+        start = [robot.reset(seed=seed * 1_000_003 + index)[0] for index, robot in enumerate(self.robots)]
+        self.observations = np.array(start, np.float32)
+
+    def step(self, actions: NDArray[np.float32]) -> TransitionBatch:
+        """Step every robot once and return the transitions, leading axis (robots,)."""
+        before = self.observations.copy()
+        after, reward, discount = before.copy(), np.zeros(len(before)), np.ones(len(before))
+        for index, robot in enumerate(self.robots):
+            try:
+                observation, gained, terminated, truncated, info = robot.step(actions[index])
+            except SimulationDiverged:
+                observation, gained, info = before[index].astype(np.float64), 0.0, {}
+                terminated, truncated = True, False
+            self.ages[index] += 1
+            after[index], reward[index], discount[index] = observation, float(gained), float(not terminated)
+            over = self.ages[index] >= robot.episode_steps or info.get("finished", False)
+            self.restarted[index] = terminated or truncated or over
+            if self.restarted[index]:
+                observation, self.ages[index] = robot.reset()[0], 0
+            self.observations[index] = observation
+        return TransitionBatch(before, actions, reward.astype(np.float32), discount.astype(np.float32), after)
+
+    def state(self) -> RobotBatchState:
+        """Return what `restore` needs."""
+        return RobotBatchState([robot.snapshot() for robot in self.robots], list(self.ages))
+
+    def restore(self, state: RobotBatchState) -> None:
+        """Return to an earlier state, bit-exactly."""
+        self.ages = list(state.ages)
+        for index, (robot, snapshot) in enumerate(zip(self.robots, state.snapshots, strict=True)):
+            robot.restore(snapshot)
+            self.observations[index] = robot.observe()
+
+
+class RemoteRobotBatch(RobotBatch):
+    """A `RobotBatch` in a process of its own, with the same results step for step.
+
+    Args:
+        robot: Name of the robot.
+        options: Arguments of the robot's class.
+        count: Number of robots.
+        seed: Seed of their episodes.
+
+    Raises:
+        TrainingError: The process died.
+    """
+
+    def __init__(self, robot: str, options: dict[str, Any], count: int, seed: int) -> None:
+        self.worker = WorkerProcess(f"worlds of {robot}", _build_batch, robot, options, count, seed)
+        self._call("")
+
+    def step(self, actions: NDArray[np.float32]) -> TransitionBatch:
+        return cast(TransitionBatch, self._call("step", actions))
+
+    def state(self) -> RobotBatchState:
+        return cast(RobotBatchState, self._call("state"))
+
+    def restore(self, state: RobotBatchState) -> None:
+        self._call("restore", state)
+
+    def _call(self, name: str, *arguments: Any) -> Any:
+        try:
+            self.worker.send(_call_batch, name, *arguments)
+            answer, self.observations, self.restarted = self.worker.receive()
+        except WorkerError as error:
+            raise TrainingError(
+                f"{error}; give the same command again to continue the run from its last checkpoint"
+            ) from error
+        return answer
+
+
+def _build_batch(robot: str, options: dict[str, Any], count: int, seed: int) -> RobotBatch:
+    return RobotBatch(partial(make_robot, robot, **options), count, seed)
+
+
+def _call_batch(batch: RobotBatch, name: str, *arguments: Any) -> tuple[Any, Any, Any]:
+    answer = getattr(batch, name)(*arguments) if name else None
+    return answer, batch.observations, batch.restarted
