@@ -13,9 +13,8 @@ from torch import nn
 
 from pdtui.core.errors import SessionError
 from pdtui.dissection.dissect import dissect as run_dissection
-from pdtui.dissection.dissection_config import DissectionConfig
+from pdtui.dissection.dissection_config import QUICK_DISSECTION, DissectionConfig, DissectionSettings
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_settings import QUICK_DISSECTION, DissectionSettings
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.keystrokes import read_keystrokes
 from pdtui.driving.loop_builder import build_loop

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from pdtui.dissection.dissection_settings import DissectionSettings
+from pdtui.dissection.dissection_config import DissectionSettings
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import save_network
 from pdtui.search.behavior_search import BehaviorSearchSettings

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.benchmarks.benchmark_episodes import DissectionBenchmarkSettings, record_episodes
-from pdtui.benchmarks.librosa_matching import load_librosa
 from pdtui.benchmarks.matching_benchmark import (
     MatchingComparison,
     ScalingCurve,
     compare_matching,
+    load_librosa,
     measure_matching_growth,
+    measure_matching_memory,
     measure_seconds,
 )
-from pdtui.benchmarks.matching_memory import measure_matching_memory
 from pdtui.core.attributes import Floats
 from pdtui.core.units import Stimulation
 from pdtui.probing.rollout_pool import RolloutPool
@@ -56,18 +56,14 @@ class DissectionBenchmark:
 
 
 def bench_dissection(
-    robot: str,
-    policy: str,
-    settings: DissectionBenchmarkSettings | None = None,
-    progress: Progress | None = None,
+    robot: str, policy: str, settings: DissectionBenchmarkSettings, progress: Progress | None = None
 ) -> DissectionBenchmark:
     """Record episodes, then measure matching, its growth and memory, and probing with one and two workers.
 
     Raises:
         PdtuiError: librosa is missing, the robot or policy cannot be loaded, or an episode is too short.
     """
-    settings = settings or DissectionBenchmarkSettings()
-    librosa = load_librosa()
+    load_librosa()
 
     def stage(done: int, name: str) -> None:
         if progress is not None:
@@ -78,7 +74,7 @@ def bench_dissection(
         episodes, attributes = record_episodes(one, settings)
         stage(1, "compare with the loop")
         compared = tuple(
-            compare_matching(librosa, episodes, attributes, find_preset(name), settings.rounds)
+            compare_matching(episodes, attributes, find_preset(name), settings.rounds)
             for name in ("paper", "authors")
         )
         stage(2, "growth")

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from pdtui.benchmarks.matching_benchmark import measure_seconds
 from pdtui.core.events import Event
 from pdtui.core.units import Stimulation
+from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_loop
@@ -42,11 +44,7 @@ class LoopBenchmark:
 
 
 def bench_loop(
-    config: DriveConfig,
-    *,
-    steps: int = 5000,
-    rounds: int = ROUNDS,
-    progress: Callable[[int, int], None] | None = None,
+    config: DriveConfig, *, steps: int = 5000, rounds: int = ROUNDS, progress: StepProgress | None = None
 ) -> LoopBenchmark:
     """Measure the four in turn over several rounds, so that a drifting machine affects all alike.
 
@@ -61,7 +59,7 @@ def bench_loop(
     behavior = next(iter(config.stimulation_map.behaviors), "")
     parts: dict[str, Callable[[], float]] = {
         "bare": lambda: _bare(loop, config.seed, walked),
-        "policy": lambda: _with_policy(loop, config.seed, steps),
+        "policy": lambda: steps / measure_seconds(lambda: _actions(loop, config.seed, steps)),
         "stimulated": lambda: _whole(loop, config.seed, steps, behavior, None),
         "recorded": lambda: _recorded(loop, config.seed, steps, behavior),
     }
@@ -97,12 +95,6 @@ def _bare(loop: ControlLoop, seed: int, actions: list[np.ndarray]) -> float:
         if terminated or truncated:
             loop.robot.reset()
     return len(actions) / (time.perf_counter() - start)
-
-
-def _with_policy(loop: ControlLoop, seed: int, steps: int) -> float:
-    start = time.perf_counter()
-    _actions(loop, seed, steps)
-    return steps / (time.perf_counter() - start)
 
 
 def _whole(

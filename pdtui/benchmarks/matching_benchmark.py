@@ -1,31 +1,35 @@
-"""Speed of matching: compared with a plain loop, and as each size grows."""
+"""Speed and memory of matching: compared with a plain loop, as each size grows, and in a fresh process."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.signal import get_window
 
 from pdtui.benchmarks.benchmark_episodes import DissectionBenchmarkSettings, widen_episode
-from pdtui.benchmarks.librosa_matching import match_by_loop
 from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.errors import PdtuiError
+from pdtui.core.worker_pool import WorkerProcess
 from pdtui.spectra.matching import Discrepancies, match_units
-from pdtui.spectra.matching_presets import MatchingPreset
+from pdtui.spectra.matching_presets import MatchingPreset, find_preset
 from pdtui.spectra.monitor import MonitoredEpisode
+from pdtui.spectra.phase_correlation import correlate_phases
 
 _ROUNDING = 1e-11
 """Discrepancies closer than this share of the largest are ties: rounding decides their order."""
+_STATUS = Path("/proc/self/status")
 
 
 @dataclass(frozen=True)
 class MatchingComparison:
-    """Matching compared with the loop of `librosa_matching`, for one preset.
+    """Matching compared with `match_by_loop`, for one preset.
 
     Attributes:
-        preset: name of the preset.
         ours_ms, loop_ms: median time over rounds, ms.
         ratio: median over rounds of the loop's time over ours.
         same_ranking: whether both rank the units of every attribute alike.
@@ -63,19 +67,15 @@ class ScalingCurve:
 
 
 def compare_matching(
-    librosa: Any,
-    episodes: Sequence[MonitoredEpisode],
-    attributes: Sequence[Attribute],
-    preset: MatchingPreset,
-    rounds: int,
+    episodes: Sequence[MonitoredEpisode], attributes: Sequence[Attribute], preset: MatchingPreset, rounds: int
 ) -> MatchingComparison:
     """Time our matching and the loop in turn on the same data; the first call of each does not count."""
     found = match_units(episodes, attributes, preset)
-    reference = match_by_loop(librosa, episodes, attributes, preset)
+    reference = match_by_loop(episodes, attributes, preset)
     ours, loops = [], []
     for _ in range(rounds):
         ours.append(measure_seconds(lambda: match_units(episodes, attributes, preset)))
-        loops.append(measure_seconds(lambda: match_by_loop(librosa, episodes, attributes, preset)))
+        loops.append(measure_seconds(lambda: match_by_loop(episodes, attributes, preset)))
     same, ties = same_ranking(found, reference)
     return MatchingComparison(
         preset=preset.name,
@@ -136,3 +136,86 @@ def measure_seconds(work: Callable[[], object]) -> float:
     start = time.perf_counter()
     work()
     return time.perf_counter() - start
+
+
+def load_librosa() -> Any:
+    """Import librosa, which only this comparison needs.
+
+    Raises:
+        PdtuiError: librosa is not installed.
+    """
+    try:
+        import librosa
+    except ImportError as error:
+        raise PdtuiError(
+            "librosa is not installed, and the benchmark compares with it: pip install 'pdtui[bench]'"
+        ) from error
+    return librosa
+
+
+def match_by_loop(
+    episodes: Sequence[MonitoredEpisode], attributes: Sequence[Attribute], preset: MatchingPreset
+) -> Floats:
+    """Compute discrepancies, shape (J, U), by a `librosa.stft` per series and a `numpy.linalg.norm` per pair.
+
+    Window, length and hop are those of the preset, without padding (``center=False``), in double precision.
+    Each series is transformed once per episode, not once per pair. librosa does not divide by the sum of the
+    window; that is done at the end, so that the numbers can be compared.
+    """
+    librosa = load_librosa()
+    exponent = 2 if preset.spectrogram == "power" else 1
+    window = {"rectangular": "boxcar"}.get(preset.window, preset.window)
+
+    def spectrogram(series: Floats) -> Floats:
+        spectra = librosa.stft(
+            series, n_fft=preset.length, hop_length=preset.hop, window=window, center=False
+        )
+        return np.asarray(np.abs(spectra) ** exponent)
+
+    total = np.zeros((len(attributes), episodes[0].activations.shape[1]))
+    for episode in episodes:
+        targets = [
+            spectrogram(episode.attributes[:, column] * attribute.scale)
+            for column, attribute in enumerate(attributes)
+        ]
+        for unit in range(total.shape[1]):
+            one = spectrogram(episode.activations[:, unit].astype(np.float64))
+            for row, target in enumerate(targets):
+                total[row, unit] += np.linalg.norm(one - target)
+    factor = float(get_window(window, preset.length).sum()) ** exponent
+    return total / (len(episodes) * factor)
+
+
+def measure_matching_memory(units: int, steps: int, attributes: int) -> tuple[float, float]:
+    """Return the peak resident memory in GB and the time in s of matching and correlating.
+
+    Both run in a fresh process, so that nothing else counts.
+
+    Raises:
+        PdtuiError: the system has no ``/proc``.
+    """
+    if not _STATUS.exists():
+        raise PdtuiError("the memory benchmark reads /proc, which this system does not have")
+    with WorkerProcess("memory of matching", int) as worker:
+        worker.send(_match_many, units, steps, attributes)
+        measured: tuple[float, float] = worker.receive()
+    return measured
+
+
+def _match_many(_: object, units: int, steps: int, attributes: int) -> tuple[float, float]:
+    """Match and correlate a synthetic episode of random walks; only that is timed."""
+    rng = np.random.default_rng(0)
+    activations = np.empty((steps, units), np.float32)
+    level = np.zeros(units, np.float32)
+    for row in activations:
+        level += 0.1 * rng.standard_normal(units, np.float32)
+        np.tanh(level, out=row)
+    episode = MonitoredEpisode(0, activations, rng.standard_normal((steps, attributes)).cumsum(axis=0))
+    known = tuple(Attribute(str(column), "", scale=0.1) for column in range(attributes))
+    preset = find_preset("paper")
+    start = time.perf_counter()
+    match_units([episode], known, preset)
+    correlate_phases([episode], known, preset)
+    seconds = time.perf_counter() - start
+    (peak,) = [line.split()[1] for line in _STATUS.read_text().splitlines() if line.startswith("VmHWM")]
+    return int(peak) * 1024 / 1e9, seconds

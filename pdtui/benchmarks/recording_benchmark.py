@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pdtui.core.errors import ScreenError
 from pdtui.core.events import Event
 from pdtui.core.step_record import StepRecord
+from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_loop
@@ -51,8 +52,6 @@ class RecordingBenchmark:
     """The result of `bench_record`.
 
     Attributes:
-        units: number of hidden units of the policy.
-        steps: control steps of each recording.
         costs: cost of each way to record.
     """
 
@@ -83,7 +82,7 @@ class MemoryBenchmark:
 
 
 def bench_record(
-    config: DriveConfig, *, steps: int = 6000, progress: Callable[[int, int], None] | None = None
+    config: DriveConfig, *, steps: int = 6000, progress: StepProgress | None = None
 ) -> RecordingBenchmark:
     """Record the same drives in each way; only the recorder's work is measured.
 
@@ -108,10 +107,7 @@ def bench_record(
 
 def _driven(loop: ControlLoop, seed: int, steps: int, behaviors: Sequence[str]) -> list[StepRecord]:
     fresh = ControlLoop(loop.robot, loop.policy, loop.map, seed)
-    records = []
-    for step in range(steps):
-        records.append(fresh.advance(_pressed(step, behaviors)))
-    return records
+    return [fresh.advance(_pressed(step, behaviors)) for step in range(steps)]
 
 
 def _pressed(step: int, behaviors: Sequence[str]) -> list[Event]:
@@ -135,9 +131,7 @@ def _cost(info: DriveInfo, records: Sequence[StepRecord]) -> tuple[float, float]
         return used / seconds, (recorder.bytes - size) / 1e6 / (seconds / 60)
 
 
-def bench_memory(
-    config: DriveConfig, *, steps: int, progress: Callable[[int, int], None] | None = None
-) -> MemoryBenchmark:
+def bench_memory(config: DriveConfig, *, steps: int, progress: StepProgress | None = None) -> MemoryBenchmark:
     """Record a long drive without a screen, examine it and replay it, all in this process.
 
     Raises:

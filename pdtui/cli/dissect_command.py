@@ -90,9 +90,8 @@ def dissect(
     An interrupted dissection continues where it stopped when the same command is run again.
     """
     from pdtui.dissection.dissect_into_map import dissect_into_map
-    from pdtui.dissection.dissection_config import DissectionConfig
-    from pdtui.dissection.dissection_settings import QUICK_DISSECTION, DissectionSettings
-    from pdtui.pictures.picture_outputs import PictureOutputs
+    from pdtui.dissection.dissection_config import QUICK_DISSECTION, DissectionConfig, DissectionSettings
+    from pdtui.pictures.dissection_report import PictureOutputs
     from pdtui.robots import check_robot, file_stem, trust_module
 
     if (robot is None) == (env is None):

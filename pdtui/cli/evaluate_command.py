@@ -145,8 +145,8 @@ def evaluate(
             options=own_options,
         )
     elif target is not None:
+        from pdtui.evaluation.evaluation_tables import tracking_table
         from pdtui.evaluation.target_tracking import evaluate_tracking
-        from pdtui.evaluation.tracking_tables import tracking_table
 
         with progress_bar("holding targets", quiet=as_json) as advance:
             tracking = evaluate_tracking(config, target, seeds, workers=workers, progress=advance)

@@ -72,11 +72,11 @@ def episode(
     trust_module(robot)
     check_robot(robot)
     check_figure(output, overwrite)
-    from pdtui.pictures.matched_curves import draw_matched_curves, match_episode
+    from pdtui.pictures.unit_attribute_pairs import draw_unit_attribute_pairs, pair_units_with_attributes
 
     with progress_bar("rolling out") as advance:
-        curves = match_episode(robot, policy or robot, progress=advance, **selection)
-    draw_matched_curves(output, curves, start=start, seconds=seconds)
+        curves = pair_units_with_attributes(robot, policy or robot, progress=advance, **selection)
+    draw_unit_attribute_pairs(output, curves, start=start, seconds=seconds)
     for pair in curves.pairs:
         click.echo(
             f"{make_printable(pair.attribute.name)}: unit {pair.unit}, discrepancy {pair.discrepancy:.3g}"

@@ -65,7 +65,7 @@ def tune(
         raise click.UsageError("expected either a BEHAVIOR or --all")
     if force and not dry_run:
         raise MapError("--force needs --dry-run: the map would get gains tuned for another policy")
-    from pdtui.evaluation.tracking_tables import tuned_table
+    from pdtui.evaluation.evaluation_tables import tuned_table
     from pdtui.search.gain_tuning import TuningSettings, tune_gains
     from pdtui.stimulation.map_library import find_map
     from pdtui.stimulation.map_writer import replace_gains, rewrite_map

@@ -21,6 +21,8 @@ from pdtui.core.errors import PdtuiError, WorkerError, format_error_in_one_line
 State = TypeVar("State")
 Job = TypeVar("Job")
 Result = TypeVar("Result")
+StepProgress = Callable[[int, int], None]
+"""Called with the units of work done and their total."""
 
 
 class WorkerProcess(Closable):
@@ -112,7 +114,7 @@ class WorkerPool(Closable, Generic[State]):
         self,
         function: Callable[[State, Job], Result],
         jobs: Sequence[Job],
-        progress: Callable[[int, int], None] | None = None,
+        progress: StepProgress | None = None,
     ) -> list[Result]:
         """Run all jobs and return their results in the order of the jobs; `WorkerError` if a worker dies.
 

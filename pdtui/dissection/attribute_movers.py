@@ -10,12 +10,12 @@ import numpy as np
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.intervals import bootstrap_interval
 from pdtui.core.units import Stimulation
-from pdtui.dissection.dissection_settings import DissectionSettings
+from pdtui.core.worker_pool import StepProgress
+from pdtui.dissection.dissection_config import DissectionSettings
 from pdtui.probing.confirmation import exceeds_random_units
-from pdtui.probing.effect_probe import EffectProbe, PlanEffects
+from pdtui.probing.effect_probe import EffectProbe, PlanEffects, UnitEffects
 from pdtui.probing.start_states import StartState
-from pdtui.probing.unit_effects import UnitEffects
-from pdtui.spectra.monitor import MonitoredEpisode, StepProgress
+from pdtui.spectra.monitor import MonitoredEpisode
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
 _KEPT = 0.7
@@ -29,7 +29,6 @@ class AttributeMover:
     """A stimulation that moves one attribute up or down.
 
     Attributes:
-        column: Column of the attribute.
         sign: 1 for up, −1 for down.
         stimulation: One unit, or two.
         measured: Change of the attribute, from held-out starts.
@@ -53,10 +52,6 @@ def movable_columns(attributes: Sequence[Attribute], episodes: Sequence[Monitore
     Left out are torques, which the policy commands; the reward; attributes that do not vary; attributes that
     mostly progress, such as the position along the way; and attributes that show the same as an earlier
     column, such as the speed of a robot that only walks forward.
-
-    Args:
-        attributes: The robot's attributes.
-        episodes: Episodes without stimulation.
     """
     values = np.concatenate([episode.attributes for episode in episodes])
     kept: list[int] = []
@@ -104,14 +99,11 @@ def find_attribute_movers(
     unit that only shifts the phase of the gait moves an attribute for half a stride, and then not at all.
 
     Args:
-        prober: Measures effects.
         columns: Columns of the attributes. Their side effects count, too.
         spread: Standard deviation of every attribute, shape (J,).
-        screen: Effects of every unit.
         refined: Effects of the units to choose from.
         starts: Starts that neither sweep used. The first half chooses units, the other half measures them.
         settings: How many units to try, and for how long.
-        progress: Called with the directions done and their total.
     """
     found = []
     half, steps = len(starts) // 2, settings.mover_steps

@@ -12,12 +12,12 @@ import numpy as np
 from torch import nn
 
 from pdtui.core.units import Stimulation, parse_unit
+from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
 from pdtui.dissection.dissection_config import DissectionConfig
-from pdtui.dissection.dissection_result import Dissection
+from pdtui.dissection.dissection_result import Dissection, pick_sample_episode
 from pdtui.dissection.dissection_searches import DissectionSearches
 from pdtui.dissection.probe_starts import gather_probe_starts
-from pdtui.dissection.sample_episode import pick_sample_episode
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.confirmation import draw_control_units, select_units_to_refine
@@ -29,7 +29,7 @@ from pdtui.search.plan_search import TimeBudget
 from pdtui.sessions.environment_versions import collect_versions
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_preset
-from pdtui.spectra.monitor import StepProgress, monitor_episodes
+from pdtui.spectra.monitor import monitor_episodes
 from pdtui.spectra.phase_correlation import correlate_phases
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map
@@ -63,7 +63,9 @@ def dissect(config: DissectionConfig) -> Dissection:
         )
         robot, network, journal = pool.robot, pool.policy, None
         if config.journal is not None:
-            journal = stack.enter_context(RolloutJournal(config.journal, _identity(pool)))
+            # What the outcome of a roll-out depends on besides its start and plan.
+            identity = json.dumps([robot.name, network.sha256, collect_versions()])
+            journal = stack.enter_context(RolloutJournal(config.journal, identity))
         prober = EffectProbe(pool, journal)
         known = _fixed_behaviors(first_map, network) if first_map is not None else ()
         episodes = monitor_episodes(
@@ -92,14 +94,7 @@ def dissect(config: DissectionConfig) -> Dissection:
         spread = np.concatenate([episode.attributes for episode in episodes]).std(axis=0)
         columns = movable_columns(robot.attributes, episodes)
         movers = find_attribute_movers(
-            prober,
-            columns,
-            spread,
-            screen,
-            refined,
-            starts.searches.held_out,
-            settings,
-            stage("up and down"),
+            prober, columns, spread, screen, refined, starts.searches.held_out, settings, stage("up and down")
         )
         searches = DissectionSearches(
             prober, robot, settings, seed, TimeBudget(config.budget_minutes, began), stage, known
@@ -132,11 +127,6 @@ def dissect(config: DissectionConfig) -> Dissection:
             import_options=config.import_options,
             shortened=starts.shortened,
         )
-
-
-def _identity(pool: RolloutPool) -> str:
-    """Return what the outcome of a roll-out depends on besides its start and plan."""
-    return json.dumps([pool.robot.name, pool.policy.sha256, collect_versions()])
 
 
 def _fixed_behaviors(stimulation_map: StimulationMap, policy: Policy) -> tuple[Stimulation, ...]:

@@ -62,8 +62,6 @@ def dissect_into_map(
 
     Args:
         config: What to dissect. Its journal is not used.
-        output: File of the map.
-        overwrite: Whether to replace a map that exists.
         draw: Draws the pictures, and returns their files.
 
     Raises:

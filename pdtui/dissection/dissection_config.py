@@ -1,20 +1,113 @@
-"""What to dissect, and how: the one object behind `pdtui dissect` and `pdtui.dissect`."""
+"""What to dissect, and with how much work: the one object behind `pdtui dissect` and `pdtui.dissect`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 from torch import nn
 
-from pdtui.dissection.dissection_settings import DissectionSettings
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.robots.robot import Robot
+from pdtui.search.behavior_search import BehaviorSearchSettings
+from pdtui.search.controller_search import ControllerSearchSettings
+from pdtui.search.imprint_candidates import ImprintSettings
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 StageProgress = Callable[[str, int, int], None]
+
+
+Part = TypeVar("Part", "DissectionSettings", BehaviorSearchSettings, ControllerSearchSettings)
+
+
+@dataclass(frozen=True)
+class DissectionSettings:
+    """How much work a dissection does. The defaults take 10 to 15 minutes on two idle cores.
+
+    Attributes:
+        steps: Control steps of a monitored episode.
+        screen_values, screen_starts, screen_steps: Outputs at which every unit is screened, the number of
+            starts, and the control steps of each roll-out.
+        refine_keep: Units kept after screening, for each attribute and direction.
+        controls: Units drawn at random and refined for comparison.
+        refine_values, refine_starts, refine_steps: The same as for screening, for the units kept; their
+            starts are others.
+        mover_singles, mover_pairs: Units tried alone, and second units tried beside the best of them, for
+            each attribute and direction.
+        mover_steps: Control steps of those roll-outs.
+        search_starts, selection_starts, held_out_starts: Starts of the searches: those they optimize on,
+            choose among the finalists on, and are judged on.
+        walk_steps: Control steps between a reset and a start.
+        imprints: Settings of the imprints that the searches begin from.
+        behavior_search, controller_search: Settings of the searches.
+    """
+
+    steps: int = 1000
+    screen_values: tuple[float, ...] = (-4.0, -2.0, 2.0, 4.0)
+    screen_starts: int = 2
+    screen_steps: int = 60
+    refine_keep: int = 2
+    controls: int = 48
+    refine_values: tuple[float, ...] = (-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0)
+    refine_starts: int = 6
+    refine_steps: int = 80
+    mover_singles: int = 3
+    mover_pairs: int = 4
+    mover_steps: int = 240
+    search_starts: int = 10
+    selection_starts: int = 12
+    held_out_starts: int = 16
+    walk_steps: int = 100
+    imprints: ImprintSettings = field(default_factory=ImprintSettings)
+    behavior_search: BehaviorSearchSettings = field(default_factory=BehaviorSearchSettings)
+    controller_search: ControllerSearchSettings = field(default_factory=ControllerSearchSettings)
+
+    @property
+    def longest_rollout(self) -> int:
+        """Control steps of the longest roll-out."""
+        behaviors, controllers = self.behavior_search, self.controller_search
+        return max(
+            *(self.screen_steps, self.refine_steps, self.mover_steps),
+            *(behaviors.quick_steps, behaviors.full_steps, behaviors.final_steps),
+            *(controllers.steps, controllers.final_steps),
+        )
+
+    def shortened_to(self, steps: int) -> DissectionSettings:
+        """Return settings whose walks, start and roll-out together, last at most this many control steps.
+
+        A quarter of them at most is spent on reaching the start.
+        """
+        walk = min(self.walk_steps, steps // 4)
+        longest = max(1, steps - walk)
+
+        def shorten(part: Part, *fields: str) -> Part:
+            return replace(part, **{name: min(getattr(part, name), longest) for name in fields})
+
+        shorter = shorten(self, "screen_steps", "refine_steps", "mover_steps")
+        return replace(
+            shorter,
+            walk_steps=walk,
+            behavior_search=shorten(self.behavior_search, "quick_steps", "full_steps", "final_steps"),
+            controller_search=shorten(self.controller_search, "steps", "final_steps"),
+        )
+
+
+QUICK_DISSECTION = DissectionSettings(
+    steps=400, screen_values=(-3.0, 3.0), screen_steps=40, refine_keep=1, controls=8,
+    refine_values=(-3.0, 0.0, 3.0), refine_starts=4, refine_steps=60,
+    mover_singles=2, mover_pairs=0, mover_steps=160,
+    search_starts=3, selection_starts=4, held_out_starts=8, walk_steps=50,
+    imprints=ImprintSettings(episodes=4, steps=40, bins=3, units=(8,), factors=(1.0,)),
+    behavior_search=BehaviorSearchSettings(
+        random_sets=12, single_units=6, elite=4, children=6, promoted=2, max_units=(3,), generations=2,
+        quick_starts=1, quick_steps=60, full_starts=3, full_steps=120, finalists=2, final_steps=160,
+    ),
+    controller_search=ControllerSearchSettings(units=1, pairs=1, finalists=2, steps=60, final_steps=160),
+)  # fmt: skip
+"""A first look that takes about a minute: fewer outputs per unit, fewer starts, and hardly any search."""
 
 
 @dataclass(frozen=True)

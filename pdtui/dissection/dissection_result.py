@@ -1,23 +1,26 @@
-"""The result of a dissection."""
+"""The result of a dissection, and the episode that it keeps for its pictures."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, column_of
 from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
-from pdtui.dissection.sample_episode import SampleEpisode
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
-from pdtui.probing.unit_effects import UnitEffects
+from pdtui.probing.effect_probe import UnitEffects
 from pdtui.robots.robot_goals import RobotGoals
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.spectra.matching import Discrepancies
 from pdtui.spectra.matching_presets import MatchingPreset
+from pdtui.spectra.monitor import MonitoredEpisode
 from pdtui.spectra.phase_correlation import PhaseCorrelations
+from pdtui.spectra.spectrogram import attribute_series, unit_series, usable_episodes
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import StimulationMap
 
@@ -119,9 +122,54 @@ class Dissection:
         return parse_map(draft_map(self), f"dissection of {self.policy}")
 
     def column(self, attribute: str) -> int:
-        """Return the column of an attribute.
-
-        Raises:
-            RobotError: The robot has no such attribute.
-        """
+        """Return the column of an attribute; a `RobotError` says that there is none of that name."""
         return column_of(attribute, self.attributes, self.robot)
+
+
+_MATCHES = 3
+"""Units that the sample episode keeps for each attribute."""
+
+
+@dataclass(frozen=True)
+class SampleEpisode:
+    """One monitored episode, with the activations of some units only.
+
+    Attributes:
+        seed: Seed of the reset.
+        units: Flat indices of the units, ascending.
+        activations: Activations of these units, shape (T, len(units)).
+        attributes: Attributes in their units, with angles unwrapped, shape (T, J).
+        compared_activations, compared_attributes: Both, at the scale at which the preset compares them.
+    """
+
+    seed: int
+    units: tuple[int, ...]
+    activations: NDArray[np.float32]
+    attributes: Floats
+    compared_activations: Floats
+    compared_attributes: Floats
+
+    def column(self, unit: int) -> int:
+        """Return the column of one of the units that were kept, given by its flat index."""
+        return self.units.index(unit)
+
+
+def pick_sample_episode(
+    episodes: Sequence[MonitoredEpisode],
+    attributes: Sequence[Attribute],
+    matching: Discrepancies,
+    preset: MatchingPreset,
+) -> SampleEpisode:
+    """Return the first episode that matching used, with the units that match each attribute best."""
+    nearest = (matching.ranked_units(column)[:_MATCHES] for column in range(len(matching.discrepancy)))
+    units = sorted({int(unit) for few in nearest for unit in few})
+    few = [replace(one, activations=one.activations[:, units]) for one in usable_episodes(episodes, preset)]
+    compared = unit_series(few, slice(None), preset)[0] if units else few[0].activations
+    return SampleEpisode(
+        few[0].seed,
+        tuple(units),
+        few[0].activations,
+        few[0].attributes,
+        np.asarray(compared, np.float64),
+        attribute_series(few, attributes, preset)[0],
+    )

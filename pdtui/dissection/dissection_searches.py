@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.core.units import Stimulation
-from pdtui.dissection.dissection_settings import DissectionSettings
-from pdtui.probing.effect_probe import EffectProbe
-from pdtui.probing.unit_effects import UnitEffects
+from pdtui.core.worker_pool import StepProgress
+from pdtui.dissection.dissection_config import DissectionSettings
+from pdtui.probing.effect_probe import EffectProbe, UnitEffects
 from pdtui.robots.robot import Robot
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.behavior_goals import STANDING, reachable_goals
@@ -19,7 +19,7 @@ from pdtui.search.controller_search import ControllerGoal, ControllerSearch, Con
 from pdtui.search.imprint_candidates import build_imprint_candidates
 from pdtui.search.plan_search import TimeBudget
 from pdtui.search.shared_candidates import SharedCandidates, draw_random_candidates
-from pdtui.spectra.monitor import StepProgress, monitor_episodes
+from pdtui.spectra.monitor import monitor_episodes
 
 _IMPRINT_SEEDS = 1000
 """Offset of the imprints' seeds from the first seed of a dissection; no other stage uses them."""
@@ -32,9 +32,6 @@ class DissectionSearches:
     """The searches of one dissection, and what they share.
 
     Attributes:
-        prober: runs the roll-outs.
-        robot: the robot.
-        settings: how much to do.
         seed: seed of every random choice.
         budget: shares the time among the searches.
         stage: returns the progress callback of a stage, given its name.

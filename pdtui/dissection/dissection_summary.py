@@ -18,7 +18,6 @@ from pdtui.probing.confirmation import (
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.spectra.matching_presets import preset_values
-from pdtui.stimulation.stimulation_map import MeasuredEffect
 
 
 def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str, Any]:
@@ -96,8 +95,7 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
             **{f"best_{count}": _number(share) for count, share in zip(TOP_MATCHES, rate.best, strict=True)},
             "random": _number(rate.random),
             "rank_correlation": _number(rate.correlation),
-            "held_out_matching": _number(rate.held_out_matching),
-            "held_out_probing": _number(rate.held_out_probing),
+            **_numbers(rate, "held_out_matching", "held_out_probing"),
         },
     }
 
@@ -107,7 +105,7 @@ def _confirmation(dissection: Dissection, column: int, one: PrimitiveConfirmatio
     return {
         "unit": format_unit(one.unit, dissection.layers),
         "value": one.value,
-        **_interval(one.measured),
+        **_numbers(one.measured, "effect", "low", "high"),
         "confirmed": one.confirmed,
         "both_ways": one.both_ways,
         "survived": one.safe_magnitude,
@@ -122,11 +120,10 @@ def _mover(dissection: Dissection, one: AttributeMover) -> dict[str, Any]:
         "attribute": dissection.attributes[one.column].name,
         "direction": "up" if one.sign > 0 else "down",
         "units": one.stimulation.by_address(dissection.layers),
-        **_interval(one.measured),
+        **_numbers(one.measured, "effect", "low", "high"),
         "falls": one.measured.falls,
         "of": one.measured.of,
-        "main": _number(one.main),
-        "side": _number(one.side),
+        **_numbers(one, "main", "side"),
         "side_alone": None if one.alone is None else _number(one.alone),
     }
 
@@ -155,14 +152,8 @@ def _behavior(found: BehaviorSearchResult, layers: tuple[int, ...]) -> dict[str,
         "reached": found.reached,
         "effect": _number(found.change.effect),
         "gain": _number(found.gain.effect),
-        "low": _number(found.gain.low),
-        "high": _number(found.gain.high),
-        "success": found.success,
-        "falls": found.falls,
-        "value": _number(found.value),
-        "unperturbed": _number(found.unperturbed),
-        "score": _number(found.score),
-        "search_score": _number(found.search_score),
+        **_numbers(found.gain, "low", "high"),
+        **_numbers(found, "success", "falls", "value", "unperturbed", "score", "search_score"),
         "rollouts": found.rollouts,
     }
 
@@ -171,21 +162,16 @@ def _controller(found: ControllerSearchResult, layers: tuple[int, ...]) -> dict[
     return {
         "attribute": found.pid.attribute,
         "units": found.weights.by_address(layers),
-        "kp": found.pid.kp,
-        "ki": found.pid.ki,
-        "kd": found.pid.kd,
-        "limit": found.pid.limit,
+        **_numbers(found.pid, "kp", "ki", "kd", "limit"),
         "holds": found.holds,
-        "error": _number(found.error),
-        "uncontrolled": _number(found.uncontrolled),
-        "falls": found.falls,
+        **_numbers(found, "error", "uncontrolled", "falls"),
         "targets": list(found.targets),
         "relative": found.relative,
     }
 
 
-def _interval(measured: MeasuredEffect) -> dict[str, float | None]:
-    return {name: _number(getattr(measured, name)) for name in ("effect", "low", "high")}
+def _numbers(source: object, *names: str) -> dict[str, float | None]:
+    return {name: _number(getattr(source, name)) for name in names}
 
 
 def _number(value: Any) -> float | None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import string
+
 import numpy as np
 
 from pdtui.core.attributes import BehaviorAim
+from pdtui.core.key_table import RESERVED_KEYS
 from pdtui.core.units import Stimulation, describe_units, format_unit
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.key_allocator import KeyAllocator
-from pdtui.probing.confirmation import PrimitiveConfirmation, rank_probed_units
+from pdtui.probing.confirmation import rank_probed_units
 from pdtui.robots.robot_goals import HoldGoal
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
@@ -77,12 +79,23 @@ def _draft_primitives(dissection: Dissection) -> list[MotorPrimitive]:
     primitives = []
     for attribute, name in _primitive_names(dissection).items():
         column = dissection.column(attribute)
-        best = rank_probed_units(column, dissection.screen, dissection.refined, dissection.seed)
+        best_units = rank_probed_units(column, dissection.screen, dissection.refined, dissection.seed)
         # Without a phase there is no ρ, and without ρ no magnitude c: such a unit is no primitive.
         rho = dissection.phase.rho(dissection.preset)[column]
-        known = [one for one in best if one.confirmed and np.isfinite(rho[one.unit])]
-        if known:
-            primitives.append(_draft_primitive(name, attribute, column, known[0], dissection))
+        best = next((one for one in best_units if one.confirmed and np.isfinite(rho[one.unit])), None)
+        if best is not None:
+            discrepancy = float(dissection.matching.discrepancy[column, best.unit])
+            primitives.append(
+                MotorPrimitive(
+                    name,
+                    attribute,
+                    format_unit(best.unit, dissection.layers),
+                    round(float(rho[best.unit]), 4),
+                    float(f"{discrepancy:.4g}") if np.isfinite(discrepancy) else None,
+                    best.value,
+                    best.measured,
+                )
+            )
     return primitives
 
 
@@ -91,21 +104,6 @@ def _primitive_names(dissection: Dissection) -> dict[str, str]:
     names = [attribute.name for attribute in dissection.attributes]
     usual = {attribute: name for attribute, name in dissection.goals.primitives.items() if attribute in names}
     return usual or {names[column]: names[column] for column in dissection.movable}
-
-
-def _draft_primitive(
-    name: str, attribute: str, column: int, best: PrimitiveConfirmation, dissection: Dissection
-) -> MotorPrimitive:
-    discrepancy = float(dissection.matching.discrepancy[column, best.unit])
-    return MotorPrimitive(
-        name,
-        attribute,
-        format_unit(best.unit, dissection.layers),
-        round(float(dissection.phase.rho(dissection.preset)[column, best.unit]), 4),
-        float(f"{discrepancy:.4g}") if np.isfinite(discrepancy) else None,
-        best.value,
-        best.measured,
-    )
 
 
 def _draft_behavior(
@@ -171,3 +169,23 @@ def _draft_controller(found: ControllerSearchResult, dissection: Dissection) -> 
 
 def _hold_goal(found: ControllerSearchResult, dissection: Dissection) -> HoldGoal:
     return next(goal for goal in dissection.goals.holds if goal.attribute == found.pid.attribute)
+
+
+class KeyAllocator:
+    """Hands out keys that are neither reserved nor taken by other behaviors."""
+
+    def __init__(self, taken: set[str]) -> None:
+        self._taken: set[str] = {*taken, *RESERVED_KEYS}
+
+    def take_pair(self, name: str) -> tuple[str, str] | None:
+        """Return a capital letter, for more of something, and its small letter, for less, if any is free.
+
+        The first free letter of the first letters of the name's words, of the name, and of the alphabet. If
+        either case of a letter is taken or reserved, the letter is not free.
+        """
+        initials = "".join(word[0] for word in name.split())
+        for letter in (initials + name).lower() + string.ascii_lowercase:
+            if letter in string.ascii_lowercase and not {letter, letter.upper()} & self._taken:
+                self._taken |= {letter, letter.upper()}
+                return letter.upper(), letter
+        return None

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import NamedTuple
 
 from pdtui.core.errors import RobotError
-from pdtui.dissection.dissection_settings import DissectionSettings
+from pdtui.dissection.dissection_config import DissectionSettings
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import StartState, collect_start_states, measure_walk_lengths
 from pdtui.search.behavior_search import SearchStartStates
@@ -69,8 +70,6 @@ def gather_probe_starts(pool: RolloutPool, settings: DissectionSettings, first_s
     everything = collect_start_states(
         pool.robot, pool.policy, first_seed, total, at=settings.walk_steps, survive=settings.longest_rollout
     )
-    parts, taken = [], 0
-    for count in counts:
-        parts.append(tuple(everything[taken : taken + count]))
-        taken += count
+    remaining = iter(everything)
+    parts = [tuple(islice(remaining, count)) for count in counts]
     return ProbeStarts(parts[0], parts[1], SearchStartStates(*parts[2:]), settings, shortened)

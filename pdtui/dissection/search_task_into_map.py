@@ -88,16 +88,8 @@ def search_task_into_map(
     If the map has a behavior for the task, the search also begins from it, and it is replaced.
 
     Args:
-        robot: Name of the robot.
-        task: Name of one of its tasks.
-        policy: Weights file, or name of a shipped policy.
         output: File of the map.
-        import_options: Answers to what the weights file does not state.
-        seed: Seed of every random choice.
-        workers: Processes that run roll-outs.
         minutes: Time after which the search ends with the best found so far.
-        settings: How much to search.
-        progress: Called with the work done and its total.
 
     Raises:
         MapError: There is no such task, or the map is of another policy or cannot be written.

@@ -7,7 +7,7 @@ difference between both drives of a seed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.events import Event
 from pdtui.core.intervals import confidence_interval
-from pdtui.core.worker_pool import WorkerPool
+from pdtui.core.worker_pool import StepProgress, WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import run_episode
@@ -37,7 +37,6 @@ class BehaviorEvaluation:
     """The effect of one behavior over all seeds.
 
     Attributes:
-        behavior: name of the behavior.
         measure: attribute, its unit and what the behavior aims at.
         effect: mean over seeds of the difference to the policy alone, in the attribute's unit.
         low, high: 95 % interval of `effect` (Student's t over seeds).
@@ -104,19 +103,11 @@ class BehaviorRun:
 
 
 def evaluate_map(
-    config: DriveConfig,
-    seeds: Sequence[int],
-    *,
-    workers: int = 2,
-    progress: Callable[[int, int], None] | None = None,
+    config: DriveConfig, seeds: Sequence[int], *, workers: int = 2, progress: StepProgress | None = None
 ) -> MapEvaluation:
     """Measure every behavior of the map that has an aim or a task.
 
-    Args:
-        config: robot, map and policy; its seed is not used.
-        seeds: seeds of the resets.
-        workers: number of worker processes.
-        progress: called with the number of runs done and the total.
+    The seed of `config` is not used; `progress` is called with the number of runs done and the total.
 
     Raises:
         PdtuiError: the robot, policy or map cannot be loaded.

@@ -1,6 +1,8 @@
-"""The tables of `pdtui evaluate`."""
+"""The tables of `pdtui evaluate` and `pdtui tune`."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from rich.console import Group
 from rich.table import Table
@@ -8,6 +10,9 @@ from rich.table import Table
 from pdtui.core.text_tables import mean_with_interval, new_table, seed_range
 from pdtui.evaluation.behavior_evaluation import MapEvaluation
 from pdtui.evaluation.policy_evaluation import PolicyEvaluation
+from pdtui.search.gain_tuning import TunedGains
+from pdtui.search.step_response import StepResponseSummary
+from pdtui.search.tracking_summary import TrackingSummary
 
 
 def behavior_tables(result: MapEvaluation) -> Group:
@@ -68,3 +73,62 @@ def policy_table(result: PolicyEvaluation) -> Table:
     table.add_row("return", f"{result.mean_return:.0f} ± {result.std_return:.0f}")
     table.add_row("episodes without a fall", f"{result.finished}/{len(result.seeds)}")
     return table
+
+
+def tracking_table(result: TrackingSummary) -> Table:
+    """Return one row per target, and the mean."""
+    unit = result.unit
+    table = new_table(
+        f"{result.behavior}: {result.attribute} ({unit}), {seed_range(result.seeds)}, falls {result.falls}",
+        *(f"target ({unit})", "mean |error|", "last 25 steps"),
+    )
+    for row in result.targets:
+        table.add_row(f"{row.target:+.2f}", f"{row.error:.3f}", f"{row.settled:.3f}")
+    table.add_section()
+    table.add_row("mean", _with_interval(result), f"{result.settled:.3f}")
+    if result.default_error is not None:
+        table.add_row("without control", f"{result.default_error:.3f}", "")
+    responses = result.responses
+    table.caption = (
+        f"Rise time {_rise(responses)} s; {responses.unrisen} of {responses.steps} steps not risen; "
+        f"overshoot {_overshoot(responses)}."
+    )
+    return table
+
+
+def tuned_table(results: list[TunedGains]) -> Group:
+    """Return the gains and figures of each behavior, before and after tuning."""
+    return Group(*(part for result in results for part in (_gains_table(result), result.verdict)))
+
+
+def _gains_table(result: TunedGains) -> Table:
+    before = result.before
+    title = f"{result.behavior}: {before.attribute}, {seed_range(before.seeds)}"
+    table = new_table(title, "", "in the map", "best found")
+    for name in ("kp", "ki", "kd", "limit"):
+        table.add_row(name, *(f"{getattr(pid, name):.3g}" for pid in (result.old, result.new)))
+    table.add_section()
+    add_tracking_figures(table, [before, result.after])
+    return table
+
+
+def add_tracking_figures(table: Table, columns: Sequence[TrackingSummary]) -> None:
+    unit, responses = columns[0].unit, [one.responses for one in columns]
+    table.add_row(f"mean |error| ({unit})", *(_with_interval(one) for one in columns))
+    table.add_row("over the last 25 steps", *(f"{one.settled:.3f}" for one in columns))
+    table.add_row("rise time (s)", *map(_rise, responses))
+    table.add_row("steps not risen", *(f"{one.unrisen} of {one.steps}" for one in responses))
+    table.add_row("overshoot", *map(_overshoot, responses))
+    table.add_row("falls", *(f"{one.falls} of {len(one.seeds)}" for one in columns))
+
+
+def _with_interval(figures: TrackingSummary) -> str:
+    return mean_with_interval(figures.error, figures.low, figures.high, ".3f")
+
+
+def _rise(responses: StepResponseSummary) -> str:
+    return "–" if responses.rise is None else f"{responses.rise:.2f}"
+
+
+def _overshoot(responses: StepResponseSummary) -> str:
+    return "–" if responses.overshoot is None else f"{responses.overshoot:.0%}"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import run_episode
@@ -18,7 +19,6 @@ class PolicyEvaluation:
     """The performance of a policy without stimulation.
 
     Attributes:
-        seeds: seeds of the episodes.
         steps: control steps per episode.
         mean_speed: mean of |v| over all steps, m/s; None for a robot without the attribute ``speed``.
         net_speed: distance between start and end over time, mean over episodes, m/s; None for a robot
@@ -41,15 +41,12 @@ def evaluate_policy(
     seeds: Sequence[int],
     *,
     steps: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: StepProgress | None = None,
 ) -> PolicyEvaluation:
     """Run the policy without stimulation for one episode per seed.
 
-    Args:
-        config: robot, map, policy and start; its seed is not used.
-        seeds: seeds of the episodes.
-        steps: control steps per episode; None for the robot's default.
-        progress: called with the number of episodes done and the total.
+    Episodes begin at the start of `config`, whose seed is not used, and last the robot's usual number of
+    control steps unless `steps` is given.
 
     Raises:
         PdtuiError: the robot, policy or map cannot be loaded.

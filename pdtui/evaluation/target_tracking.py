@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from pdtui.core.errors import MapError
+from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveRunner
 from pdtui.search.tracking_summary import (
@@ -24,17 +25,12 @@ def evaluate_tracking(
     *,
     targets: Sequence[float] = (),
     workers: int = 1,
-    progress: Callable[[int, int], None] | None = None,
+    progress: StepProgress | None = None,
 ) -> TrackingSummary:
     """Drive every seed through the targets, 100 control steps each, with the PID behavior and without.
 
-    Args:
-        config: robot, map and policy; its seed is not used.
-        attribute: name of the attribute to hold.
-        seeds: seeds of the resets.
-        targets: targets in the attribute's unit; empty for those of `choose_tracking_targets`.
-        workers: number of worker processes.
-        progress: called with the number of drives done and the total.
+    The targets are in the attribute's unit, and by default those of `choose_tracking_targets`. The seed of
+    `config` is not used.
 
     Raises:
         MapError: the map has no behavior of mode ``pid`` for the attribute.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pdtui.core.attributes import Floats, unwrap_angles
+from pdtui.core.attributes import unwrap_angles
 from pdtui.core.events import Event
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import run_episode
@@ -21,8 +21,6 @@ class TaskEvaluation:
     """The success of one behavior over all seeds.
 
     Attributes:
-        behavior: name of the behavior.
-        task: name of its task.
         wanted: what counts as success.
         done: number of seeds with success with the behavior.
         by_itself: number of seeds with success without it.
@@ -68,14 +66,9 @@ def run_task(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bo
     fell = records[-1].fell
     if len(rows) <= walk + 1:
         return TaskRun(TaskVerdict(False, 0.0, {}), fell)
-    return TaskRun(_judge(task, loop, np.array(rows), walk, fell), fell)
-
-
-def _judge(task: Task, loop: ControlLoop, rows: Floats, walk: int, fell: bool) -> TaskVerdict:
-    attributes = loop.robot.attributes
-    return task.judge(
-        RunTrace(attributes, rows[: walk + 1], unwrap_angles(rows[walk + 1 :], attributes), fell)
-    )
+    attributes, values = loop.robot.attributes, np.array(rows)
+    trace = RunTrace(attributes, values[: walk + 1], unwrap_angles(values[walk + 1 :], attributes), fell)
+    return TaskRun(task.judge(trace), fell)
 
 
 def summarise_task(

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from rich.table import Table
 
 from pdtui.core.errors import RobotError
 from pdtui.core.events import Event
 from pdtui.core.intervals import confidence_interval
+from pdtui.core.text_tables import mean_with_interval, new_table, seed_range
+from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import run_episode
 from pdtui.driving.loop_builder import build_loop
-from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
+from pdtui.stimulation.stimulation_map import Behavior
 
 SETTLED = 100
 """Control steps at the start of an episode that do not count: the robot has to get into its gait."""
@@ -24,12 +26,10 @@ _ASKED = "asked"
 
 @dataclass(frozen=True)
 class CommandTracking:
-    """How closely one command is followed, over all seeds.
+    """How closely one command is followed: mean |attribute − command| and its 95 % interval over seeds.
 
     Attributes:
-        command, unit: name and unit of the command.
         asked: value of the command on each seed.
-        error, low, high: mean |attribute − command| over steps and seeds, with its 95 % interval over seeds.
         bias: mean over seeds of |mean attribute − command|, which averages the gait out.
     """
 
@@ -47,10 +47,8 @@ class CommandFollowingResult:
     """How closely a policy follows its commands.
 
     Attributes:
-        robot, policy: names of robot and policy.
         seeds: seeds of the episodes; each draws its own commands.
         steps: control steps per episode; the first 100 do not count.
-        commands: result of each command.
         finished: number of episodes without a fall.
     """
 
@@ -61,13 +59,9 @@ class CommandFollowingResult:
     commands: tuple[CommandTracking, ...]
     finished: int
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return what ``--json`` prints."""
-        return asdict(self)
-
 
 def evaluate_command_following(
-    config: DriveConfig, seeds: Sequence[int], *, progress: Callable[[int, int], None] | None = None
+    config: DriveConfig, seeds: Sequence[int], *, progress: StepProgress | None = None
 ) -> CommandFollowingResult:
     """Run an episode per seed with constant commands, drawn from the ranges of the training.
 
@@ -82,13 +76,14 @@ def evaluate_command_following(
         raise RobotError(f"{robot.name}: it takes no commands")
     columns = [robot.attribute_index(one.attribute) for one in ranges.values()]
     asked, errors, biases, finished = [], [], [], 0
+    press = {0: [Event(0, "behavior", _ASKED)]}
     for done, seed in enumerate(seeds, start=1):
         rng = np.random.default_rng(seed)
         wanted = np.array([rng.uniform(one.low, one.high) for one in ranges.values()])
-        loop = ControlLoop(
-            robot, policy, _map_with_commands(built.map, dict(zip(ranges, wanted, strict=True))), seed
-        )
-        records = list(run_episode(loop, robot.episode_steps, _press_at_start))
+        behavior = Behavior(_ASKED, "a", "sets commands", {}, commands=dict(zip(ranges, wanted, strict=True)))
+        only_commands = replace(built.map, primitives={}, behaviors={_ASKED: behavior})
+        loop = ControlLoop(robot, policy, only_commands, seed)
+        records = list(run_episode(loop, robot.episode_steps, lambda step: press.get(step, [])))
         values = [record.attributes[columns] for record in records]
         settled = np.array(values[SETTLED:] or values[-1:])
         asked.append(wanted)
@@ -115,11 +110,19 @@ def evaluate_command_following(
     )
 
 
-def _press_at_start(step: int) -> list[Event]:
-    return [Event(0, "behavior", _ASKED)] if step == 0 else []
-
-
-def _map_with_commands(shipped: StimulationMap, commands: dict[str, float]) -> StimulationMap:
-    """Return the map with a single behavior, which sets these commands."""
-    behavior = Behavior(_ASKED, "a", "sets commands", {}, commands=commands)
-    return replace(shipped, primitives={}, behaviors={_ASKED: behavior})
+def commands_table(result: CommandFollowingResult) -> Table:
+    """Return a table with one row per command."""
+    table = new_table(
+        f"{result.robot}, policy {result.policy}, {seed_range(result.seeds)}, {result.steps} steps each",
+        *("command", "asked", "mean |error| [95 %]", "without the gait", "falls"),
+    )
+    count = len(result.seeds)
+    for row in result.commands:
+        table.add_row(
+            f"{row.command} ({row.unit})",
+            f"{min(row.asked):+.2f} to {max(row.asked):+.2f}",
+            mean_with_interval(row.error, row.low, row.high, ".3f"),
+            f"{row.bias:.3f}",
+            f"{count - result.finished}/{count}",
+        )
+    return table

@@ -29,11 +29,8 @@ class ExperimentRequest:
 
     Attributes:
         configs: robot, map and policy of each map to measure.
-        seeds: seeds of the drives.
-        workers: number of worker processes.
         pictures, overwrite: picture files to write, and whether they may replace existing ones.
         options: those of the experiment's own options that were given, by parameter name.
-        progress: called with the number of drives done and the total.
     """
 
     configs: Sequence[DriveConfig]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,7 @@ def run_forest_experiment(request: ExperimentRequest) -> ExperimentReport:
     result = evaluate_forest(
         request.configs[0], request.seeds, workers=request.workers, progress=request.progress, **options
     )
-    return ExperimentReport(result.as_dict(), forest_table(result))
+    return ExperimentReport(asdict(result), forest_table(result))
 
 
 def forest_table(result: ForestExperimentResult) -> Group:

@@ -6,7 +6,7 @@ command which the policy was trained to follow, and by a PID that sets the outpu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -15,6 +15,7 @@ from scipy import stats
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
+from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.target_tracking import find_pid_behaviors
 from pdtui.search.tracking_drives import STEPS_EACH, TrackingDrive, TrackingDriveResult, TrackingDriveRunner
@@ -44,12 +45,9 @@ class HeadingControllerResult:
     """The result of one behavior that holds the heading.
 
     Attributes:
-        map: file of its map.
-        robot, policy: names of robot and policy.
         input_kind: whether the PID sets commands, units or both.
         inputs: names of the commands and units that it sets.
         other_commands: the commands that it leaves alone, and their values.
-        tracking: how precisely it holds the targets.
         ratio: its error over that of the map's behavior by command; None for that one, and without one.
         headings: heading per seed and control step, rad, shape (seeds, targets × 100); NaN after a fall.
     """
@@ -118,16 +116,11 @@ def compare_heading_precision(
     *,
     targets: Sequence[float] = HEADINGS,
     workers: int = 1,
-    progress: Callable[[int, int], None] | None = None,
+    progress: StepProgress | None = None,
 ) -> HeadingPrecisionComparison:
     """Hold headings with every behavior of the maps that has a PID on the yaw angle.
 
-    Args:
-        configs: robots, maps and policies; their seeds are not used.
-        seeds: seeds of the resets.
-        targets: target headings, 100 control steps each, rad.
-        workers: number of worker processes.
-        progress: called with the number of drives done and the total.
+    The targets, in rad, are held for 100 control steps each. The seeds of the configurations are not used.
 
     Raises:
         MapError: a map has no such behavior, or the robots' control steps differ in duration.

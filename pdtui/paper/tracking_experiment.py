@@ -60,7 +60,7 @@ def heading_figure(result: HeadingPrecisionComparison) -> HeadingFigure:
 def heading_precision_table(result: HeadingPrecisionComparison) -> Table:
     """Return a table with one column per behavior, map by map."""
     from pdtui.core.text_tables import mean_with_interval, new_table, seed_range
-    from pdtui.evaluation.tracking_tables import add_tracking_figures
+    from pdtui.evaluation.evaluation_tables import add_tracking_figures
     from pdtui.search.tracking_drives import STEPS_EACH
 
     table = new_table(

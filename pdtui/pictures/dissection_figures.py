@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.pictures.all_attributes import draw_matching_hits, draw_side_effects
-from pdtui.pictures.attribute_figure import draw_effect_key, draw_effects, draw_ranking, draw_spectrograms
+from pdtui.dissection.dissection_summary import summarise_dissection
+from pdtui.pictures.attribute_plots import draw_effect_key, draw_effects, draw_ranking, draw_spectrograms
+from pdtui.pictures.dissection_chart_data import side_effect_matrix
 from pdtui.pictures.matplotlib_page import figure_page, policy_title
+from pdtui.pictures.plot_colors import GREEN, GREY, VERMILLION, diverging, to_hex
+from pdtui.probing.confirmation import TOP_MATCHES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+_MATCHED, _PROBED, _FAINT = to_hex(VERMILLION), to_hex(GREEN), to_hex(GREY)
+
 
 _A_PAGE = 8
 """Attributes per page."""
@@ -23,18 +32,17 @@ NAMES = ("spectrograms", "discrepancies", "effects", "side-effects", "hit-rates"
 
 
 def draw_dissection_figures(folder: Path, dissection: Dissection) -> list[Path]:
-    """Draw all figures into a folder; files of the same names are replaced.
-
-    Returns:
-        The files.
+    """Draw all figures into a folder, replace files of the same names, and return the files.
 
     Raises:
         PictureError: A file cannot be written.
     """
-    columns = range(len(dissection.attributes))
-    written = _draw_pages(folder, dissection, "spectrograms", columns, _spectrograms)
-    written += _draw_pages(folder, dissection, "discrepancies", columns, _discrepancies)
-    written += _draw_pages(folder, dissection, "effects", columns, _effects)
+    columns, written = range(len(dissection.attributes)), list[Path]()
+    pages = [columns[first : first + _A_PAGE] for first in range(0, len(columns), _A_PAGE)]
+    for name, draw_page in zip(NAMES, (_draw_spectrograms, _draw_rankings, _draw_effects), strict=False):
+        for number, page in enumerate(pages, start=1):
+            written.append(folder / (f"{name}.png" if len(pages) == 1 else f"{name}-{number}.png"))
+            draw_page(written[-1], dissection, page)
     for name, draw in (("side-effects", draw_side_effects), ("hit-rates", draw_matching_hits)):
         written.append(folder / f"{name}.png")
         draw(written[-1], dissection)
@@ -48,72 +56,111 @@ def existing_figures(folder: Path) -> list[Path]:
     )
 
 
-@dataclass(frozen=True)
-class _Sheet:
-    """One page of panels: its file and the attributes on it."""
-
-    path: Path
-    columns: tuple[int, ...]
-
-
-def _draw_pages(
-    folder: Path,
-    dissection: Dissection,
-    stem: str,
-    columns: Sequence[int],
-    draw: Callable[[_Sheet, Dissection], None],
-) -> list[Path]:
-    pages = [tuple(columns[first : first + _A_PAGE]) for first in range(0, len(columns), _A_PAGE)]
-    sheets = [
-        _Sheet(folder / (f"{stem}.png" if len(pages) == 1 else f"{stem}-{number}.png"), few)
-        for number, few in enumerate(pages, 1)
-    ]
-    for sheet in sheets:
-        draw(sheet, dissection)
-    return [sheet.path for sheet in sheets]
+@contextmanager
+def _panel_page(
+    path: Path, count: int, row_height: float, title: str, margin: float = 0.5
+) -> Iterator[tuple[Figure, list[Axes]]]:
+    """Yield a page and its panels, four in a row."""
+    rows = -(-count // 4)
+    with figure_page(path, margin + row_height * rows, title) as figure:
+        panels = list(figure.subplots(rows, 4, squeeze=False).flat)
+        for panel in panels[count:]:
+            panel.set_axis_off()
+        yield figure, panels[:count]
 
 
-def _grid(figure: Figure, count: int, across: int) -> list[Axes]:
-    """Return the panels of a page, row by row; there may be more than `count`."""
-    rows = -(-count // across)
-    return list(figure.subplots(rows, across, squeeze=False).flat)
-
-
-def _height(count: int, across: int, row: float) -> float:
-    return 0.5 + row * -(-count // across)
-
-
-def _spectrograms(sheet: _Sheet, dissection: Dissection) -> None:
-    count = len(sheet.columns)
+def _draw_spectrograms(path: Path, dissection: Dissection, columns: Sequence[int]) -> None:
     title = f"{policy_title(dissection)}: spectrograms of attributes and of their best matches"
-    with figure_page(sheet.path, _height(count, 2, 1.55), title) as figure:
-        panels = _grid(figure, 2 * count, 4)
-        for number, column in enumerate(sheet.columns):
-            draw_spectrograms(figure, panels[2 * number], panels[2 * number + 1], dissection, column)
-        _clear(panels[2 * count :])
+    with _panel_page(path, 2 * len(columns), 1.55, title) as (figure, panels):
+        for column, left, right in zip(columns, panels[::2], panels[1::2], strict=True):
+            draw_spectrograms(figure, left, right, dissection, column)
 
 
-def _discrepancies(sheet: _Sheet, dissection: Dissection) -> None:
-    count, title = len(sheet.columns), f"{policy_title(dissection)}: discrepancy of the nearest units"
-    with figure_page(sheet.path, _height(count, 4, 1.9), title) as figure:
-        panels = _grid(figure, count, 4)
-        for panel, column in zip(panels, sheet.columns, strict=False):
+def _draw_rankings(path: Path, dissection: Dissection, columns: Sequence[int]) -> None:
+    title = f"{policy_title(dissection)}: discrepancy of the nearest units"
+    with _panel_page(path, len(columns), 1.9, title) as (_, panels):
+        for panel, column in zip(panels, columns, strict=True):
             draw_ranking(panel, dissection, column)
         panels[0].set_ylabel("unit")
-        _clear(panels[count:])
 
 
-def _effects(sheet: _Sheet, dissection: Dissection) -> None:
-    count = len(sheet.columns)
+def _draw_effects(path: Path, dissection: Dissection, columns: Sequence[int]) -> None:
     title = f"{policy_title(dissection)}: effect of single units, mean and 95 % interval"
-    with figure_page(sheet.path, _height(count, 4, 1.8) + 0.25, title) as figure:
-        panels = _grid(figure, count, 4)
-        for panel, column in zip(panels, sheet.columns, strict=False):
+    with _panel_page(path, len(columns), 1.8, title, margin=0.75) as (figure, panels):
+        for panel, column in zip(panels, columns, strict=True):
             draw_effects(panel, dissection, column)
-        _clear(panels[count:])
         draw_effect_key(figure)
 
 
-def _clear(panels: Sequence[Axes]) -> None:
-    for panel in panels:
-        panel.set_axis_off()
+def draw_side_effects(target: Path | BytesIO, dissection: Dissection) -> None:
+    """Draw units × attributes as a heat map for each sign of the output."""
+    effects = side_effect_matrix(dissection)
+    title = f"{policy_title(dissection)}: side effects of single units"
+    rows = max(1, len(effects.by_value))
+    with figure_page(target, 0.6 + rows * (0.6 + 0.155 * len(effects.attributes)), title) as figure:
+        panels = list(figure.subplots(rows, 1, squeeze=False).flat)
+        for panel, (value, matrix) in zip(panels, effects.by_value.items(), strict=False):
+            panel.imshow(diverging(matrix.T, effects.limit), aspect="auto", interpolation="nearest")
+            panel.set_title(f"output held at v = {value:g}")
+            panel.set_yticks(range(len(effects.attributes)), effects.attributes)
+            panel.set_xticks(range(len(effects.units)), effects.units, rotation=90)
+            panel.tick_params(axis="x", labelsize=min(7.0, 420.0 / max(1, len(effects.units))))
+            panel.set_xlabel("unit")
+        _colorbar(figure, panels, effects.limit)
+
+
+def _colorbar(figure: Figure, panels: Sequence[Axes], limit: float) -> None:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
+    shades = diverging(np.linspace(-limit, limit, 201), limit) / 255
+    bar = figure.colorbar(
+        ScalarMappable(Normalize(-limit, limit), ListedColormap(shades)),
+        ax=list(panels),
+        aspect=40,
+        pad=0.015,
+        extend="both",
+    )
+    bar.set_label("change, in standard deviations of the attribute")
+
+
+def draw_matching_hits(target: Path | BytesIO, dissection: Dissection) -> None:
+    """Draw how well matching finds the units that probing finds, one row per attribute."""
+    attributes = summarise_dissection(dissection)["attributes"]
+    names = [attribute["name"] for attribute in attributes]
+    hits = [attribute["hits"] for attribute in attributes]
+    places = np.arange(len(names))
+    with figure_page(
+        target, 1.1 + 0.19 * len(names), f"{policy_title(dissection)}: how well matching finds units that act"
+    ) as figure:
+        left, right = figure.subplots(1, 2, sharey=True)
+        width = 0.8 / (1 + len(TOP_MATCHES))
+        shades = ("#c85200", "#ff9a4d", "#ffc79b")
+        bars = [("first", "first match"), *((f"best_{one}", f"first {one} matches") for one in TOP_MATCHES)]
+        for number, (key, label) in enumerate(bars):
+            shares = 100 * np.array([_or_nan(hit[key]) for hit in hits])
+            offset = (number - len(TOP_MATCHES) / 2) * width
+            left.barh(places + offset, shares, width, color=shades[number], label=label)
+        random = 100 * np.array([_or_nan(hit["random"]) for hit in hits])
+        left.plot(random, places, "|", color="black", markersize=9, label="a unit drawn at random")
+        left.set(xlabel="hits (%)", xlim=(0, 102), title="Share among the strongest tenth")
+        left.set_yticks(places, names)
+        left.invert_yaxis()
+        for key, label, color, marker in (
+            ("held_out_matching", "ranked by matching", _MATCHED, "o"),
+            ("held_out_probing", "ranked by probing", _PROBED, "s"),
+        ):
+            right.plot(
+                [_or_nan(hit[key]) for hit in hits], places, marker, color=color, markersize=4, label=label
+            )
+        right.axvline(0, color=_FAINT, linewidth=0.6)
+        right.set(xlabel="rank correlation with the effect on other starts", xlim=(-1.05, 1.05))
+        right.set_title(f"Held out: {len(dissection.controls)} units drawn at random")
+        for panel in (left, right):
+            panel.grid(axis="y", linewidth=0.3, alpha=0.5)
+            panel.set_axisbelow(True)
+            panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
+
+
+def _or_nan(value: float | None) -> float:
+    return float("nan") if value is None else float(value)

@@ -1,9 +1,10 @@
-"""The report of a dissection: a recording that opens laid out in the Rerun viewer."""
+"""The report of a dissection, a recording that opens laid out in the Rerun viewer, and where pictures go."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -14,23 +15,29 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from pdtui.core.atomic_file import check_writable
+from pdtui.core.errors import PictureError
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.pictures.all_attributes import draw_matching_hits, draw_side_effects
-from pdtui.pictures.attribute_figure import draw_attribute_page
-from pdtui.pictures.chart_data import (
+from pdtui.dissection.dissection_tables import dissection_remarks, dissection_tables
+from pdtui.pictures.attribute_plots import draw_attribute_page
+from pdtui.pictures.dissection_chart_data import (
     effect_curves,
-    matched_pair,
-    sample_times,
+    matched_spectrograms,
     side_effect_matrix,
     unit_ranking,
 )
-from pdtui.pictures.markdown_report import dissection_markdown
+from pdtui.pictures.dissection_figures import (
+    draw_dissection_figures,
+    draw_matching_hits,
+    draw_side_effects,
+    existing_figures,
+)
 from pdtui.pictures.plot_colors import ORANGE, SKY, RgbColor
-from pdtui.pictures.report_file import open_report_file
+from pdtui.pictures.report_file import TIME, open_report_file, rows_to_markdown, table_to_markdown
 from pdtui.sessions.environment_versions import collect_versions
 
-APP, TIME = "pdtui-dissection", "time"
+APP = "pdtui-dissection"
 PROPERTY, VERSIONS = "dissection", "versions"
 SUMMARY, SIDE_EFFECTS, HIT_RATES, ATTRIBUTES = "/summary", "/side_effects", "/hit_rates", "/attributes"
 Log = Callable[[str, Any], None]
@@ -64,15 +71,14 @@ def write_dissection_report(path: Path, dissection: Dissection) -> None:
         _log_overviews(log, dissection)
 
 
-def _layout(dissection: Dissection) -> rrb.Blueprint:
+def _layout(dissection: Dissection) -> rrb.Tabs:
     """Tabs: the tables, the figures of all attributes, and each attribute."""
-    tabs = rrb.Tabs(
+    return rrb.Tabs(
         rrb.TextDocumentView(origin=SUMMARY, name="Summary"),
         rrb.Spatial2DView(origin=SIDE_EFFECTS, name="Side effects"),
         rrb.Spatial2DView(origin=HIT_RATES, name="Matching against probing"),
         *(_attribute_tab(dissection, column) for column in range(len(dissection.attributes))),
     )
-    return rrb.Blueprint(tabs, rrb.TimePanel(timeline=TIME, state="hidden"), collapse_panels=True)
 
 
 def _attribute_tab(dissection: Dissection, column: int) -> rrb.Vertical:
@@ -128,10 +134,12 @@ def _log_episode(recording: rr.RecordingStream, log: Log, dissection: Dissection
     episode, attribute = dissection.sample_episode, dissection.attributes[column]
     series: dict[str, tuple[NDArray[np.floating], str, RgbColor]] = {}
     series["attribute"] = (episode.attributes[:, column], f"{attribute.name} ({attribute.unit})", SKY)
-    pair = matched_pair(dissection, column)
+    pair = matched_spectrograms(dissection, column)
     if pair is not None:
         series["unit"] = (episode.activations[:, episode.column(pair.unit)], f"unit {pair.label}", ORANGE)
-    times = rr.TimeColumn(TIME, duration=sample_times(episode, dissection.dt))
+    # Row t is the state after control step t.
+    seconds = (np.arange(len(episode.attributes), dtype=np.float64) + 1) * dissection.dt
+    times = rr.TimeColumn(TIME, duration=seconds)
     for part, (values, name, color) in series.items():
         entity = _attribute_entity(dissection, column, f"episode/{part}")
         log(entity, rr.SeriesLines(names=[name], colors=[color], widths=[1.5]))
@@ -147,3 +155,67 @@ def _log_overviews(log: Log, dissection: Dissection) -> None:
         entity = f"/side_effect_numbers/{rr.escape_entity_path_part(f'v = {value:g}')}"
         log(entity, rr.Tensor(matrix, dim_names=("unit", "attribute")))
         log(entity, rr.AnyValues(units=pa.array(effects.units), attributes=pa.array(effects.attributes)))
+
+
+def dissection_markdown(dissection: Dissection) -> str:
+    """Return everything that the terminal prints about a dissection, and its origin, as Markdown."""
+    summary = summarise_dissection(dissection)
+    parts = [f"# Dissection of {summary['policy']} on {summary['robot']}", _origin(dissection, summary)]
+    parts += [table_to_markdown(table) for table in dissection_tables(summary)]
+    parts += ["## Remarks", "\n".join(f"- {line}" for line in dissection_remarks(summary))]
+    return "\n\n".join(parts) + "\n"
+
+
+def _origin(dissection: Dissection, summary: dict[str, Any]) -> str:
+    preset, dt = dissection.preset, dissection.dt
+    versions = collect_versions()
+    episodes = ", ".join(str(seed) for seed in summary["episodes"])
+    rows = [
+        ("policy", f"{summary['policy']}, SHA-256 `{summary['sha256']}`"),
+        ("hidden layers", " · ".join(f"{width} units" for width in dissection.layers)),
+        (
+            "seed",
+            f"{summary['seed']}; episodes of seeds {episodes}, pictured: {dissection.sample_episode.seed}",
+        ),
+        (
+            "spectrum",
+            f"preset `{preset}`: {preset.window.title()} window of {preset.length} steps, hop "
+            f"{preset.hop}; {dt:g} s per step",
+        ),
+        ("probed", f"{summary['rollouts']} roll-outs, {summary['control_steps']} control steps"),
+        ("versions", ", ".join(f"{name} {versions[name]}" for name in ("pdtui", "mujoco", "torch", "numpy"))),
+    ]
+    return rows_to_markdown(["", ""], rows)
+
+
+@dataclass(frozen=True)
+class PictureOutputs:
+    """Where the pictures of one dissection go.
+
+    Attributes:
+        report: File of the report, a recording.
+        figures: Folder of the PNG files; None draws none.
+        overwrite: Whether existing files are replaced.
+    """
+
+    report: Path
+    figures: Path | None
+    overwrite: bool
+
+    def check(self) -> None:
+        """Raise a `PictureError`, before minutes of work, if a file exists already or cannot be written."""
+        if self.report.suffix != ".rrd":
+            raise PictureError(f"{self.report}: expected a name that ends in .rrd; the viewer opens no other")
+        found = [self.report] if self.report.exists() else []
+        if self.figures is not None:
+            found += existing_figures(self.figures)
+        if found and not self.overwrite:
+            raise PictureError(f"{found[0]}: exists already; --overwrite replaces it")
+        for path in (self.report, *([] if self.figures is None else [self.figures / "figure.png"])):
+            check_writable(path, PictureError)
+
+    def draw(self, dissection: Dissection) -> list[Path]:
+        """Write the pictures, and return their files; a `PictureError` says which one cannot be written."""
+        write_dissection_report(self.report, dissection)
+        figures = [] if self.figures is None else draw_dissection_figures(self.figures, dissection)
+        return [self.report, *figures]

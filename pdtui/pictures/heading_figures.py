@@ -16,12 +16,11 @@ from rich.table import Table
 from pdtui.core.attributes import Floats, wrap_angles
 from pdtui.core.errors import PictureError
 from pdtui.core.printable_text import to_json
-from pdtui.pictures.markdown_report import table_to_markdown
 from pdtui.pictures.matplotlib_page import figure_page
 from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, to_hex
-from pdtui.pictures.report_file import open_report_file
+from pdtui.pictures.report_file import TIME, open_report_file, table_to_markdown
 
-APP, TIME = "pdtui-tracking", "time"
+APP = "pdtui-tracking"
 PROPERTY = "tracking"
 _BAND = (5.0, 95.0)
 """Percentiles of the seeds between which the band is drawn."""
@@ -123,17 +122,13 @@ def draw_heading_pictures(paths: Sequence[Path], shown: HeadingFigure) -> None:
     """
     for path in paths:
         if path.suffix == ".png":
-            draw_heading_figure(path, shown)
+            _draw_heading_figure(path, shown)
         else:
-            write_heading_recording(path, shown)
+            _write_heading_recording(path, shown)
 
 
-def draw_heading_figure(path: Path, shown: HeadingFigure) -> None:
-    """Draw headings over their target, with the middle 90 % of seeds, and below them the mean |error|.
-
-    Raises:
-        PictureError: The file cannot be written.
-    """
+def _draw_heading_figure(path: Path, shown: HeadingFigure) -> None:
+    """Draw headings over their target, with the middle 90 % of seeds, and below them the mean |error|."""
     times: Floats = np.arange(len(shown.target), dtype=np.float64) * shown.dt
     with figure_page(path, 4.2, shown.title) as figure:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
@@ -153,12 +148,8 @@ def draw_heading_figure(path: Path, shown: HeadingFigure) -> None:
         figure.legend(*legend, loc="outside lower left", ncols=min(3, len(legend[0])))
 
 
-def write_heading_recording(path: Path, shown: HeadingFigure) -> None:
-    """Write the same as a recording: headings, errors, the table, and ``--json`` as a property.
-
-    Raises:
-        PictureError: The file cannot be written.
-    """
+def _write_heading_recording(path: Path, shown: HeadingFigure) -> None:
+    """Write the same as a recording: headings, errors, the table, and ``--json`` as a property."""
     moments = rr.TimeColumn(TIME, duration=np.arange(len(shown.target)) * shown.dt)
     with open_report_file(path, APP, _layout(shown)) as recording:
 
@@ -184,8 +175,8 @@ def write_heading_recording(path: Path, shown: HeadingFigure) -> None:
             curve(f"{_ERRORS}/{part}", one.error, name, one.color, 1.5)
 
 
-def _layout(shown: HeadingFigure) -> rrb.Blueprint:
-    views = rrb.Vertical(
+def _layout(shown: HeadingFigure) -> rrb.Vertical:
+    return rrb.Vertical(
         rrb.TimeSeriesView(
             origin=_HEADINGS, name=f"Heading (rad), mean and middle 90 % of {shown.seeds} seeds"
         ),
@@ -196,4 +187,3 @@ def _layout(shown: HeadingFigure) -> rrb.Blueprint:
         ),
         row_shares=[3, 2],
     )
-    return rrb.Blueprint(views, rrb.TimePanel(timeline=TIME, state="hidden"), collapse_panels=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from pdtui.core.intervals import bootstrap_interval
-from pdtui.probing.unit_effects import UnitEffects
+from pdtui.probing.effect_probe import UnitEffects
 from pdtui.spectra.matching import Discrepancies
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
@@ -100,11 +100,8 @@ def confirm_unit(
     """Judge one unit by its refined effects.
 
     Args:
-        unit: flat index of one of the refined units.
-        column: index of the attribute.
         screening: effects of every unit at a few values.
         refinement: effects of some units at those values and more, from other starts.
-        seed: seed of the bootstrap.
     """
     row = refinement.units.index(unit)
     shared = [dose for dose, value in enumerate(refinement.values) if value in screening.values]
@@ -146,9 +143,6 @@ def measure_matching_hits(
     """Compare the ranking by discrepancy with the effects that probing measured.
 
     Args:
-        column: index of the attribute.
-        screening: effects of every unit.
-        matching: the ranking.
         refinement: effects of some units from other starts.
         controls: those of the refined units that were drawn at random.
     """

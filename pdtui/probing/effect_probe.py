@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
+from pdtui.core.worker_pool import StepProgress
 from pdtui.probing.rollout_journal import RolloutJournal, fingerprint_start_state
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, RolloutPlan
-from pdtui.probing.unit_effects import UnitEffects
-from pdtui.spectra.monitor import StepProgress
 
 
 @dataclass(frozen=True)
@@ -37,6 +36,58 @@ class PlanEffects:
     unperturbed: Floats
     falls: NDArray[np.bool_]
     errors: Floats
+
+
+@dataclass(frozen=True)
+class UnitEffects:
+    """Effects of N units, overwritten with D values from K starts, on J attributes.
+
+    Attributes:
+        units: flat indices of the units.
+        values: the values v with which each unit is overwritten.
+        effects: change of each attribute against the unperturbed roll-out, shape (N, D, K, J), as in
+            `PlanEffects`.
+        falls: whether the robot fell, shape (N, D, K).
+        unperturbed: means of the attributes without stimulation, shape (K, J).
+    """
+
+    units: tuple[int, ...]
+    values: tuple[float, ...]
+    effects: Floats
+    falls: NDArray[np.bool_]
+    unperturbed: Floats
+
+    def robust_effects(self, column: int, sign: float) -> Floats:
+        """Return the weakest effect over all starts in the direction of `sign`, shape (N, D).
+
+        It is negative where the effect from a start has the other sign, and at most 0 where the robot fell.
+        """
+        weakest = np.min(sign * np.nan_to_num(self.effects[..., column]), axis=-1)
+        return np.asarray(np.where(self.falls.any(axis=-1), np.minimum(weakest, 0.0), weakest))
+
+    def robust_strengths(self, column: int) -> Floats:
+        """Return the largest robust effect of each unit over its values and both directions, shape (N,)."""
+        both = np.maximum(self.robust_effects(column, 1.0), self.robust_effects(column, -1.0))
+        strengths: Floats = np.maximum(both.max(axis=1), 0.0)
+        return strengths
+
+    def mean_strengths(self, column: int, values: Sequence[float]) -> Floats:
+        """Return the largest mean effect of each unit over the starts, in size, at some values, shape (N,).
+
+        Unlike `robust_strengths` it does not require one sign from every start, so it ranks weak units too.
+        A fall counts as no effect.
+        """
+        doses = [self.values.index(value) for value in values]
+        effects = np.where(self.falls, 0.0, np.nan_to_num(self.effects[..., column]))[:, doses]
+        strengths: Floats = np.abs(effects.mean(axis=-1)).max(axis=1)
+        return strengths
+
+    def safe_magnitude(self, unit: int) -> float:
+        """Return the largest |v| of a unit up to which the robot never fell; 0 if there is none."""
+        row = self.units.index(unit)
+        falls = zip(self.values, self.falls[row].any(axis=-1), strict=True)
+        lowest_fall = min((abs(value) for value, fell in falls if fell), default=np.inf)
+        return max((abs(value) for value in self.values if abs(value) < lowest_fall), default=0.0)
 
 
 class EffectProbe:
@@ -63,11 +114,9 @@ class EffectProbe:
         """Measure plans from common starts.
 
         Args:
-            plans: stimulations of any number of units, or controllers.
             starts: states to which robot and policy are restored, bit for bit, before each roll-out.
             steps: control steps of stimulation.
             measure_from: first step that is measured; by default the second half is.
-            progress: called with the number of roll-outs finished and of all roll-outs.
 
         Raises:
             WorkerError: a worker process died.

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 from pdtui.core.closable import Closable
-from pdtui.core.worker_pool import WorkerPool
+from pdtui.core.worker_pool import StepProgress, WorkerPool
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_fit import check_fit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, WorldSpaces
@@ -19,7 +18,6 @@ from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, run_rollout
 from pdtui.robots import make_robot, open_robot
 from pdtui.robots.robot import Robot
-from pdtui.spectra.monitor import StepProgress
 
 # Control steps that a worker is sent at once: enough to make the cost of sending them negligible, few enough
 # for progress to be reported about once per second.
@@ -28,14 +26,8 @@ _STEPS_PER_CHUNK = 1200
 WorkItem = TypeVar("WorkItem")
 WorkResult = TypeVar("WorkResult")
 _Pair = tuple[Robot, Policy]
-
-
-@dataclass(frozen=True)
-class _Chunk:
-    jobs: Sequence[RolloutJob]
-    starts: dict[int, StartState]
-    steps: int
-    measure_from: int
+_Chunk = tuple[Sequence[RolloutJob], dict[int, StartState], int, int]
+"""Jobs, their starts by index, the steps of each roll-out, and the first step that is measured."""
 
 
 def _build_pair(robot: str, policy: str, import_options: ImportOptions) -> _Pair:
@@ -54,10 +46,8 @@ def _apply(
 
 
 def _run_chunk(pair: _Pair, chunk: _Chunk) -> list[RolloutOutcome]:
-    return [
-        run_rollout(*pair, chunk.starts[index], plan, chunk.steps, chunk.measure_from)
-        for plan, index in chunk.jobs
-    ]
+    jobs, starts, steps, measure_from = chunk
+    return [run_rollout(*pair, starts[index], plan, steps, measure_from) for plan, index in jobs]
 
 
 class RolloutPool(Closable):
@@ -120,10 +110,6 @@ class RolloutPool(Closable):
         """Run all jobs and return their outcomes in the order of the jobs.
 
         Args:
-            jobs: plans, each with the index of its start.
-            starts: states to start from.
-            steps: control steps per roll-out.
-            measure_from: first step that is measured.
             keep: called with the indices of finished jobs and with their outcomes, as they are finished.
 
         Raises:
@@ -131,9 +117,7 @@ class RolloutPool(Closable):
         """
         size = max(1, _STEPS_PER_CHUNK // steps)
         parts = [jobs[low : low + size] for low in range(0, len(jobs), size)]
-        chunks = [
-            _Chunk(part, {index: starts[index] for _, index in part}, steps, measure_from) for part in parts
-        ]
+        chunks = [(part, {index: starts[index] for _, index in part}, steps, measure_from) for part in parts]
         results: list[list[RolloutOutcome]] = [[] for _ in chunks]
         for number, outcomes in self._pool.as_completed(_run_chunk, chunks):
             results[number] = outcomes

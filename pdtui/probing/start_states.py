@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from pdtui.core.errors import RobotError, SimulationDiverged
@@ -38,10 +38,6 @@ def collect_start_states(
     a stimulated roll-out is due to the stimulation.
 
     Args:
-        robot: the robot; it is reset.
-        policy: the policy, which acts with its mean action.
-        first_seed: seed of the first walk; the others follow.
-        count: number of states.
         at: control steps from the reset to the state.
         survive: control steps for which the walk has to go on without a fall.
 
@@ -50,8 +46,11 @@ def collect_start_states(
     """
     starts: list[StartState] = []
     for seed in range(first_seed, first_seed + 4 * count):
-        start = _walk(robot, policy, seed, at, survive)
-        if start is not None:
+        start = None
+        for step in _walk(robot, policy, seed, at + survive):
+            if step == at:
+                start = StartState(seed, at, robot.snapshot(), policy.snapshot())
+        if start is not None and step == at + survive:
             starts.append(start)
         if len(starts) == count:
             return starts
@@ -67,45 +66,28 @@ def measure_walk_lengths(
     """Return for how many control steps unstimulated walks last, in the order of their seeds.
 
     Args:
-        robot: the robot; it is reset.
-        policy: the policy, which acts with its mean action.
-        seeds: one seed per walk.
         most: step at which a walk is broken off.
         enough: stop after this many walks of `most` steps; 0 for never.
     """
     lengths: list[int] = []
     for seed in seeds:
-        lengths.append(_length(robot, policy, seed, most))
+        *_, length = _walk(robot, policy, seed, most)
+        lengths.append(length)
         if enough and sum(length >= most for length in lengths) >= enough:
             break
     return lengths
 
 
-def _length(robot: Robot, policy: Policy, seed: int, most: int) -> int:
+def _walk(robot: Robot, policy: Policy, seed: int, most: int) -> Iterator[int]:
+    """Yield 0 after the reset, and then the number of each control step with which the walk does not end."""
     observation, _ = robot.reset(seed=seed)
     policy.reset()
-    for step in range(most):
+    yield 0
+    for step in range(1, most + 1):
         try:
             observation, _, terminated, truncated, _ = robot.step(policy.act(observation).action)
         except SimulationDiverged:
-            return step
+            return
         if terminated or truncated:
-            # The state after the last step is a fall, so a walk that does without it is a step shorter.
-            return step
-    return most
-
-
-def _walk(robot: Robot, policy: Policy, seed: int, at: int, survive: int) -> StartState | None:
-    observation, _ = robot.reset(seed=seed)
-    policy.reset()
-    start = StartState(seed, 0, robot.snapshot(), policy.snapshot()) if at == 0 else None
-    for step in range(1, at + survive + 1):
-        try:
-            observation, _, terminated, truncated, _ = robot.step(policy.act(observation).action)
-        except SimulationDiverged:
-            return None
-        if terminated or truncated:
-            return None
-        if step == at:
-            start = StartState(seed, at, robot.snapshot(), policy.snapshot())
-    return start
+            return
+        yield step

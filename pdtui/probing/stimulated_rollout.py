@@ -66,9 +66,6 @@ def run_rollout(
     Args:
         robot: restored to the start state, bit for bit.
         policy: likewise; acts with its mean action.
-        start: state to start from.
-        plan: what to overwrite.
-        steps: number of control steps.
         measure_from: first step that is measured.
     """
     robot.restore(start.snapshot)

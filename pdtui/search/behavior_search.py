@@ -12,15 +12,14 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.intervals import bootstrap_interval
 from pdtui.core.units import Stimulation
-from pdtui.probing.effect_probe import EffectProbe, PlanEffects
+from pdtui.core.worker_pool import StepProgress
+from pdtui.probing.effect_probe import EffectProbe, PlanEffects, UnitEffects
 from pdtui.probing.start_states import StartState
-from pdtui.probing.unit_effects import UnitEffects
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.behavior_goals import goal_gains, goal_scores
 from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionSettings, SearchProblem
 from pdtui.search.shared_candidates import SharedCandidates
 from pdtui.search.stimulation_sampler import StimulationSampler
-from pdtui.spectra.monitor import StepProgress
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
 

@@ -10,10 +10,9 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
-from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.effect_probe import EffectProbe, UnitEffects
 from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import ControllerPlan
-from pdtui.probing.unit_effects import UnitEffects
 from pdtui.search.plan_search import Deadline, ScoringStage, select_plans
 from pdtui.search.stimulation_sampler import round_outputs, round_to_three_digits
 from pdtui.stimulation.stimulation_map import PidGains

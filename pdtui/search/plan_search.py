@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from pdtui.core.worker_pool import StepProgress
 from pdtui.search.stimulation_sampler import OutputBounds
-from pdtui.spectra.monitor import StepProgress
 
 Plan = TypeVar("Plan")
 PlanScoring = Callable[[Sequence[Plan]], Iterable[Any]]

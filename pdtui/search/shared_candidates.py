@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from pdtui.core.units import Stimulation
+from pdtui.core.worker_pool import StepProgress
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.behavior_goals import goal_scores
 from pdtui.search.stimulation_sampler import OutputBounds, StimulationSampler
-from pdtui.spectra.monitor import StepProgress
 
 
 class SharedCandidates:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.units import Stimulation
+from pdtui.core.worker_pool import StepProgress
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.robot import Robot
@@ -17,7 +18,6 @@ from pdtui.robots.task import Task, TaskVerdict
 from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionSettings, SearchProblem
 from pdtui.search.stimulation_sampler import CROSSED, StimulationSampler
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
-from pdtui.spectra.monitor import StepProgress
 
 _SEEDS_APART = 1000
 """Seeds from the first of one stage to the first of the next."""

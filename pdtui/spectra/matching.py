@@ -13,12 +13,24 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PolicyError
 from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.monitor import MonitoredEpisode
-from pdtui.spectra.scaled_series import BLOCK, attribute_series, map_unit_blocks, unit_series, usable_episodes
-from pdtui.spectra.spectrogram import short_time_transform, spectrogram
+from pdtui.spectra.spectrogram import (
+    BLOCK,
+    attribute_series,
+    map_unit_blocks,
+    short_time_transform,
+    spectrogram,
+    unit_series,
+    usable_episodes,
+)
 
 # ``|a|² + |b|² − 2ab`` loses digits where a and b are close. Below this share of ``|a|² + |b|²`` the
 # difference itself is squared, so that relative errors stay under 1e-9.
 _NEAR = 1e-6
+_CONSTANT = {
+    True: "constant in every episode; only its level can match",
+    False: "constant in every episode, and levels do not count; left out",
+}
+"""What is wrong with a constant series, by whether levels count."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +75,7 @@ def match_units(
     with units, attributes and episodes; memory grows by one block of units per core.
 
     Args:
-        episodes: unstimulated episodes.
         attributes: the robot's attributes, with their scales.
-        preset: choices of the method.
         block: units per block, which results depend on only by rounding.
 
     Raises:
@@ -143,19 +153,11 @@ def _find_flaws(
     flaws: dict[str, str] = {}
     for column, attribute in enumerate(attributes):
         series = [episode.attributes[:, column] for episode in episodes]
-        broken = [
-            episode.seed
-            for episode, values in zip(episodes, series, strict=True)
-            if not np.isfinite(values).all()
-        ]
+        broken = [one.seed for one in episodes if not np.isfinite(one.attributes[:, column]).all()]
         if broken:
             flaws[attribute.name] = f"not finite in the episodes of seeds {broken}; left out"
         elif all(np.ptp(values) == 0 for values in series):
-            flaws[attribute.name] = (
-                "constant in every episode; only its level can match"
-                if _levels_count(preset)
-                else "constant in every episode, and levels do not count; left out"
-            )
+            flaws[attribute.name] = _CONSTANT[_levels_count(preset)]
     return flaws
 
 
@@ -173,10 +175,8 @@ def _find_unit_flaws(
             flaws[unit] = "not finite; left out"
         elif (high[:, number] == 0).all():
             flaws[unit] = "never fires" + ("" if _levels_count(preset) else "; left out")
-        elif _levels_count(preset):
-            flaws[unit] = "constant in every episode; only its level can match"
         else:
-            flaws[unit] = "constant in every episode, and levels do not count; left out"
+            flaws[unit] = _CONSTANT[_levels_count(preset)]
     return flaws
 
 

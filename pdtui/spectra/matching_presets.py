@@ -133,11 +133,9 @@ def find_preset(name: str, settings: Sequence[str] = ()) -> MatchingPreset:
     """
     if name not in PRESETS:
         raise PdtuiError(f"unknown preset '{name}'; there are {', '.join(PRESETS)}")
-    preset = PRESETS[name]
     values: dict[str, Any] = dict(_parse(setting) for setting in settings)
-    changed = tuple(
-        f"{key}={value}" for key, value in values.items() if value != preset_values(PRESETS[name])[key]
-    )
+    preset, usual = PRESETS[name], preset_values(PRESETS[name])
+    changed = tuple(f"{key}={value}" for key, value in values.items() if value != usual[key])
     preset = replace(preset, **values, changed=changed)
     if preset.hop > preset.length:
         raise PdtuiError(
@@ -160,12 +158,11 @@ def _parse(setting: str) -> tuple[str, str | int]:
         raise PdtuiError(f"unknown setting '{name}'; there are {describe_preset_options()}")
     if name in _RANGES:
         low, high = _RANGES[name]
-        if not value.isdecimal() or not low <= int(value) <= high:
-            raise PdtuiError(f"setting '{name}': expected {_describe_values(name)}, got '{value}'")
-        return name, int(value)
-    if value not in preset_options()[name]:
-        raise PdtuiError(f"setting '{name}': expected {_describe_values(name)}, got '{value}'")
-    return name, value
+        if value.isdecimal() and low <= int(value) <= high:
+            return name, int(value)
+    elif value in preset_options()[name]:
+        return name, value
+    raise PdtuiError(f"setting '{name}': expected {_describe_values(name)}, got '{value}'")
 
 
 def _describe_values(name: str) -> str:

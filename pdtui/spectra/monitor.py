@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats, unwrap_angles
 from pdtui.core.errors import SimulationDiverged
+from pdtui.core.worker_pool import StepProgress
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot
-
-StepProgress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -48,11 +47,8 @@ def monitor_episodes(
     """Run one episode per seed with the policy's mean action and no stimulation (section 3.2, "monitoring").
 
     Args:
-        robot: the robot; it is reset.
-        policy: the policy.
         seeds: one seed per episode; the paper uses five.
         steps: largest number of control steps per episode.
-        progress: called with the number of episodes finished and of all episodes.
     """
     episodes = []
     for seed in seeds:

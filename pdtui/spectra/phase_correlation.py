@@ -11,8 +11,16 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.monitor import MonitoredEpisode
-from pdtui.spectra.scaled_series import BLOCK, attribute_series, map_unit_blocks, unit_series, usable_episodes
-from pdtui.spectra.spectrogram import Complexes, short_time_transform, spectrogram
+from pdtui.spectra.spectrogram import (
+    BLOCK,
+    Complexes,
+    attribute_series,
+    map_unit_blocks,
+    short_time_transform,
+    spectrogram,
+    unit_series,
+    usable_episodes,
+)
 
 DISAGREE = 0.1
 """Difference between the plain and the circular ρ above which both are reported."""
@@ -66,8 +74,6 @@ def correlate_phases(
 
     Args:
         episodes: unstimulated episodes; at least one has to be one window long, which `match_units` checks.
-        attributes: the robot's attributes, with their scales.
-        preset: choices of the method.
         block: units per block.
     """
     used = usable_episodes(episodes, preset)

@@ -1,28 +1,93 @@
-"""Step 2, spectrum: the short-time Fourier transform of each series."""
+"""Step 2, spectrum: the recorded series at the preset's scale, and their short-time Fourier transform."""
 
 from __future__ import annotations
 
-from typing import Any
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.fft
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
-from pdtui.core.attributes import Floats
+from pdtui.core.attributes import Attribute, Floats
 from pdtui.spectra.matching_presets import MatchingPreset
+from pdtui.spectra.monitor import MonitoredEpisode
 
+# Units per block: the spectra of 64 units over one episode of 1000 steps (2 MB) fit into a core's own cache.
+BLOCK = 64
+_Result = TypeVar("_Result")
 Complexes = NDArray[np.complex128]
 
 
+def usable_episodes(episodes: Sequence[MonitoredEpisode], preset: MatchingPreset) -> list[MonitoredEpisode]:
+    """Return the episodes that are at least one window long."""
+    return [episode for episode in episodes if episode.steps >= preset.length]
+
+
+def attribute_series(
+    episodes: Sequence[MonitoredEpisode], attributes: Sequence[Attribute], preset: MatchingPreset
+) -> list[Floats]:
+    """Return the scaled attributes of each episode, shape (T, J) each."""
+    series = [np.array(episode.attributes, np.float64) for episode in episodes]
+    if preset.angles == "wrapped":
+        for column, attribute in enumerate(attributes):
+            if attribute.wraps:
+                for values in series:
+                    values[:, column] = np.pi - (np.pi - values[:, column]) % (2 * np.pi)
+    if preset.scaling == "standardised":
+        return _standardised(series)
+    if preset.scaling == "observed":
+        scales = np.array([attribute.scale for attribute in attributes])
+        return [values * scales for values in series]
+    return series
+
+
+def unit_series(
+    episodes: Sequence[MonitoredEpisode], units: slice, preset: MatchingPreset
+) -> list[NDArray[Any]]:
+    """Return the scaled activations of B units of each episode, shape (T, B) each."""
+    series = [episode.activations[:, units] for episode in episodes]
+    return _standardised(series) if preset.scaling == "standardised" else series
+
+
+def map_unit_blocks(
+    work: Callable[[slice], _Result], units: int, block: int = BLOCK
+) -> Iterator[tuple[slice, _Result]]:
+    """Call a function with each block of units, on all cores; memory grows by one block per core.
+
+    Each block, a slice of the units, comes with its result, in order. numpy and scipy release the
+    interpreter's lock, so threads are enough.
+    """
+    blocks = [slice(low, min(low + block, units)) for low in range(0, units, block)]
+    threads = min(os.cpu_count() or 1, max(1, len(blocks)))
+    # More threads within the matrix products would only wait for these.
+    with ThreadPoolExecutor(threads) as pool, _libraries().limit(limits=1, user_api="blas"):
+        yield from zip(blocks, pool.map(work, blocks), strict=True)
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+def _standardised(series: Sequence[NDArray[Any]]) -> list[Floats]:
+    together = np.concatenate(series).astype(np.float64)
+    mean, spread = together.mean(axis=0), together.std(axis=0)
+    # The mean of equal numbers is not exactly that number; a constant series has to become all zeros.
+    still = np.ptp(together, axis=0) == 0
+    mean[still], spread[still] = together[0, still], 1.0
+    return [(values - mean) / spread for values in series]
+
+
 def short_time_transform(series: NDArray[Any], preset: MatchingPreset) -> Complexes:
-    """Return the short-time Fourier transform of N series.
+    """Return the short-time Fourier transform of N series, shape (T, N).
 
     ``STFT(d, ω) = Σ_t w(t) x(d·hop + t) exp(−iωt) / Σ_t w(t)``, so phases count from each window's start.
-
-    Args:
-        series: shape (T, N).
-        preset: sets window, length and hop.
 
     Returns:
         The transform in D whole windows and F bins, shape (N, D, F); D is 0 if T is shorter than a window.

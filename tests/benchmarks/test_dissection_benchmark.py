@@ -9,8 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from pdtui.benchmarks.benchmark_episodes import DissectionBenchmarkSettings, record_episodes, widen_episode
-from pdtui.benchmarks.librosa_matching import load_librosa, match_by_loop
-from pdtui.benchmarks.matching_benchmark import same_ranking
+from pdtui.benchmarks.matching_benchmark import load_librosa, match_by_loop, same_ranking
 from pdtui.cli import main
 from pdtui.core.attributes import Attribute
 from pdtui.core.errors import PdtuiError
@@ -69,7 +68,7 @@ def test_the_loop_computes_what_matching_does() -> None:
     attributes = (Attribute("vx", "m/s"), Attribute("torque", "N m", scale=0.1))
     for one in PRESETS.values():
         found = match_units(episodes, attributes, one)
-        loop = match_by_loop(load_librosa(), episodes, attributes, one)
+        loop = match_by_loop(episodes, attributes, one)
         np.testing.assert_allclose(found.discrepancy, loop, rtol=1e-9)
         assert same_ranking(found, loop) == (True, 0)
         assert not same_ranking(found, loop[:, ::-1])[0]

@@ -8,8 +8,8 @@ import numpy as np
 from pdtui.core.attributes import Attribute
 from pdtui.core.key_table import RESERVED_KEYS
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
-from pdtui.dissection.dissection_settings import QUICK_DISSECTION
-from pdtui.dissection.key_allocator import KeyAllocator
+from pdtui.dissection.dissection_config import QUICK_DISSECTION
+from pdtui.dissection.draft_map import KeyAllocator
 from pdtui.probing.confirmation import select_units_to_refine
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_pool import RolloutPool

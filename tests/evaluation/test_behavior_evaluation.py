@@ -19,9 +19,9 @@ from pdtui.core.units import Stimulation
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.behavior_evaluation import STEPS, evaluate_map, run_behavior
+from pdtui.evaluation.evaluation_tables import tracking_table
 from pdtui.evaluation.policy_evaluation import evaluate_policy
 from pdtui.evaluation.target_tracking import evaluate_tracking, find_pid_behaviors
-from pdtui.evaluation.tracking_tables import tracking_table
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import StimulationMap

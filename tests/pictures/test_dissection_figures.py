@@ -11,7 +11,7 @@ from PIL import Image
 from pdtui.core.errors import PictureError
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.pictures.dissection_figures import draw_dissection_figures
-from pdtui.pictures.picture_outputs import PictureOutputs
+from pdtui.pictures.dissection_report import PictureOutputs
 
 
 @pytest.fixture(scope="module")
@@ -71,5 +71,5 @@ def test_a_report_of_another_kind_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_core_does_not_load_matplotlib() -> None:
-    code = "import sys, pdtui.cli, pdtui.pictures.picture_outputs; print('matplotlib' in sys.modules)"
+    code = "import sys, pdtui.cli, pdtui.pictures.dissection_report; print('matplotlib' in sys.modules)"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "False"

@@ -8,7 +8,7 @@ from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
 from pdtui.spectra.matching_presets import PRESETS
 from pdtui.spectra.monitor import monitor_episodes
-from pdtui.spectra.scaled_series import attribute_series
+from pdtui.spectra.spectrogram import attribute_series
 
 
 def test_a_row_holds_the_activations_and_the_state_that_they_led_to(policy_file: Path) -> None:

@@ -6,13 +6,13 @@ cannot sense. All conditions run in the same forests for the same time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 from pdtui.core.errors import PdtuiError, PolicyError, SessionError
-from pdtui.core.worker_pool import WorkerPool
+from pdtui.core.worker_pool import StepProgress, WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_loop
@@ -58,7 +58,7 @@ def evaluate_forest(
     record: Path | None = None,
     tried: tuple[Sequence[int], int] = (TRIED_SEEDS, TRIED_STEPS),
     workers: int = 2,
-    progress: Callable[[int, int], None] | None = None,
+    progress: StepProgress | None = None,
 ) -> ForestExperimentResult:
     """Measure the conditions in the same forests, and score recorded drives.
 
@@ -69,12 +69,8 @@ def evaluate_forest(
         seeds: seeds of the forests; consecutive seeds form a repeat.
         conditions: conditions to measure; vision is left out if its robot or policy does not exist.
         sessions: a person's drives, each a repeat of one episode.
-        repeats: number of repeats into which the seeds are divided.
-        steps: largest number of control steps per episode.
         record: folder for the operator's drives, each a session and a keystroke file.
         tried: seeds and control steps of the drives to which the key models are fitted.
-        workers: number of worker processes.
-        progress: called with the number of episodes done and the total.
 
     Raises:
         PdtuiError: the robot, policy or map cannot be loaded or lacks what is needed, the seeds cannot be

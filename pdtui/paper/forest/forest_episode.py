@@ -32,13 +32,10 @@ class ForestEpisode:
     """The score of one episode.
 
     Attributes:
-        seed: seed of the forest.
-        reward: return of the episode.
         distance: distance along x, m.
         collisions: number of trees that the robot ran into.
         fell: whether the episode ended with a fall.
         crossed: whether it ended at the far end of the forest.
-        steps: control steps.
         presses: number of key presses.
         pressed_steps: number of control steps before which a key was pressed.
     """
@@ -60,16 +57,12 @@ def drive_forest_episode(
     operator: ScriptedOperator | None = None,
     recorder: SessionRecorder | None = None,
 ) -> tuple[ForestEpisode, tuple[Event, ...]]:
-    """Drive one episode: up to a fall, the far end of the forest, or the last step.
+    """Drive one episode, up to a fall, the far end of the forest, or the last step; return score and events.
 
     Args:
         loop: a drive in the forest, before its first step.
-        steps: largest number of control steps.
         operator: presses the keys; None leaves the policy alone.
         recorder: records every step; the caller closes it.
-
-    Returns:
-        The score, and all events.
     """
     column = loop.robot.attribute_index("distance")
     yaw = loop.robot.attribute_index("yaw")
@@ -113,15 +106,7 @@ def record_forest_episode(
 
 
 def read_forest_episode(path: Path, robot: str, steps: int) -> tuple[ForestEpisode, str]:
-    """Score the first episode of a recorded drive, up to the same end; its seed determines the forest.
-
-    Args:
-        path: the session.
-        robot: name of the robot that the session has to be of.
-        steps: largest number of control steps that count.
-
-    Returns:
-        The score, and the name of the policy.
+    """Score the first episode of a recorded drive, up to the same end, and return its policy's name, too.
 
     Raises:
         SessionError: the session cannot be read, is of another robot or start, or was rewound.
@@ -179,12 +164,7 @@ def _score(
 
 
 def drive_with_random_keys(loop: ControlLoop, steps: int) -> ObservedDrive:
-    """Press the operator's keys in random order to observe what they do.
-
-    Args:
-        loop: the drive, before its first step; its seed also draws the keys.
-        steps: largest number of control steps.
-    """
+    """Press the operator's keys in random order, drawn with the drive's seed, to observe what they do."""
     keys = list(operator_keys(loop.map).values())
     rng = np.random.default_rng(loop.seed)
     yaw = loop.robot.attribute_index("yaw")

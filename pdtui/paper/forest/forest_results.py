@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,17 +24,11 @@ class ForestConditionSummary:
     """The figures of one condition over all repeats, per episode.
 
     Attributes:
-        condition: description of the condition.
-        policy: name of the weights.
-        reward: return.
         distance: distance along x, m.
         collisions: number of trees that the robot ran into.
         presses: number of key presses.
         involvement: number of control steps before which a key was pressed.
-        falls: number of episodes that ended with a fall.
         crossed: number of episodes that reached the far end of the forest.
-        episodes: number of episodes.
-        runs: the score of each episode.
     """
 
     condition: str
@@ -56,7 +49,6 @@ class ForestExperimentResult:
     """The result of the forest experiment.
 
     Attributes:
-        robot: name of the robot.
         seeds: seeds of the forests; empty if only sessions were scored.
         repeats: number of repeats into which the seeds are divided in their order.
         steps: largest number of control steps per episode.
@@ -65,7 +57,6 @@ class ForestExperimentResult:
         left_out: the conditions that were not measured, and the reasons.
         keys: the operator's models of its keys; empty if the operator was not measured.
         key_seeds: seeds of the drives to which these models were fitted.
-        sessions: the session files that were scored.
     """
 
     robot: str
@@ -78,10 +69,6 @@ class ForestExperimentResult:
     keys: dict[str, KeyMotionModel]
     key_seeds: tuple[int, ...]
     sessions: tuple[str, ...]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return what ``--json`` prints."""
-        return asdict(self)
 
 
 def summarise_condition(

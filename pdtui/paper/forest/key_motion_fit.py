@@ -61,12 +61,7 @@ class _Stretches:
 def fit_key_motion_models(
     drives: Sequence[ObservedDrive], names: Sequence[str], dt: float
 ) -> dict[str, KeyMotionModel]:
-    """Fit the models that predict the drives best.
-
-    Args:
-        drives: observed drives; each key occurs in some of them.
-        names: names of the keys, by their indices.
-        dt: duration of a control step, s.
+    """Fit the models that predict the drives best; each key, by its index in `names`, occurs in some of them.
 
     Raises:
         RobotError: there are too few stretches with a key, because the robot fell.
@@ -93,19 +88,12 @@ def fit_key_motion_models(
         found = integrate_drift(table[seen.choices], seen.before("drift"), pace)
         return (found - seen.drifts) * np.minimum(seen.speeds, 1.0)
 
+    errors = (heading_errors, speed_errors, drift_errors)
     tables = [
-        _minimise(errors, len(names), *bounds)
-        for errors, *bounds in zip(
-            (heading_errors, speed_errors, drift_errors), _GUESS, _LOW, _HIGH, strict=True
-        )
+        _minimise(one, len(names), *bounds) for one, *bounds in zip(errors, _GUESS, _LOW, _HIGH, strict=True)
     ]
-    rows = np.hstack(tables)
-    key_models = {}
-    for name, row, (fell, presses) in zip(names, rows, falls, strict=True):
-        pull, hold, lag, drive, drag, slip, settle = row.tolist()
-        fallen = fell / max(presses, 1)
-        key_models[name] = KeyMotionModel(pull, hold, lag, drive, drag, slip, settle, fallen)
-    return key_models
+    tables.append(np.array([[fell / max(presses, 1)] for fell, presses in falls]))
+    return {name: KeyMotionModel(*row.tolist()) for name, row in zip(names, np.hstack(tables), strict=True)}
 
 
 def _minimise(

@@ -43,12 +43,7 @@ class KeyPlanner:
         self._presses = (np.diff(self._schedules, axis=1) != 0).sum(axis=1)
 
     def choose(self, place: RobotMotion, latched: int) -> int:
-        """Return the index of the key to latch; the latched one unless another is worth a press.
-
-        Args:
-            place: the robot's motion now.
-            latched: index of the latched key.
-        """
+        """Return the index of the key to latch; the latched one unless another is worth a press."""
         scores = self._scores(place, latched)
         return int(self._schedules[int(np.argmax(scores)), 0])
 

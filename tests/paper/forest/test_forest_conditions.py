@@ -173,7 +173,7 @@ def test_conditions_and_a_person_stand_in_one_table(
         f"a1-forest-seed{seed}.{kind}" for seed in (1, 2) for kind in ("keys", "rrd")
     ]
     assert list(result.keys) == list(KEY_MODELS)
-    assert json.loads(json.dumps(result.as_dict()))["seeds"] == [1, 2]
+    assert json.loads(json.dumps(asdict(result)))["seeds"] == [1, 2]
 
 
 def test_a_killed_worker_ends_the_experiment(config: DriveConfig) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.attributes import Floats
-from pdtui.paper.forest.tree_contact_recovery import STUCK_TIME, TreeContactRecovery
+from pdtui.paper.forest.scripted_operator import STUCK_TIME, TreeContactRecovery
 
 DT = 0.016
 TREE = np.array([[5.0, 0.0, 0.3]])

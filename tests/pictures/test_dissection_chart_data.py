@@ -7,7 +7,7 @@ import pytest
 
 from pdtui.core.attributes import Floats
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.pictures.chart_data import matched_pair, side_effect_matrix, spectrogram_of
+from pdtui.pictures.dissection_chart_data import matched_spectrograms, side_effect_matrix, spectrogram_of
 from pdtui.pictures.plot_colors import BLUE, GREY, VERMILLION, diverging
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
@@ -24,7 +24,7 @@ def test_the_pictured_spectrograms_are_those_that_were_compared(
     alone = match_units(episodes, robot.attributes, dissection.preset)
     for name in ("vx", "yaw", "height"):
         column = dissection.column(name)
-        pair = matched_pair(dissection, column)
+        pair = matched_spectrograms(dissection, column)
         assert pair is not None
         assert pair.unit == dissection.matching.ranked_units(column)[0]
         one, other = (10 ** (shown.decibels / 10) for shown in (pair.of_attribute, pair.of_unit))

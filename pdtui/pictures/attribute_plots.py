@@ -1,6 +1,6 @@
-"""One page for each attribute: spectrograms, nearest units and effects.
+"""Plots of one attribute: spectrograms, nearest units and effects; and a page with all of them.
 
-The panels are also those of the pages that show one kind of panel for several attributes.
+Other pages show one kind of plot for several attributes.
 """
 
 from __future__ import annotations
@@ -11,13 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.pictures.chart_data import (
-    EffectCurve,
-    SpectrogramChart,
-    effect_curves,
-    matched_pair,
-    unit_ranking,
-)
+from pdtui.pictures.dissection_chart_data import effect_curves, matched_spectrograms, unit_ranking
 from pdtui.pictures.matplotlib_page import figure_page, policy_title
 from pdtui.pictures.plot_colors import BLUE, GREEN, GREY, VERMILLION, to_hex
 
@@ -29,11 +23,7 @@ _MATCHED, _PROBED, _OTHER, _FAINT = (to_hex(color) for color in (VERMILLION, GRE
 
 
 def draw_attribute_page(dissection: Dissection, column: int) -> bytes:
-    """Draw everything about one attribute on a page.
-
-    Returns:
-        A PNG file.
-    """
+    """Draw everything about one attribute on a page, and return the PNG file."""
     attribute, target = dissection.attributes[column], io.BytesIO()
     label = f"{attribute.name} ({attribute.unit})" if attribute.unit else attribute.name
     with figure_page(target, 4.4, f"{policy_title(dissection)}: {label}") as figure:
@@ -49,18 +39,17 @@ def draw_attribute_page(dissection: Dissection, column: int) -> bytes:
 
 def draw_spectrograms(figure: Figure, left: Axes, right: Axes, dissection: Dissection, column: int) -> None:
     """Draw the spectrograms of an attribute and of its best match, in the same colours."""
-    pair = matched_pair(dissection, column)
+    pair = matched_spectrograms(dissection, column)
     if pair is None:
         _leave_out(left, dissection, column)
         right.set_axis_off()
         return
     mesh = None
     attribute = pair.attribute
-    charts: tuple[tuple[Axes, str, SpectrogramChart], ...] = (
+    for panel, name, chart in (
         (left, f"{attribute.name} ({attribute.unit})", pair.of_attribute),
         (right, f"unit {pair.label}", pair.of_unit),
-    )
-    for panel, name, chart in charts:
+    ):
         mesh = panel.pcolormesh(
             chart.times,
             chart.frequencies,
@@ -98,24 +87,19 @@ def draw_effects(panel: Axes, dissection: Dissection, column: int) -> None:
     attribute = dissection.attributes[column]
     panel.axhline(0, color=_FAINT, linewidth=0.6)
     for curve in effect_curves(dissection, column):
-        _draw_effect_curve(panel, curve)
+        color = _MATCHED if curve.matched else _PROBED
+        spread = np.vstack([curve.means - curve.lows, curve.highs - curve.means])
+        panel.errorbar(
+            curve.values, curve.means, yerr=np.nan_to_num(np.maximum(spread, 0.0)), color=color, marker="o",
+            markersize=2.5, capsize=2, elinewidth=0.8, label=curve.label,
+        )  # fmt: skip
+        fell = curve.falls > 0
+        panel.plot(curve.values[fell], curve.means[fell], "x", color="black", markersize=4)
     panel.set_title(attribute.name)
     panel.set_ylabel(f"change ({attribute.unit})" if attribute.unit else "change")
     panel.set_xlabel("output v")
     if panel.has_data() and panel.get_legend_handles_labels()[1]:
         panel.legend(loc="best", handlelength=1.2, borderpad=0.1)
-
-
-def _draw_effect_curve(panel: Axes, curve: EffectCurve) -> None:
-    color = _MATCHED if curve.matched else _PROBED
-    spread = np.vstack([curve.means - curve.lows, curve.highs - curve.means])
-    panel.errorbar(
-        curve.values, curve.means, yerr=np.nan_to_num(np.maximum(spread, 0.0)), color=color, marker="o",
-        markersize=2.5, capsize=2, elinewidth=0.8, label=curve.label,
-    )  # fmt: skip
-    fell = curve.falls > 0
-    if fell.any():
-        panel.plot(curve.values[fell], curve.means[fell], "x", color="black", markersize=4)
 
 
 def draw_effect_key(figure: Figure) -> None:

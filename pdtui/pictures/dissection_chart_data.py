@@ -11,7 +11,6 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.intervals import bootstrap_interval
 from pdtui.core.units import format_unit
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.sample_episode import SampleEpisode
 from pdtui.probing.confirmation import rank_probed_units
 from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.spectrogram import short_time_transform
@@ -42,14 +41,12 @@ class SpectrogramChart:
 
 
 @dataclass(frozen=True)
-class MatchedPair:
-    """An attribute and the unit that matches it best, over the same episode.
+class MatchedSpectrograms:
+    """Spectrograms of an attribute and of the unit that matches it best, over the same episode.
 
     Attributes:
         attribute: The attribute, at the scale at which matching compares it.
-        unit: Flat index of the unit.
-        label: Address of the unit.
-        of_attribute, of_unit: Their spectrograms.
+        unit, label: Flat index and address of the unit.
         low, high: Range of the colours that both share, dB.
     """
 
@@ -68,7 +65,6 @@ class UnitRanking:
 
     Attributes:
         labels: Addresses of the units.
-        discrepancies: Their discrepancies, shape (N,).
         level_shares: Share of each squared distance that is mean level, shape (N,).
     """
 
@@ -136,7 +132,7 @@ def spectrogram_of(series: NDArray[np.floating], preset: MatchingPreset, dt: flo
     return SpectrogramChart(times, preset.frequencies(dt), decibels)
 
 
-def matched_pair(dissection: Dissection, column: int) -> MatchedPair | None:
+def matched_spectrograms(dissection: Dissection, column: int) -> MatchedSpectrograms | None:
     """Return the spectrograms of an attribute and its best match; None where no unit matches."""
     ranked = dissection.matching.ranked_units(column)
     if not ranked.size:
@@ -148,7 +144,8 @@ def matched_pair(dissection: Dissection, column: int) -> MatchedPair | None:
     heard = both[np.isfinite(both)]
     high = float(heard.max()) if heard.size else 0.0
     label = format_unit(unit, dissection.layers)
-    return MatchedPair(dissection.attributes[column], unit, label, one, other, high - DECIBELS, high)
+    attribute = dissection.attributes[column]
+    return MatchedSpectrograms(attribute, unit, label, one, other, high - DECIBELS, high)
 
 
 def unit_ranking(dissection: Dissection, column: int, count: int = RANKED) -> UnitRanking:
@@ -177,24 +174,23 @@ def effect_curves(dissection: Dissection, column: int) -> list[EffectCurve]:
 def _curve(dissection: Dissection, column: int, unit: int, role: str) -> EffectCurve:
     refined = dissection.refined
     row = refined.units.index(unit)
-    means, lows, highs, falls = [], [], [], []
+    samples = refined.effects[row, :, :, column]
+    known = np.isfinite(samples)
+    intervals = [bootstrap_interval(some, dissection.seed) for some in samples]
+    lows, highs = np.array(intervals, np.float64).T
+    means = [
+        float(some[finite].mean()) if finite.any() else float("nan")
+        for some, finite in zip(samples, known, strict=True)
+    ]
     order = np.argsort(refined.values)
-    for dose in order:
-        samples = refined.effects[row, dose, :, column]
-        known = samples[np.isfinite(samples)]
-        low, high = bootstrap_interval(samples, dissection.seed)
-        means.append(float(known.mean()) if known.size else float("nan"))
-        lows.append(low)
-        highs.append(high)
-        falls.append(float(refined.falls[row, dose].mean()))
     return EffectCurve(
         format_unit(unit, dissection.layers),
         role,
         np.array(refined.values, np.float64)[order],
-        np.array(means),
-        np.array(lows),
-        np.array(highs),
-        np.array(falls),
+        np.array(means)[order],
+        lows[order],
+        highs[order],
+        refined.falls[row].mean(axis=-1)[order],
         unit in dissection.matching.ranked_units(column)[:1],
     )
 
@@ -217,9 +213,3 @@ def side_effect_matrix(dissection: Dissection) -> SideEffectMatrix:
         tuple(attribute.name for attribute in dissection.attributes),
         {value: matrix[order] for value, matrix in by_value.items()},
     )
-
-
-def sample_times(shown: SampleEpisode, dt: float) -> Floats:
-    """Return the seconds since the reset at each row: row t is the state after control step t."""
-    times: Floats = (np.arange(len(shown.attributes), dtype=np.float64) + 1) * dt
-    return times

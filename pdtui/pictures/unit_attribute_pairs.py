@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PictureError
 from pdtui.core.units import format_unit, parse_unit
+from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.attribute_movers import movable_columns
 from pdtui.pictures.matplotlib_page import figure_page
 from pdtui.pictures.plot_colors import CYCLE, to_hex
@@ -21,7 +22,7 @@ from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_preset
-from pdtui.spectra.monitor import StepProgress, monitor_episodes
+from pdtui.spectra.monitor import monitor_episodes
 from pdtui.spectra.phase_correlation import correlate_phases
 
 if TYPE_CHECKING:
@@ -32,15 +33,15 @@ _PANEL_HEIGHT = 0.98
 """Inches per pair."""
 _DEFAULT_PAIRS = 6
 """Pairs drawn unless attributes are named: as many as fit on half a page."""
+_DASHED: dict[str, Any] = {"linestyle": (0, (2.2, 1.2)), "linewidth": 0.9}
 
 
 @dataclass(frozen=True)
-class MatchedCurve:
+class UnitAttributePair:
     """An attribute and a unit over one episode of T control steps.
 
     Attributes:
         attribute: The attribute, in its physical unit.
-        unit: The unit's address.
         values: The attribute's values, shape (T,).
         activation: The unit's activation, shape (T,).
         discrepancy: Mean over all episodes; NaN for an attribute that cannot be matched.
@@ -56,11 +57,10 @@ class MatchedCurve:
 
 
 @dataclass(frozen=True)
-class MatchedEpisode:
+class EpisodePairs:
     """One episode with the pairs that the figure shows.
 
     Attributes:
-        robot, policy: Their names.
         seed: Seed of the episode: the first one that was matched.
         times: Seconds since the reset, shape (T,).
         pairs: Attributes with their units.
@@ -70,10 +70,10 @@ class MatchedEpisode:
     policy: str
     seed: int
     times: Floats
-    pairs: tuple[MatchedCurve, ...]
+    pairs: tuple[UnitAttributePair, ...]
 
 
-def match_episode(
+def pair_units_with_attributes(
     robot: str,
     policy: str,
     *,
@@ -85,18 +85,13 @@ def match_episode(
     steps: int = 1000,
     seed: int = 1000,
     progress: StepProgress | None = None,
-) -> MatchedEpisode:
+) -> EpisodePairs:
     """Roll a policy out and pair attributes with units.
 
     Args:
-        robot: Name of the robot.
-        policy: Weights file or name of a shipped policy.
         attributes: Names of attributes; by default the first six that vary, without torques.
         units: One address per attribute; by default the unit of least discrepancy.
-        import_options: What the weights file leaves open.
-        preset: Name of the matching preset.
         episodes, steps, seed: The roll-outs, as in a dissection; all of them are matched.
-        progress: Called with (episodes done, episodes).
 
     Raises:
         PictureError: Units and attributes differ in number, or there is nothing to show.
@@ -123,7 +118,7 @@ def match_episode(
             raise PictureError(f"{robot}: no attribute can be matched with a unit: {flaws or 'none varies'}")
         flats = flats or [int(ranked[0]) for ranked in best]
         pairs = [
-            MatchedCurve(
+            UnitAttributePair(
                 world.attributes[column],
                 format_unit(unit, network.layers),
                 shown.attributes[:, column],
@@ -134,17 +129,16 @@ def match_episode(
             for column, unit in zip(columns, flats, strict=True)
         ]
         times = (np.arange(shown.steps, dtype=np.float64) + 1) * world.control_dt
-        return MatchedEpisode(robot, network.name, shown.seed, times, tuple(pairs))
+        return EpisodePairs(robot, network.name, shown.seed, times, tuple(pairs))
 
 
-def draw_matched_curves(
-    path: Path, curves: MatchedEpisode, *, start: float = 0.0, seconds: float | None = 10.0
+def draw_unit_attribute_pairs(
+    path: Path, curves: EpisodePairs, *, start: float = 0.0, seconds: float | None = 10.0
 ) -> None:
     """Draw one panel per pair: the attribute as a solid line, the unit as a dashed one, in the same colour.
 
     Args:
         path: PNG file; an existing one is replaced once the picture is whole.
-        curves: The episode and its pairs.
         start, seconds: The part of the episode to show, in seconds; None shows it to the end.
 
     Raises:
@@ -166,24 +160,20 @@ def draw_matched_curves(
         _draw_key(figure)
 
 
-def _draw_pair(panel: Axes, pair: MatchedCurve, times: Floats, part: NDArray[np.bool_], color: str) -> None:
+def _draw_pair(
+    panel: Axes, pair: UnitAttributePair, times: Floats, part: NDArray[np.bool_], color: str
+) -> None:
     attribute = pair.attribute
     panel.plot(times[part], pair.values[part], color=color)
-    unit = f" ({attribute.unit})" if attribute.unit else ""
-    panel.set_ylabel(f"{attribute.name}\n{unit.strip()}".strip(), color=color)
+    unit = f"\n({attribute.unit})" if attribute.unit else ""
+    panel.set_ylabel(f"{attribute.name}{unit}", color=color)
     right = panel.twinx()
-    right.plot(times[part], pair.activation[part], color=color, linestyle=(0, (2.2, 1.2)), linewidth=0.9)
+    right.plot(times[part], pair.activation[part], color=color, **_DASHED)
     right.set_ylabel(f"unit {pair.unit}", color=color)
     right.spines["right"].set_visible(True)
-    panel.set_title(f"{attribute.name} and unit {pair.unit}: {_facts(pair)}")
-
-
-def _facts(pair: MatchedCurve) -> str:
-    parts = [
-        f"discrepancy {pair.discrepancy:.3g}" if np.isfinite(pair.discrepancy) else "not matched",
-        f"ρ = {pair.correlation:+.2f}" if np.isfinite(pair.correlation) else "no ρ",
-    ]
-    return ", ".join(parts)
+    nearness = f"discrepancy {pair.discrepancy:.3g}" if np.isfinite(pair.discrepancy) else "not matched"
+    sign = f"ρ = {pair.correlation:+.2f}" if np.isfinite(pair.correlation) else "no ρ"
+    panel.set_title(f"{attribute.name} and unit {pair.unit}: {nearness}, {sign}")
 
 
 def _draw_key(figure: Figure) -> None:
@@ -191,13 +181,6 @@ def _draw_key(figure: Figure) -> None:
 
     lines = [
         Line2D([], [], color="black", label="attribute (left axis)"),
-        Line2D(
-            [],
-            [],
-            color="black",
-            linestyle=(0, (2.2, 1.2)),
-            linewidth=0.9,
-            label="output of the unit (right axis)",
-        ),
+        Line2D([], [], color="black", label="output of the unit (right axis)", **_DASHED),
     ]
     figure.legend(handles=lines, loc="outside lower left", ncols=2)

@@ -10,16 +10,20 @@ from PIL import Image
 from pdtui.cli import main
 from pdtui.core.errors import PictureError, PolicyError, RobotError
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.pictures.matched_curves import MatchedEpisode, draw_matched_curves, match_episode
+from pdtui.pictures.unit_attribute_pairs import (
+    EpisodePairs,
+    draw_unit_attribute_pairs,
+    pair_units_with_attributes,
+)
 
 
 @pytest.fixture(scope="module")
-def curves(policy_file: Path) -> MatchedEpisode:
-    return match_episode("ant", str(policy_file), episodes=2, steps=130, seed=1000)
+def curves(policy_file: Path) -> EpisodePairs:
+    return pair_units_with_attributes("ant", str(policy_file), episodes=2, steps=130, seed=1000)
 
 
 def test_main_attributes_come_with_the_units_that_match_them(
-    curves: MatchedEpisode, dissection: Dissection
+    curves: EpisodePairs, dissection: Dissection
 ) -> None:
     """The same roll-outs as those of the dissection, so the same matches."""
     assert [pair.attribute.name for pair in curves.pairs] == ["vx", "vy", "speed", "yaw", "yaw rate", "roll"]
@@ -36,7 +40,7 @@ def test_main_attributes_come_with_the_units_that_match_them(
 
 
 def test_a_pair_may_be_named(policy_file: Path) -> None:
-    curves = match_episode(
+    curves = pair_units_with_attributes(
         "ant", str(policy_file), attributes=["height", "vx"], units=["1:3", "0:0"], episodes=1, steps=64
     )
     assert [(pair.attribute.name, pair.unit) for pair in curves.pairs] == [("height", "1:3"), ("vx", "0:0")]
@@ -54,12 +58,14 @@ def test_what_does_not_exist_is_named(
     attributes: list[str], units: list[str], error: type[Exception], message: str, policy_file: Path
 ) -> None:
     with pytest.raises(error, match=message):
-        match_episode("ant", str(policy_file), attributes=attributes, units=units, episodes=1, steps=64)
+        pair_units_with_attributes(
+            "ant", str(policy_file), attributes=attributes, units=units, episodes=1, steps=64
+        )
 
 
-def test_each_pair_is_drawn_in_its_colour(curves: MatchedEpisode, tmp_path: Path) -> None:
+def test_each_pair_is_drawn_in_its_colour(curves: EpisodePairs, tmp_path: Path) -> None:
     path = tmp_path / "new" / "episode.png"
-    draw_matched_curves(path, curves)
+    draw_unit_attribute_pairs(path, curves)
     with Image.open(path) as image:
         assert image.format == "PNG"
         picture = np.array(image.convert("RGB"))
@@ -69,9 +75,9 @@ def test_each_pair_is_drawn_in_its_colour(curves: MatchedEpisode, tmp_path: Path
         assert np.ptp(rows) < picture.shape[0] / 5, color
 
 
-def test_an_episode_that_is_over_says_so(curves: MatchedEpisode, tmp_path: Path) -> None:
+def test_an_episode_that_is_over_says_so(curves: EpisodePairs, tmp_path: Path) -> None:
     with pytest.raises(PictureError, match=r"the episode lasts 6\.5 s; nothing is left to show from 7 s on"):
-        draw_matched_curves(tmp_path / "x.png", curves, start=7.0)
+        draw_unit_attribute_pairs(tmp_path / "x.png", curves, start=7.0)
     assert list(tmp_path.iterdir()) == []
 
 
