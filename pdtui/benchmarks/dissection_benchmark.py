@@ -2,29 +2,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pdtui.benchmarks.benchmark_episodes import DissectionBenchmarkSettings, record_episodes
 from pdtui.benchmarks.matching_benchmark import (
     MatchingComparison,
-    ScalingCurve,
     compare_matching,
     load_librosa,
-    measure_matching_growth,
     measure_matching_memory,
     measure_seconds,
 )
-from pdtui.core.attributes import Floats
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.errors import PdtuiError
 from pdtui.core.units import Stimulation
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
 from pdtui.probing.stimulated_rollout import RolloutJob
-from pdtui.spectra.matching_presets import find_preset
+from pdtui.spectra.matching import Discrepancies, match_units
+from pdtui.spectra.matching_presets import MatchingPreset, find_preset
+from pdtui.spectra.monitor import MonitoredEpisode, monitor_episodes
 
 Progress = Callable[[int, int, str], None]
+
+
+_SHIFT = 37
+"""Control steps by which a repeated column is shifted; no multiple of a hop, so that the series differ."""
+
+
+@dataclass(frozen=True)
+class DissectionBenchmarkSettings:
+    """How much the dissection benchmark measures.
+
+    Attributes:
+        episodes, steps, units, attributes: size of the recorded data; steps per episode.
+        rounds: rounds of each comparison, in which both sides take turns.
+        factors: each size is multiplied by these to see how time grows with it.
+        memory_units, memory_steps: size of the synthetic episode whose memory is measured.
+        probes: stimulated roll-outs per round.
+        probe_steps: control steps per roll-out.
+    """
+
+    episodes: int = 5
+    steps: int = 1000
+    units: int = 512
+    attributes: int = 20
+    rounds: int = 7
+    factors: tuple[float, ...] = (0.25, 0.5, 1, 2, 4)
+    memory_units: int = 100_000
+    memory_steps: int = 1000
+    probes: int = 240
+    probe_steps: int = 60
+
+
+@dataclass(frozen=True)
+class ScalingCurve:
+    """How the time of matching grows with one size.
+
+    Attributes:
+        grows: name of the size.
+        sizes: its values.
+        ms: median time over rounds at each of them, ms.
+        fixed_ms, each_ms: the line of least relative error, ms = fixed + each · size.
+        deviation: largest relative distance from that line.
+    """
+
+    grows: str
+    sizes: tuple[int, ...]
+    ms: tuple[float, ...]
+    fixed_ms: float
+    each_ms: float
+    deviation: float
 
 
 @dataclass(frozen=True)
@@ -121,3 +172,73 @@ def measure_probing_rate(one: RolloutPool, two: RolloutPool, settings: Dissectio
         return (pool.control_steps - before) / seconds
 
     return np.array([[rate(one), rate(two)] for _ in range(settings.rounds)])
+
+
+def record_episodes(
+    pool: RolloutPool, settings: DissectionBenchmarkSettings
+) -> tuple[list[MonitoredEpisode], tuple[Attribute, ...]]:
+    """Record episodes without stimulation, widened to the numbers of units and attributes of the settings.
+
+    Raises:
+        PdtuiError: an episode ended before its number of steps.
+    """
+    recorded = monitor_episodes(
+        pool.robot, pool.policy, range(1000, 1000 + settings.episodes), settings.steps
+    )
+    for episode in recorded:
+        if episode.steps < settings.steps:
+            raise PdtuiError(
+                f"{pool.robot.name}: expected {settings.steps} steps, but the episode of seed {episode.seed} "
+                f"ended after {episode.steps}: {episode.ended}"
+            )
+    episodes = [widen_episode(episode, settings.units, settings.attributes) for episode in recorded]
+    known = pool.robot.attributes
+    attributes = tuple(
+        replace(known[column % len(known)], name=f"{known[column % len(known)].name} {column}")
+        for column in range(settings.attributes)
+    )
+    return episodes, attributes
+
+
+def widen_episode(episode: MonitoredEpisode, units: int, attributes: int) -> MonitoredEpisode:
+    """Return the episode with other widths; columns beyond the recorded ones repeat them, shifted in time."""
+    return replace(
+        episode,
+        activations=_widened(episode.activations, units),
+        attributes=_widened(episode.attributes, attributes),
+    )
+
+
+def _widened(series: NDArray[Any], width: int) -> NDArray[Any]:
+    copies = -(-width // series.shape[1])
+    shifted = [np.roll(series, _SHIFT * copy, axis=0) for copy in range(copies)]
+    return np.ascontiguousarray(np.hstack(shifted)[:, :width])
+
+
+def measure_matching_growth(
+    episodes: Sequence[MonitoredEpisode],
+    attributes: Sequence[Attribute],
+    preset: MatchingPreset,
+    settings: DissectionBenchmarkSettings,
+) -> tuple[ScalingCurve, ...]:
+    """Time matching while one size grows and the others stay the same."""
+
+    def sized(units: int, columns: int, count: int) -> Callable[[], Discrepancies]:
+        data = [widen_episode(episodes[number % len(episodes)], units, columns) for number in range(count)]
+        chosen = [attributes[column % len(attributes)] for column in range(columns)]
+        return lambda: match_units(data, chosen, preset)
+
+    full = {"units": settings.units, "attributes": settings.attributes, "episodes": settings.episodes}
+    curves = []
+    for grows, size in full.items():
+        sizes = sorted({max(1, round(size * factor)) for factor in settings.factors})
+        cases = [sized(*{**full, grows: one}.values()) for one in sizes]
+        rounds = [[measure_seconds(case) for case in cases] for _ in range(settings.rounds)]
+        times = np.median(rounds, axis=0) * 1e3
+        each, fixed = np.polyfit(sizes, times, 1, w=1 / times)
+        line = fixed + each * np.array(sizes)
+        deviation = float(np.max(np.abs(times / line - 1)))
+        curves.append(
+            ScalingCurve(grows, tuple(sizes), tuple(times.tolist()), float(fixed), float(each), deviation)
+        )
+    return tuple(curves)

@@ -60,8 +60,8 @@ def bench_loop(
     parts: dict[str, Callable[[], float]] = {
         "bare": lambda: _bare(loop, config.seed, walked),
         "policy": lambda: steps / measure_seconds(lambda: _actions(loop, config.seed, steps)),
-        "stimulated": lambda: _whole(loop, config.seed, steps, behavior, None),
-        "recorded": lambda: _recorded(loop, config.seed, steps, behavior),
+        "stimulated": lambda: _whole(loop, config.seed, steps, behavior, recorded=False),
+        "recorded": lambda: _whole(loop, config.seed, steps, behavior, recorded=True),
     }
     rates: dict[str, list[float]] = {name: [] for name in parts}
     for done in range(rounds):
@@ -97,27 +97,21 @@ def _bare(loop: ControlLoop, seed: int, actions: list[np.ndarray]) -> float:
     return len(actions) / (time.perf_counter() - start)
 
 
-def _whole(
-    loop: ControlLoop, seed: int, steps: int, behavior: str, recorder: SessionRecorder | None
-) -> float:
+def _whole(loop: ControlLoop, seed: int, steps: int, behavior: str, *, recorded: bool) -> float:
     fresh = ControlLoop(loop.robot, loop.policy, loop.map, seed)
-    start = time.perf_counter()
-    for step in range(steps):
-        events = [Event(step, "behavior", behavior)] if behavior and step % 200 == 100 else []
-        if step % 200 == 150:
-            events = [Event(step, "default")]
-        record = fresh.advance(events)
-        if recorder is not None:
-            recorder.write(record)
-    if recorder is not None:
-        recorder.close("finished")
-    return steps / (time.perf_counter() - start)
-
-
-def _recorded(loop: ControlLoop, seed: int, steps: int, behavior: str) -> float:
     with tempfile.TemporaryDirectory() as folder:
-        recorder = SessionRecorder(Path(folder) / "bench.rrd", loop.info)
-        return _whole(loop, seed, steps, behavior, recorder)
+        recorder = SessionRecorder(Path(folder) / "bench.rrd", loop.info) if recorded else None
+        start = time.perf_counter()
+        for step in range(steps):
+            events = [Event(step, "behavior", behavior)] if behavior and step % 200 == 100 else []
+            if step % 200 == 150:
+                events = [Event(step, "default")]
+            record = fresh.advance(events)
+            if recorder is not None:
+                recorder.write(record)
+        if recorder is not None:
+            recorder.close("finished")
+        return steps / (time.perf_counter() - start)
 
 
 def _forward(loop: ControlLoop, calls: int = 2000) -> float:

@@ -1,4 +1,4 @@
-"""Speed and memory of matching: compared with a plain loop, as each size grows, and in a fresh process."""
+"""Speed and memory of matching: compared with a plain loop, and in a fresh process."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from scipy.signal import get_window
 
-from pdtui.benchmarks.benchmark_episodes import DissectionBenchmarkSettings, widen_episode
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PdtuiError
 from pdtui.core.worker_pool import WorkerProcess
@@ -44,26 +43,6 @@ class MatchingComparison:
     same_ranking: bool
     ties: int
     largest_difference: float
-
-
-@dataclass(frozen=True)
-class ScalingCurve:
-    """How the time of matching grows with one size.
-
-    Attributes:
-        grows: name of the size.
-        sizes: its values.
-        ms: median time over rounds at each of them, ms.
-        fixed_ms, each_ms: the line of least relative error, ms = fixed + each · size.
-        deviation: largest relative distance from that line.
-    """
-
-    grows: str
-    sizes: tuple[int, ...]
-    ms: tuple[float, ...]
-    fixed_ms: float
-    each_ms: float
-    deviation: float
 
 
 def compare_matching(
@@ -101,35 +80,6 @@ def same_ranking(found: Discrepancies, reference: Floats) -> tuple[bool, int]:
         ties += int((np.diff(np.sort(distances)) <= rounding).sum())
         same &= len(ours) == len(distances) and bool((np.diff(in_our_order) >= -rounding).all())
     return same, ties
-
-
-def measure_matching_growth(
-    episodes: Sequence[MonitoredEpisode],
-    attributes: Sequence[Attribute],
-    preset: MatchingPreset,
-    settings: DissectionBenchmarkSettings,
-) -> tuple[ScalingCurve, ...]:
-    """Time matching while one size grows and the others stay the same."""
-
-    def sized(units: int, columns: int, count: int) -> Callable[[], Discrepancies]:
-        data = [widen_episode(episodes[number % len(episodes)], units, columns) for number in range(count)]
-        chosen = [attributes[column % len(attributes)] for column in range(columns)]
-        return lambda: match_units(data, chosen, preset)
-
-    full = {"units": settings.units, "attributes": settings.attributes, "episodes": settings.episodes}
-    curves = []
-    for grows, size in full.items():
-        sizes = sorted({max(1, round(size * factor)) for factor in settings.factors})
-        cases = [sized(*{**full, grows: one}.values()) for one in sizes]
-        rounds = [[measure_seconds(case) for case in cases] for _ in range(settings.rounds)]
-        times = np.median(rounds, axis=0) * 1e3
-        each, fixed = np.polyfit(sizes, times, 1, w=1 / times)
-        line = fixed + each * np.array(sizes)
-        deviation = float(np.max(np.abs(times / line - 1)))
-        curves.append(
-            ScalingCurve(grows, tuple(sizes), tuple(times.tolist()), float(fixed), float(each), deviation)
-        )
-    return tuple(curves)
 
 
 def measure_seconds(work: Callable[[], object]) -> float:

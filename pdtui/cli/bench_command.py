@@ -59,9 +59,8 @@ def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bo
 @json_option
 def bench_dissect_command(robot: str, policy: str, as_json: bool, **sizes: Any) -> None:
     """Measure matching against a loop over librosa, and probing on two workers."""
-    from pdtui.benchmarks.benchmark_episodes import DissectionBenchmarkSettings
     from pdtui.benchmarks.benchmark_tables import dissect_table
-    from pdtui.benchmarks.dissection_benchmark import bench_dissection
+    from pdtui.benchmarks.dissection_benchmark import DissectionBenchmarkSettings, bench_dissection
 
     with progress_bar("measuring", quiet=as_json) as advance:
         result = bench_dissection(robot, policy or robot, DissectionBenchmarkSettings(**sizes), advance)

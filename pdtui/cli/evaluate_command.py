@@ -172,7 +172,7 @@ def _evaluate_behaviors(config: DriveConfig, seeds: range, workers: int, update:
     if update:
         path = Path(config.stimulation_map.source)
         rewrite_map(path, lambda text: replace_effects(text, result.measured_effects(), str(path)))
-    show_result(result.as_dict(), as_json, lambda: behavior_tables(result))
+    show_result(asdict(result), as_json, lambda: behavior_tables(result))
 
 
 def _check_experiment(

@@ -6,25 +6,29 @@ import json
 import time
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from torch import nn
 
+from pdtui.core.errors import RobotError
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
-from pdtui.dissection.dissection_config import DissectionConfig
+from pdtui.dissection.dissection_config import DissectionConfig, DissectionSettings
 from pdtui.dissection.dissection_result import Dissection, pick_sample_episode
 from pdtui.dissection.dissection_searches import DissectionSearches
-from pdtui.dissection.probe_starts import gather_probe_starts
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.confirmation import draw_control_units, select_units_to_refine
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.probing.start_states import StartState, collect_start_states, measure_walk_lengths
 from pdtui.robots import open_robot
+from pdtui.search.behavior_search import SearchStartStates
 from pdtui.search.plan_search import TimeBudget
 from pdtui.sessions.environment_versions import collect_versions
 from pdtui.spectra.matching import match_units
@@ -34,6 +38,28 @@ from pdtui.spectra.phase_correlation import correlate_phases
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stimulation_map import StimulationMap
+
+_SHORTEST = 24
+"""Control steps of the longest roll-out, below which dissecting is refused."""
+_MORE = 4
+"""Walks that are tried for each start state that is needed."""
+
+
+class ProbeStarts(NamedTuple):
+    """Start states for each stage of a dissection. No walk serves two stages.
+
+    Attributes:
+        screen, refine: Starts of the sweeps.
+        searches: Starts of everything after them.
+        settings: Those asked for, with roll-outs as short as the walks require.
+        shortened: A sentence on what was shortened; empty if nothing was.
+    """
+
+    screen: tuple[StartState, ...]
+    refine: tuple[StartState, ...]
+    searches: SearchStartStates
+    settings: DissectionSettings
+    shortened: str
 
 
 def dissect(config: DissectionConfig) -> Dissection:
@@ -143,3 +169,44 @@ def _fixed_behaviors(stimulation_map: StimulationMap, policy: Policy) -> tuple[S
         for behavior in stimulation_map.behaviors.values()
         if behavior.pid is None
     )
+
+
+def gather_probe_starts(pool: RolloutPool, settings: DissectionSettings, first_seed: int) -> ProbeStarts:
+    """Take one start state from each of several walks that last as long as the longest roll-out from there.
+
+    If too few walks do (a hopper may fall after two seconds), starts and roll-outs are shortened: what a unit
+    does within a second is still worth knowing.
+
+    Raises:
+        RobotError: The walks are too short even for that.
+    """
+    counts = (
+        settings.screen_starts,
+        settings.refine_starts,
+        settings.search_starts,
+        settings.selection_starts,
+        settings.held_out_starts,
+    )
+    total, wanted, shortened = sum(counts), settings.walk_steps + settings.longest_rollout, ""
+    seeds = range(first_seed, first_seed + _MORE * total)
+    lengths = measure_walk_lengths(pool.robot, pool.policy, seeds, wanted, enough=total)
+    lasting = sorted(lengths, reverse=True)[total - 1]
+    if lasting < wanted:
+        settings = settings.shortened_to(lasting)
+        if settings.longest_rollout < _SHORTEST:
+            raise RobotError(
+                f"{pool.robot.name}: expected {total} walks of {wanted} steps without a fall, but of "
+                f"{len(seeds)} walks only that many last {lasting} steps; dissection needs a policy that "
+                "stays up longer"
+            )
+        shortened = (
+            f"Of {len(seeds)} walks, {sum(length >= wanted for length in lengths)} lasted the {wanted} steps "
+            f"asked for and {total} lasted {lasting}, so stimulation began at step {settings.walk_steps} and "
+            f"lasted at most {settings.longest_rollout} steps. Effects beyond that were not measured."
+        )
+    everything = collect_start_states(
+        pool.robot, pool.policy, first_seed, total, at=settings.walk_steps, survive=settings.longest_rollout
+    )
+    remaining = iter(everything)
+    parts = [tuple(islice(remaining, count)) for count in counts]
+    return ProbeStarts(parts[0], parts[1], SearchStartStates(*parts[2:]), settings, shortened)

@@ -108,9 +108,7 @@ def _behavior_table(summary: dict[str, Any]) -> Table:
         {
             "behavior": lambda one: one["name"] + ("" if one["reached"] else " (goal not reached)"),
             "units": lambda one: describe_units(one["units"]),
-            "gain [95 %]": lambda one: (
-                f"{_show(one['gain'], '.2f')} [{_show(one['low'], '.2f')}, {_show(one['high'], '.2f')}]"
-            ),
+            "gain [95 %]": lambda one: _effect(one, "gain", ".2f"),
             "goal": lambda one: f"{one['enough']:g}",
             "success": lambda one: f"{one['success']:.0%}",
             "falls": lambda one: f"{one['falls']:.0%}",
@@ -189,10 +187,10 @@ def _yes(value: bool) -> str:
     return "yes" if value else "no"
 
 
-def _effect(one: dict[str, Any] | None) -> str:
+def _effect(one: dict[str, Any] | None, name: str = "effect", form: str = "+.2f") -> str:
     if one is None:
         return ""
-    return f"{_show(one['effect'], '+.2f')} [{_show(one['low'], '+.2f')}, {_show(one['high'], '+.2f')}]"
+    return f"{_show(one[name], form)} [{_show(one['low'], form)}, {_show(one['high'], form)}]"
 
 
 def _show(number: float | None, form: str) -> str:

@@ -8,7 +8,7 @@ difference between both drives of a seed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -70,16 +70,6 @@ class MapEvaluation:
     seeds: tuple[int, ...]
     behaviors: tuple[BehaviorEvaluation, ...]
     tasks: tuple[TaskEvaluation, ...] = ()
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return what ``--json`` prints."""
-        return {
-            "robot": self.robot,
-            "policy": self.policy,
-            "seeds": list(self.seeds),
-            "behaviors": [asdict(result) for result in self.behaviors],
-            "tasks": [asdict(result) for result in self.tasks],
-        }
 
     def measured_effects(self) -> dict[str, MeasuredEffect]:
         """Return the effects by behavior, as maps hold them."""
@@ -185,13 +175,11 @@ def _summarise(
     else:
         right = (with_it * sign > 0) & (effect * sign > 0)
         wanted = "> 0" if sign > 0 else "< 0"
-    low, high = confidence_interval(effect)
     return BehaviorEvaluation(
         behavior.name,
         f"{behavior.aim.attribute} ({loop.robot.attributes[column].unit}), wanted {wanted}",
         float(effect.mean()),
-        low,
-        high,
+        *confidence_interval(effect),
         float(with_it.mean()),
         float(default.mean()),
         int((right & ~fell).sum()),

@@ -183,9 +183,7 @@ def paired_ratio(units: Sequence[TrackingDriveResult], command: Sequence[Trackin
     above, below = seed_errors(units), seed_errors(command)
     both = np.isfinite(above) & np.isfinite(below)
     above, below = above[both], below[both]
-    if not len(above):
-        return ErrorRatio(float("nan"), 0.0, float("inf"))
-    value = float(above.mean() / below.mean())
+    value = float(above.mean() / below.mean()) if len(above) else float("nan")
     if len(above) < 2:
         return ErrorRatio(value, 0.0, float("inf"))
     drawn = stats.bootstrap(

@@ -69,17 +69,17 @@ def draw_spectrograms(figure: Figure, left: Axes, right: Axes, dissection: Disse
 
 def draw_ranking(panel: Axes, dissection: Dissection, column: int) -> None:
     """Draw the discrepancies of the nearest units as bars, the nearest on top."""
-    ranking = unit_ranking(dissection, column)
-    if not ranking.labels:
+    labels, discrepancies, level_shares = unit_ranking(dissection, column)
+    if not labels:
         _leave_out(panel, dissection, column)
         return
-    places = np.arange(len(ranking.labels))
-    panel.barh(places, ranking.discrepancies, color=[_MATCHED, *[_OTHER] * (len(places) - 1)], height=0.75)
-    panel.set_yticks(places, ranking.labels)
+    places = np.arange(len(labels))
+    panel.barh(places, discrepancies, color=[_MATCHED, *[_OTHER] * (len(places) - 1)], height=0.75)
+    panel.set_yticks(places, labels)
     panel.invert_yaxis()
     panel.ticklabel_format(axis="x", scilimits=(-2, 3), useMathText=True)
     panel.set_title(dissection.attributes[column].name)
-    panel.set_xlabel(f"discrepancy\n(first: {ranking.level_shares[0]:.0%} mean level)")
+    panel.set_xlabel(f"discrepancy\n(first: {level_shares[0]:.0%} mean level)")
 
 
 def draw_effects(panel: Axes, dissection: Dissection, column: int) -> None:

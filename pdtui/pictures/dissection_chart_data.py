@@ -60,20 +60,6 @@ class MatchedSpectrograms:
 
 
 @dataclass(frozen=True)
-class UnitRanking:
-    """The N units of least discrepancy with one attribute, the nearest first.
-
-    Attributes:
-        labels: Addresses of the units.
-        level_shares: Share of each squared distance that is mean level, shape (N,).
-    """
-
-    labels: tuple[str, ...]
-    discrepancies: Floats
-    level_shares: Floats
-
-
-@dataclass(frozen=True)
 class EffectCurve:
     """Change of one attribute with the output v of one unit, relative to unstimulated roll-outs.
 
@@ -148,15 +134,16 @@ def matched_spectrograms(dissection: Dissection, column: int) -> MatchedSpectrog
     return MatchedSpectrograms(attribute, unit, label, one, other, high - DECIBELS, high)
 
 
-def unit_ranking(dissection: Dissection, column: int, count: int = RANKED) -> UnitRanking:
-    """Return the nearest units of an attribute; none for an attribute that matching left out."""
+def unit_ranking(dissection: Dissection, column: int) -> tuple[list[str], Floats, Floats]:
+    """Return the `RANKED` units nearest to an attribute; none for an attribute that matching left out.
+
+    Returns:
+        Their addresses, discrepancies, and the shares of the squared distances that are mean level.
+    """
     matching = dissection.matching
-    ranked = matching.ranked_units(column)[:count]
-    return UnitRanking(
-        tuple(format_unit(int(unit), dissection.layers) for unit in ranked),
-        matching.discrepancy[column, ranked],
-        matching.level_share[column, ranked],
-    )
+    ranked = matching.ranked_units(column)[:RANKED]
+    labels = [format_unit(int(unit), dissection.layers) for unit in ranked]
+    return labels, matching.discrepancy[column, ranked], matching.level_share[column, ranked]
 
 
 def effect_curves(dissection: Dissection, column: int) -> list[EffectCurve]:

@@ -106,13 +106,10 @@ def _image(content: bytes) -> rr.EncodedImage:
 
 
 def _log_ranking(log: Log, dissection: Dissection, column: int) -> None:
-    ranking = unit_ranking(dissection, column)
-    if ranking.labels:
-        numbers = rr.AnyValues(
-            unit=pa.array(ranking.labels),
-            discrepancy=pa.array(ranking.discrepancies),
-            mean_level=pa.array(ranking.level_shares),
-        )
+    labels, discrepancies, level_shares = unit_ranking(dissection, column)
+    if labels:
+        columns = {"unit": labels, "discrepancy": discrepancies, "mean_level": level_shares}
+        numbers = rr.AnyValues(**{name: pa.array(values) for name, values in columns.items()})
         log(_attribute_entity(dissection, column, "discrepancies"), numbers)
 
 

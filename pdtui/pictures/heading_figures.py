@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,18 @@ class TrackedHeading:
     note: str
     values: Floats
 
+    def statistics(self, target: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return statistics over the seeds that have not fallen, shape (T,) each; NaN where all have.
+
+        Returns:
+            Mean heading, both ends of the middle 90 % of headings, and mean |error|, in rad.
+        """
+        errors = np.abs(wrap_angles(target - self.values))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # steps that no seed reached
+            low, high = np.nanpercentile(self.values, _BAND, axis=0)
+            return np.nanmean(self.values, axis=0), low, high, np.nanmean(errors, axis=0)
+
 
 @dataclass(frozen=True)
 class HeadingFigure:
@@ -66,39 +79,6 @@ class HeadingFigure:
     def seeds(self) -> int:
         """Number of drives of each behavior."""
         return len(self.held[0].values)
-
-
-@dataclass(frozen=True)
-class HeadingCurve:
-    """One behavior over time.
-
-    Attributes:
-        held: Its headings.
-        color: Its colour in every picture.
-        mean, low, high: Mean heading of the seeds that have not fallen, and the range of the middle 90 % of
-            them, in rad; shape (T,), NaN where all have fallen.
-        error: Mean |error| of the same seeds in rad, shape (T,).
-    """
-
-    held: TrackedHeading
-    color: RgbColor
-    mean: Floats
-    low: Floats
-    high: Floats
-    error: Floats
-
-
-def heading_curves(shown: HeadingFigure) -> list[HeadingCurve]:
-    """Return the curves that both pictures draw."""
-    curves = []
-    for number, held in enumerate(shown.held):
-        errors = np.abs(wrap_angles(shown.target - held.values))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # steps that no seed reached
-            low, high = np.nanpercentile(held.values, _BAND, axis=0)
-            mean, error = np.nanmean(held.values, axis=0), np.nanmean(errors, axis=0)
-        curves.append(HeadingCurve(held, CYCLE[number % len(CYCLE)], mean, low, high, error))
-    return curves
 
 
 def check_heading_pictures(paths: Sequence[Path], overwrite: bool) -> None:
@@ -133,11 +113,11 @@ def _draw_heading_figure(path: Path, shown: HeadingFigure) -> None:
     with figure_page(path, 4.2, shown.title) as figure:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         above.plot(times, shown.target, color="black", linewidth=0.9, linestyle="--", label="target")
-        for curve in heading_curves(shown):
-            color, held = to_hex(curve.color), curve.held
-            above.fill_between(times, curve.low, curve.high, color=color, alpha=0.2, linewidth=0.0)
-            above.plot(times, curve.mean, color=color, label=f"{held.name}: {held.note}")
-            below.plot(times, curve.error, color=color)
+        for held, color in zip(shown.held, cycle(map(to_hex, CYCLE)), strict=False):
+            mean, low, high, error = held.statistics(shown.target)
+            above.fill_between(times, low, high, color=color, alpha=0.2, linewidth=0.0)
+            above.plot(times, mean, color=color, label=f"{held.name}: {held.note}")
+            below.plot(times, error, color=color)
         above.set_title(f"{shown.seeds} seeds: mean and middle 90 %")
         above.set_ylabel("heading (rad)")
         above.set_xlim(0.0, float(times[-1]))
@@ -164,15 +144,15 @@ def _write_heading_recording(path: Path, shown: HeadingFigure) -> None:
         table = rr.TextDocument(table_to_markdown(shown.figures), media_type=rr.MediaType.MARKDOWN)
         rr.log(_FIGURES, table, static=True, recording=recording, strict=True)
         curve(f"{_HEADINGS}/target", shown.target, "target", GREY, 1.5)
-        for one in heading_curves(shown):
-            name = one.held.name
-            part = rr.escape_entity_path_part(name)
-            red, green, blue = one.color
+        for held, color in zip(shown.held, cycle(CYCLE), strict=False):
+            mean, low, high, error = held.statistics(shown.target)
+            part = rr.escape_entity_path_part(held.name)
+            red, green, blue = color
             faint = (red // 2, green // 2, blue // 2)
-            for end, values in (("low", one.low), ("high", one.high)):
-                curve(f"{_HEADINGS}/{part}/{end}", values, f"{name}, {end} end of 90 %", faint, 0.7)
-            curve(f"{_HEADINGS}/{part}/mean", one.mean, name, one.color, 2.0)
-            curve(f"{_ERRORS}/{part}", one.error, name, one.color, 1.5)
+            for end, values in (("low", low), ("high", high)):
+                curve(f"{_HEADINGS}/{part}/{end}", values, f"{held.name}, {end} end of 90 %", faint, 0.7)
+            curve(f"{_HEADINGS}/{part}/mean", mean, held.name, color, 2.0)
+            curve(f"{_ERRORS}/{part}", error, held.name, color, 1.5)
 
 
 def _layout(shown: HeadingFigure) -> rrb.Vertical:

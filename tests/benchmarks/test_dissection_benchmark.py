@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from pdtui.benchmarks.benchmark_episodes import DissectionBenchmarkSettings, record_episodes, widen_episode
+from pdtui.benchmarks.dissection_benchmark import DissectionBenchmarkSettings, record_episodes, widen_episode
 from pdtui.benchmarks.matching_benchmark import load_librosa, match_by_loop, same_ranking
 from pdtui.cli import main
 from pdtui.core.attributes import Attribute

@@ -171,11 +171,8 @@ def _configs(
     configs: dict[ForestCondition, DriveConfig] = {}
     left_out = {}
     for condition in conditions:
-        if condition != "vision":
-            configs[condition] = config
-            continue
         try:
-            configs[condition] = _with_vision(config)
+            configs[condition] = _with_vision(config) if condition == "vision" else config
         except PdtuiError as error:
             left_out[CONDITIONS[condition]] = str(error)
     return configs, left_out

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from rich.console import Group
 
+from pdtui.core.text_tables import new_table, seed_range
 from pdtui.paper.forest.forest_episode import ForestEpisode
 from pdtui.paper.forest.key_motion_model import KeyMotionModel
 
@@ -95,3 +98,31 @@ def summarise_condition(
         len(runs),
         tuple(runs),
     )
+
+
+def forest_table(result: ForestExperimentResult) -> Group:
+    """Return a table with one column per condition and figures per episode, and notes below it."""
+    measured = f", {seed_range(result.seeds)} in {result.repeats} repeats" if result.seeds else ""
+    rows = result.conditions
+    table = new_table(
+        f"{result.robot} in the forest, at most {result.steps} steps ({result.seconds:g} s){measured}",
+        *("per episode", *(row.condition for row in rows)),
+    )
+    table.add_row("policy", *(row.policy for row in rows))
+    table.add_row("reward", *(_mean_and_spread(row.reward, 0) for row in rows))
+    table.add_row("distance along x (m)", *(_mean_and_spread(row.distance, 2) for row in rows))
+    table.add_row("collisions", *(_mean_and_spread(row.collisions, 2) for row in rows))
+    table.add_row("key presses", *(_mean_and_spread(row.presses, 1) for row in rows))
+    table.add_row("steps with a key press", *(_mean_and_spread(row.involvement, 1) for row in rows))
+    table.add_row("falls", *(f"{row.falls}/{row.episodes}" for row in rows))
+    table.add_row("crossed the forest", *(f"{row.crossed}/{row.episodes}" for row in rows))
+    notes = ["Mean ± standard deviation over repeats. An episode ends at a fall or at the far end."]
+    if result.sessions:
+        notes.append("The first episode of each scored session counts as a repeat.")
+    notes += [f"Not measured: {condition}: {reason}" for condition, reason in result.left_out.items()]
+    return Group(table, *notes)
+
+
+def _mean_and_spread(figure: RepeatStatistics, digits: int) -> str:
+    spread = "" if math.isnan(figure.std) else f" ± {figure.std:.{digits}f}"
+    return f"{figure.mean:.{digits}f}{spread}"
