@@ -182,16 +182,14 @@ def record_episodes(
     Raises:
         PdtuiError: an episode ended before its number of steps.
     """
-    recorded = monitor_episodes(
-        pool.robot, pool.policy, range(1000, 1000 + settings.episodes), settings.steps
-    )
-    for episode in recorded:
+    walks = monitor_episodes(pool.robot, pool.policy, range(1000, 1000 + settings.episodes), settings.steps)
+    for episode in walks:
         if episode.steps < settings.steps:
             raise PdtuiError(
                 f"{pool.robot.name}: expected {settings.steps} steps, but the episode of seed {episode.seed} "
                 f"ended after {episode.steps}: {episode.ended}"
             )
-    episodes = [widen_episode(episode, settings.units, settings.attributes) for episode in recorded]
+    episodes = [widen_episode(episode, settings.units, settings.attributes) for episode in walks]
     known = pool.robot.attributes
     attributes = tuple(
         replace(known[column % len(known)], name=f"{known[column % len(known)].name} {column}")
@@ -235,10 +233,8 @@ def measure_matching_growth(
         cases = [sized(*{**full, grows: one}.values()) for one in sizes]
         rounds = [[measure_seconds(case) for case in cases] for _ in range(settings.rounds)]
         times = np.median(rounds, axis=0) * 1e3
-        each, fixed = np.polyfit(sizes, times, 1, w=1 / times)
+        each, fixed = np.polyfit(sizes, times, 1, w=1 / times).tolist()
         line = fixed + each * np.array(sizes)
         deviation = float(np.max(np.abs(times / line - 1)))
-        curves.append(
-            ScalingCurve(grows, tuple(sizes), tuple(times.tolist()), float(fixed), float(each), deviation)
-        )
+        curves.append(ScalingCurve(grows, tuple(sizes), tuple(times.tolist()), fixed, each, deviation))
     return tuple(curves)

@@ -117,10 +117,8 @@ def match_by_loop(
     window = {"rectangular": "boxcar"}.get(preset.window, preset.window)
 
     def spectrogram(series: Floats) -> Floats:
-        spectra = librosa.stft(
-            series, n_fft=preset.length, hop_length=preset.hop, window=window, center=False
-        )
-        return np.asarray(np.abs(spectra) ** exponent)
+        stft = librosa.stft(series, n_fft=preset.length, hop_length=preset.hop, window=window, center=False)
+        return np.asarray(np.abs(stft) ** exponent)
 
     total = np.zeros((len(attributes), episodes[0].activations.shape[1]))
     for episode in episodes:

@@ -101,9 +101,7 @@ def find_attribute_movers(
     Args:
         columns: Columns of the attributes. Their side effects count, too.
         spread: Standard deviation of every attribute, shape (J,).
-        refined: Effects of the units to choose from.
         starts: Starts that neither sweep used. The first half chooses units, the other half measures them.
-        settings: How many units to try, and for how long.
     """
     found = []
     half, steps = len(starts) // 2, settings.mover_steps
@@ -146,9 +144,7 @@ def _singles(
                 robust[row, dose] = 0.0
     furthest = robust.max(axis=1)
     rows = [int(row) for row in np.argsort(-furthest, kind="stable")[:count] if furthest[row] > 0]
-    return [
-        Stimulation((refined.units[row],), (refined.values[int(np.argmax(robust[row]))],)) for row in rows
-    ]
+    return [Stimulation((refined.units[row],), (refined.values[robust[row].argmax()],)) for row in rows]
 
 
 def _lasting(result: PlanEffects, column: int, sign: int) -> int | None:

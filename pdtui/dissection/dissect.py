@@ -83,10 +83,8 @@ def dissect(config: DissectionConfig) -> Dissection:
         report = config.progress
         return None if report is None else lambda done, total: report(name, done, total)
 
-    with ExitStack() as stack:
-        pool = stack.enter_context(
-            RolloutPool(config.robot, config.policy, config.workers, config.import_options)
-        )
+    pool = RolloutPool(config.robot, config.policy, config.workers, config.import_options)
+    with pool, ExitStack() as stack:
         robot, network, journal = pool.robot, pool.policy, None
         if config.journal is not None:
             # What the outcome of a roll-out depends on besides its start and plan.
@@ -162,13 +160,9 @@ def _fixed_behaviors(stimulation_map: StimulationMap, policy: Policy) -> tuple[S
         MapError: A unit does not exist in the policy.
     """
     stimulation_map.check(stimulation_map.robot, policy.layers, policy.sha256, force=True)
-    return tuple(
-        Stimulation.of(
-            {parse_unit(unit, policy.layers): v for unit, v in stimulation_map.units_of(behavior).items()}
-        )
-        for behavior in stimulation_map.behaviors.values()
-        if behavior.pid is None
-    )
+    fixed = [one for one in stimulation_map.behaviors.values() if one.pid is None]
+    units = [stimulation_map.units_of(one).items() for one in fixed]
+    return tuple(Stimulation.of({parse_unit(unit, policy.layers): v for unit, v in one}) for one in units)
 
 
 def gather_probe_starts(pool: RolloutPool, settings: DissectionSettings, first_seed: int) -> ProbeStarts:

@@ -60,9 +60,7 @@ def dissect_into_map(
     Roll-outs are kept in `journal_path` until the map and the pictures are written, so that the same call
     continues where an interrupted one stopped.
 
-    Args:
-        config: What to dissect. Its journal is not used.
-        draw: Draws the pictures, and returns their files.
+    The journal of `config` is not used. `draw` draws the pictures, and returns their files.
 
     Raises:
         MapError: The map exists already or cannot be written. Found out before the work starts.

@@ -63,14 +63,12 @@ class DissectionSearches:
         policy, imprints = self.prober.pool.policy, self.settings.imprints
         settings = self.settings.behavior_search
         first = self.seed + _IMPRINT_SEEDS
-        episodes = monitor_episodes(
-            self.robot, policy, range(first, first + imprints.episodes), imprints.steps
-        )
+        walks = monitor_episodes(self.robot, policy, range(first, first + imprints.episodes), imprints.steps)
         plans = [
             *self.known,
             *draw_random_candidates(policy.units, settings.random_sets, settings.bounds, self.seed),
             *build_imprint_candidates(
-                episodes, self.robot.attributes, policy.layers, imprints, settings.bounds.largest
+                walks, self.robot.attributes, policy.layers, imprints, settings.bounds.largest
             ),
         ]
         few, progress = starts.search[: settings.quick_starts], self.stage("sets of units")

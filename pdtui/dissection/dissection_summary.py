@@ -23,9 +23,7 @@ from pdtui.spectra.matching_presets import preset_values
 def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str, Any]:
     """Return the findings as data for JSON. Numbers that do not exist are None.
 
-    Args:
-        dissection: The findings.
-        matches: Number of matches listed for each attribute, the nearest first.
+    For each attribute at most `matches` matches are listed, the nearest first.
     """
     return {
         "robot": dissection.robot,

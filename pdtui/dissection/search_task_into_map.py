@@ -86,10 +86,7 @@ def search_task_into_map(
     """Search for a stimulation that does a task, and write it into a new map or one of the same policy.
 
     If the map has a behavior for the task, the search also begins from it, and it is replaced.
-
-    Args:
-        output: File of the map.
-        minutes: Time after which the search ends with the best found so far.
+    After `minutes` it ends with the best found so far.
 
     Raises:
         MapError: There is no such task, or the map is of another policy or cannot be written.

@@ -70,7 +70,7 @@ def evaluate_command_following(
         PdtuiError: the robot, policy or map cannot be loaded.
     """
     built = build_loop(config)
-    robot, policy = built.robot, built.policy
+    robot, policy, steps = built.robot, built.policy, built.robot.episode_steps
     ranges = {name: one for name, one in robot.command_ranges.items() if name in robot.commands}
     if not ranges:
         raise RobotError(f"{robot.name}: it takes no commands")
@@ -83,7 +83,7 @@ def evaluate_command_following(
         behavior = Behavior(_ASKED, "a", "sets commands", {}, commands=dict(zip(ranges, wanted, strict=True)))
         only_commands = replace(built.map, primitives={}, behaviors={_ASKED: behavior})
         loop = ControlLoop(robot, policy, only_commands, seed)
-        records = list(run_episode(loop, robot.episode_steps, lambda step: press.get(step, [])))
+        records = list(run_episode(loop, steps, lambda step: press.get(step, [])))
         values = [record.attributes[columns] for record in records]
         settled = np.array(values[SETTLED:] or values[-1:])
         asked.append(wanted)
@@ -105,9 +105,7 @@ def evaluate_command_following(
                 float(np.array(biases)[:, index].mean()),
             )
         )
-    return CommandFollowingResult(
-        robot.name, policy.name, tuple(seeds), robot.episode_steps, tuple(rows), finished
-    )
+    return CommandFollowingResult(robot.name, policy.name, tuple(seeds), steps, tuple(rows), finished)
 
 
 def commands_table(result: CommandFollowingResult) -> Table:

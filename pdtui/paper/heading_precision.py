@@ -143,7 +143,7 @@ def compare_heading_precision(
                 for one in behaviors
                 for seed in seeds
             ]
-            rows += _rows(runner, behaviors, runner.run(drives, tell), len(seeds))
+            rows += _rows(runner, behaviors, runner.run(drives, tell))
         before += len(seeds) * len(behaviors)
     if len(set(steps.values())) > 1:
         told = ", ".join(f"{source} has {dt:g} s" for source, dt in steps.items())
@@ -152,16 +152,11 @@ def compare_heading_precision(
 
 
 def _rows(
-    runner: TrackingDriveRunner,
-    behaviors: Sequence[Behavior],
-    followed: Sequence[TrackingDriveResult],
-    count: int,
+    runner: TrackingDriveRunner, behaviors: Sequence[Behavior], followed: Sequence[TrackingDriveResult]
 ) -> list[HeadingControllerResult]:
-    loop = runner.loop
+    loop, count = runner.loop, len(followed) // len(behaviors)
     parts = [list(followed[number * count :][:count]) for number in range(len(behaviors))]
-    by_command = next(
-        (p for b, p in zip(behaviors, parts, strict=True) if control_input(b) == "command"), None
-    )
+    command = next((p for b, p in zip(behaviors, parts, strict=True) if control_input(b) == "command"), None)
     return [
         HeadingControllerResult(
             loop.map.source,
@@ -171,7 +166,7 @@ def _rows(
             (*behavior.commands, *loop.map.units_of(behavior)),
             {name: value for name, value in loop.robot.commands.items() if name not in behavior.commands},
             summarise_tracking(part, runner.attribute(ATTRIBUTE).unit),
-            None if by_command is None or part is by_command else paired_ratio(part, by_command),
+            None if command is None or part is command else paired_ratio(part, command),
             np.array([one.values.ravel() for one in part]),
         )
         for behavior, part in zip(behaviors, parts, strict=True)

@@ -135,10 +135,9 @@ def matched_spectrograms(dissection: Dissection, column: int) -> MatchedSpectrog
 
 
 def unit_ranking(dissection: Dissection, column: int) -> tuple[list[str], Floats, Floats]:
-    """Return the `RANKED` units nearest to an attribute; none for an attribute that matching left out.
+    """Return the units nearest to an attribute; none for an attribute that matching left out.
 
-    Returns:
-        Their addresses, discrepancies, and the shares of the squared distances that are mean level.
+    They are addresses, discrepancies, and the shares of the squared distances that are mean level.
     """
     matching = dissection.matching
     ranked = matching.ranked_units(column)[:RANKED]

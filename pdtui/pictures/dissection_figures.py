@@ -51,9 +51,8 @@ def draw_dissection_figures(folder: Path, dissection: Dissection) -> list[Path]:
 
 def existing_figures(folder: Path) -> list[Path]:
     """Return the files in a folder that `draw_dissection_figures` may replace."""
-    return sorted(
-        path for name in NAMES for path in (*folder.glob(f"{name}.png"), *folder.glob(f"{name}-[0-9]*.png"))
-    )
+    ends = ("", "-[0-9]*")
+    return sorted(path for name in NAMES for end in ends for path in folder.glob(f"{name}{end}.png"))
 
 
 @contextmanager

@@ -43,10 +43,9 @@ class TrackedHeading:
     values: Floats
 
     def statistics(self, target: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return statistics over the seeds that have not fallen, shape (T,) each; NaN where all have.
+        """Return mean heading, both ends of its middle 90 %, and mean |error|, in rad, shape (T,) each.
 
-        Returns:
-            Mean heading, both ends of the middle 90 % of headings, and mean |error|, in rad.
+        They are over the seeds that have not fallen, and NaN where all have.
         """
         errors = np.abs(wrap_angles(target - self.values))
         with warnings.catch_warnings():

@@ -43,10 +43,7 @@ _STYLE: dict[str, Any] = {
 def figure_page(target: Path | BytesIO, height: float, title: str) -> Iterator[Figure]:
     """Yield a figure that is written as a PNG when the block ends without an error.
 
-    Args:
-        target: The file, whose folder is made and which is replaced once the picture is whole; or a buffer.
-        height: Inches; the width is `WIDTH`.
-        title: Text above everything.
+    A file's folder is made, and the file is replaced once the picture is whole. The height is in inches.
 
     Raises:
         PictureError: The file cannot be written.

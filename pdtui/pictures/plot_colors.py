@@ -28,12 +28,8 @@ def to_hex(color: RgbColor) -> str:
 def diverging(values: Floats, limit: float) -> NDArray[np.uint8]:
     """Colour values: vermillion below zero, white at zero, blue above, grey where there is no number.
 
-    Args:
-        values: Array of any shape (...).
-        limit: Magnitude from which the colours no longer change.
-
-    Returns:
-        Red, green and blue, shape (..., 3).
+    From a magnitude of `limit` on the colours no longer change. Values have any shape (...); the red, green
+    and blue of the colours have the shape (..., 3).
     """
     part = np.clip(np.nan_to_num(values) / limit, -1.0, 1.0)[..., None]
     ends = np.where(part < 0, np.array(VERMILLION), np.array(BLUE))

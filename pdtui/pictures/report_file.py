@@ -22,10 +22,8 @@ TIME = "time"
 def open_report_file(path: Path, app: str, layout: rrb.Tabs | rrb.Vertical) -> Iterator[rr.RecordingStream]:
     """Yield a recording that is in its file when the block ends without an error.
 
-    Args:
-        path: The file; its folder is made, and an existing file is replaced once the recording is whole.
-        app: Name of the application, by which viewers remember a user's own layout.
-        layout: The views with which the recording opens.
+    The file's folder is made, and an existing file is replaced once the recording is whole. Viewers remember a
+    user's own layout by the name of the app.
 
     Raises:
         PictureError: The file cannot be written.

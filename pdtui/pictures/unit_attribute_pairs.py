@@ -137,9 +137,8 @@ def draw_unit_attribute_pairs(
 ) -> None:
     """Draw one panel per pair: the attribute as a solid line, the unit as a dashed one, in the same colour.
 
-    Args:
-        path: PNG file; an existing one is replaced once the picture is whole.
-        start, seconds: The part of the episode to show, in seconds; None shows it to the end.
+    The part that is shown begins at `start` and lasts `seconds`, or up to the end for None. An existing file
+    is replaced once the picture is whole.
 
     Raises:
         PictureError: The episode ends before `start`, or the file cannot be written.

@@ -74,85 +74,77 @@ class MatchingHitRate:
 
 
 def select_units_to_refine(
-    screening: UnitEffects, matching: Discrepancies, columns: Sequence[int], keep: int
+    screen: UnitEffects, matching: Discrepancies, columns: Sequence[int], keep: int
 ) -> tuple[int, ...]:
     """Choose the first match of each attribute, and the `keep` strongest probed units in each direction."""
     chosen: set[int] = set()
     for column in columns:
         chosen.update(matching.ranked_units(column)[:1].tolist())
         for sign in (1.0, -1.0):
-            strengths = screening.robust_effects(column, sign).max(axis=1)
+            strengths = screen.robust_effects(column, sign).max(axis=1)
             order = np.argsort(-strengths, kind="stable")[:keep]
-            chosen.update(screening.units[row] for row in order if strengths[row] > 0)
+            chosen.update(screen.units[row] for row in order if strengths[row] > 0)
     return tuple(sorted(chosen))
 
 
-def draw_control_units(screening: UnitEffects, count: int, seed: int) -> tuple[int, ...]:
+def draw_control_units(screen: UnitEffects, count: int, seed: int) -> tuple[int, ...]:
     """Draw units at random, whatever they do: a ranking has to beat them."""
     rng = np.random.default_rng(seed)
-    chosen = rng.choice(screening.units, size=min(count, len(screening.units)), replace=False)
+    chosen = rng.choice(screen.units, size=min(count, len(screen.units)), replace=False)
     return tuple(sorted(chosen.tolist()))
 
 
 def confirm_unit(
-    unit: int, column: int, screening: UnitEffects, refinement: UnitEffects, seed: int
+    unit: int, column: int, screen: UnitEffects, refined: UnitEffects, seed: int
 ) -> PrimitiveConfirmation:
     """Judge one unit by its refined effects.
 
-    Args:
-        screening: effects of every unit at a few values.
-        refinement: effects of some units at those values and more, from other starts.
+    It is judged at the values at which all units were screened, by its effects from other starts.
     """
-    row = refinement.units.index(unit)
-    shared = [dose for dose, value in enumerate(refinement.values) if value in screening.values]
-    up, down = (refinement.robust_effects(column, sign)[row] for sign in (1.0, -1.0))
+    row = refined.units.index(unit)
+    shared = [dose for dose, value in enumerate(refined.values) if value in screen.values]
+    up, down = (refined.robust_effects(column, sign)[row] for sign in (1.0, -1.0))
     robust = np.maximum(up, down)
     dose = shared[int(np.argmax(robust[shared]))]
-    samples = refinement.effects[row, dose, :, column]
+    samples = refined.effects[row, dose, :, column]
     known = samples[np.isfinite(samples)]
     effect = float(known.mean()) if known.size else float("nan")
-    value = refinement.values[dose]
+    value = refined.values[dose]
     low, high = bootstrap_interval(samples, seed)
     return PrimitiveConfirmation(
         unit=unit,
         value=value,
         measured=MeasuredEffect(effect, low, high),
         one_sign=bool(robust[dose] > 0),
-        exceeds_random=exceeds_random_units(effect, value, column, screening),
-        both_ways=_moves_both_ways(refinement.values, up > 0, down > 0),
-        safe_magnitude=refinement.safe_magnitude(unit),
+        exceeds_random=exceeds_random_units(effect, value, column, screen),
+        both_ways=_moves_both_ways(refined.values, up > 0, down > 0),
+        safe_magnitude=refined.safe_magnitude(unit),
     )
 
 
 def rank_probed_units(
-    column: int, screening: UnitEffects, refinement: UnitEffects, seed: int, count: int = 3
+    column: int, screen: UnitEffects, refined: UnitEffects, seed: int, count: int = 3
 ) -> list[PrimitiveConfirmation]:
     """Return the `count` best of the refined units that move an attribute most, confirmed ones first."""
-    order = np.argsort(-refinement.robust_strengths(column), kind="stable")[: 4 * count]
-    judged = [confirm_unit(refinement.units[row], column, screening, refinement, seed) for row in order]
+    order = np.argsort(-refined.robust_strengths(column), kind="stable")[: 4 * count]
+    judged = [confirm_unit(refined.units[row], column, screen, refined, seed) for row in order]
     return sorted(judged, key=lambda one: not one.confirmed)[:count]
 
 
 def measure_matching_hits(
-    column: int,
-    screening: UnitEffects,
-    matching: Discrepancies,
-    refinement: UnitEffects,
-    controls: Sequence[int],
+    column: int, screen: UnitEffects, matching: Discrepancies, refined: UnitEffects, controls: Sequence[int]
 ) -> MatchingHitRate:
     """Compare the ranking by discrepancy with the effects that probing measured.
 
-    Args:
-        refinement: effects of some units from other starts.
-        controls: those of the refined units that were drawn at random.
+    The refined effects are from other starts; the controls are those of the refined units drawn at random.
     """
-    strengths = screening.robust_strengths(column)
+    strengths = screen.robust_strengths(column)
     hits = (strengths > 0) & (strengths > np.quantile(strengths, RANDOM_QUANTILE))
-    values = [value for value in screening.values if value in refinement.values]
-    units = np.array(screening.units)
-    screened = screening.mean_strengths(column, values)[np.searchsorted(units, np.array(controls, np.intp))]
-    rows = [refinement.units.index(unit) for unit in controls]
-    held_out = refinement.mean_strengths(column, values)[rows]
+    values = [value for value in screen.values if value in refined.values]
+    units = np.array(screen.units)
+    screened = screen.mean_strengths(column, values)[np.searchsorted(units, np.array(controls, np.intp))]
+    rows = [refined.units.index(unit) for unit in controls]
+    held_out = refined.mean_strengths(column, values)[rows]
     probing = rank_correlation(screened, held_out)
     ranked = matching.ranked_units(column)
     if not ranked.size:
@@ -176,12 +168,12 @@ def rank_correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     return float(stats.spearmanr(a, b).statistic)
 
 
-def exceeds_random_units(effect: float, value: float, column: int, screening: UnitEffects) -> bool:
+def exceeds_random_units(effect: float, value: float, column: int, screen: UnitEffects) -> bool:
     """Return whether an effect exceeds that of `RANDOM_QUANTILE` of all units at the nearest screened |v|."""
-    magnitude = min((abs(v) for v in screening.values), key=lambda size: abs(size - abs(value)))
-    doses = [dose for dose, v in enumerate(screening.values) if abs(v) == magnitude]
+    magnitude = min((abs(v) for v in screen.values), key=lambda size: abs(size - abs(value)))
+    doses = [dose for dose, v in enumerate(screen.values) if abs(v) == magnitude]
     # A fall before the measured steps leaves NaN, which counts as no effect.
-    sizes = np.abs(np.nan_to_num(screening.effects[:, doses, :, column]).mean(axis=-1))
+    sizes = np.abs(np.nan_to_num(screen.effects[:, doses, :, column]).mean(axis=-1))
     return bool(abs(effect) > np.quantile(sizes, RANDOM_QUANTILE))
 
 

@@ -93,9 +93,7 @@ class UnitEffects:
 class EffectProbe:
     """Measures the effects of stimulations, and remembers the unperturbed roll-outs that all of them need.
 
-    Args:
-        pool: runs the roll-outs.
-        journal: file of finished roll-outs, which are not run again; None for none.
+    Finished roll-outs that the journal holds are not run again.
     """
 
     def __init__(self, pool: RolloutPool, journal: RolloutJournal | None = None) -> None:
@@ -113,10 +111,8 @@ class EffectProbe:
     ) -> PlanEffects:
         """Measure plans from common starts.
 
-        Args:
-            starts: states to which robot and policy are restored, bit for bit, before each roll-out.
-            steps: control steps of stimulation.
-            measure_from: first step that is measured; by default the second half is.
+        Before each roll-out robot and policy are restored to its start, bit for bit. By default the second
+        half of the steps is measured.
 
         Raises:
             WorkerError: a worker process died.

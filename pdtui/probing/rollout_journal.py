@@ -24,9 +24,8 @@ class RolloutJournal(Closable):
     A dissection that is run again with the same arguments makes the same decisions. It reads the outcomes of
     finished roll-outs instead of running them, and soon arrives where it was interrupted.
 
-    Args:
-        path: SQLite database; created if it does not exist.
-        identity: what all roll-outs have in common, such as the robot and the hash of the policy.
+    The SQLite database at `path` is created if it does not exist. The identity is what all roll-outs have in
+    common, such as the robot and the hash of the policy.
 
     Raises:
         RobotError: the file is not a journal or cannot be written.
@@ -41,9 +40,7 @@ class RolloutJournal(Closable):
             self._database.execute(_SCHEMA)
             self._database.execute("PRAGMA synchronous=OFF")
         except (sqlite3.Error, OSError) as error:
-            raise RobotError(
-                f"{path}: expected a journal of roll-outs, or a place for one: {error}"
-            ) from error
+            raise RobotError(f"{path}: expected a journal of roll-outs or room for one: {error}") from error
 
     def __len__(self) -> int:
         return int(self._database.execute("SELECT count(*) FROM rollouts").fetchone()[0])
@@ -58,12 +55,8 @@ class RolloutJournal(Closable):
         """Return the key of each job."""
         prints = [fingerprint_start_state(start) for start in starts]
         length = f"{steps} {measure_from}".encode()
-        return [
-            blake2b(
-                b"\0".join((self._identity, prints[index], repr(plan).encode(), length)), digest_size=16
-            ).digest()
-            for plan, index in jobs
-        ]
+        parts = ((self._identity, prints[index], repr(plan).encode(), length) for plan, index in jobs)
+        return [blake2b(b"\0".join(part), digest_size=16).digest() for part in parts]
 
     def read(self, keys: Sequence[bytes]) -> list[RolloutOutcome | None]:
         """Return the outcome for each key, or None where there is none."""

@@ -39,10 +39,8 @@ def _load(policy: str | Path, world: Robot, import_options: ImportOptions) -> Po
     return load_policy(policy, world.name, import_options=import_options, spaces=WorldSpaces.of_world(world))
 
 
-def _apply(
-    function: Callable[[Robot, Policy, WorkItem], WorkResult], pair: _Pair, item: WorkItem
-) -> WorkResult:
-    return function(*pair, item)
+def _apply(work: Callable[[Robot, Policy, WorkItem], WorkResult], pair: _Pair, item: WorkItem) -> WorkResult:
+    return work(*pair, item)
 
 
 def _run_chunk(pair: _Pair, chunk: _Chunk) -> list[RolloutOutcome]:
@@ -55,12 +53,8 @@ class RolloutPool(Closable):
 
     The results do not depend on the number of workers, as each roll-out depends on its start and plan only.
 
-    Args:
-        robot: name of the robot, or a robot.
-        policy: weights file, name of a shipped policy, or a policy.
-        workers: number of processes, each of which loads robot and policy by name. If one of the two is given
-            as an object, all roll-outs run in this process.
-        import_options: what the weights file leaves open.
+    Each worker process loads robot and policy by name. If one of the two is given as an object, all roll-outs
+    run in this process. The import options say what the weights file leaves open.
 
     Attributes:
         rollouts: number of roll-outs so far.
@@ -109,8 +103,7 @@ class RolloutPool(Closable):
     ) -> list[RolloutOutcome]:
         """Run all jobs and return their outcomes in the order of the jobs.
 
-        Args:
-            keep: called with the indices of finished jobs and with their outcomes, as they are finished.
+        `keep` is called with the indices of finished jobs and with their outcomes, as they are finished.
 
         Raises:
             WorkerError: a worker process died.

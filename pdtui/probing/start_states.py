@@ -37,9 +37,7 @@ def collect_start_states(
     Seeds whose walk falls before step ``at + survive`` are skipped, so that a fall within `survive` steps of
     a stimulated roll-out is due to the stimulation.
 
-    Args:
-        at: control steps from the reset to the state.
-        survive: control steps for which the walk has to go on without a fall.
+    The state is taken `at` control steps after the reset, and the walk goes on for `survive` steps.
 
     Raises:
         RobotError: too few of ``4 * count`` walks last that long.
@@ -65,9 +63,7 @@ def measure_walk_lengths(
 ) -> list[int]:
     """Return for how many control steps unstimulated walks last, in the order of their seeds.
 
-    Args:
-        most: step at which a walk is broken off.
-        enough: stop after this many walks of `most` steps; 0 for never.
+    Walks are broken off after `most` steps. After `enough` walks of that length no more are taken; 0 is never.
     """
     lengths: list[int] = []
     for seed in seeds:

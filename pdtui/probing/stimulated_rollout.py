@@ -63,10 +63,8 @@ def run_rollout(
 ) -> RolloutOutcome:
     """Run a policy with stimulation from a start state, and measure the later part.
 
-    Args:
-        robot: restored to the start state, bit for bit.
-        policy: likewise; acts with its mean action.
-        measure_from: first step that is measured.
+    Robot and policy are restored to the start, bit for bit; the policy acts with its mean action. The steps
+    from `measure_from` on are measured.
     """
     robot.restore(start.snapshot)
     policy.restore(start.policy_state)

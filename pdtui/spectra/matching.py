@@ -73,10 +73,7 @@ def match_units(
 
     The norm is over all frequencies and windows, and its mean is taken over the episodes. Time grows linearly
     with units, attributes and episodes; memory grows by one block of units per core.
-
-    Args:
-        attributes: the robot's attributes, with their scales.
-        block: units per block, which results depend on only by rounding.
+    Results depend on the size of a block only by rounding.
 
     Raises:
         PolicyError: no episode is as long as one window.

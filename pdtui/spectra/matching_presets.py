@@ -124,9 +124,7 @@ def preset_values(preset: MatchingPreset) -> dict[str, Any]:
 def find_preset(name: str, settings: Sequence[str] = ()) -> MatchingPreset:
     """Return a preset by name, with some of its choices changed.
 
-    Args:
-        name: ``paper`` or ``authors``.
-        settings: changes, each ``NAME=VALUE``; the last one of a name counts.
+    Each setting is ``NAME=VALUE``; the last one of a name counts.
 
     Raises:
         PdtuiError: there is no such preset or choice, or the choice does not allow that value.

@@ -46,9 +46,7 @@ def monitor_episodes(
 ) -> list[MonitoredEpisode]:
     """Run one episode per seed with the policy's mean action and no stimulation (section 3.2, "monitoring").
 
-    Args:
-        seeds: one seed per episode; the paper uses five.
-        steps: largest number of control steps per episode.
+    The paper uses five episodes. Each lasts at most `steps` control steps.
     """
     episodes = []
     for seed in seeds:

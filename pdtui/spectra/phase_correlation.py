@@ -71,25 +71,18 @@ def correlate_phases(
 
     The predominant frequency ``ω* = argmax_ω Σ_d SG(d, ω | s)`` sums over the windows of all episodes. The
     phase difference at ω* is wrapped to (−π, π] and averaged over all windows of all episodes.
-
-    Args:
-        episodes: unstimulated episodes; at least one has to be one window long, which `match_units` checks.
-        block: units per block.
+    At least one episode has to be one window long, which `match_units` checks.
     """
     used = usable_episodes(episodes, preset)
     with np.errstate(invalid="ignore", over="ignore"):  # match_units reports what is not finite
-        targets = [
-            short_time_transform(series, preset) for series in attribute_series(used, attributes, preset)
-        ]
+        targets = [short_time_transform(one, preset) for one in attribute_series(used, attributes, preset)]
         energy = np.sum([spectrogram(target, preset).sum(axis=1) for target in targets], axis=0)
     allowed = np.nan_to_num(energy[:, preset.phase_from_bin :], nan=-1.0)
     bins = np.argmax(allowed, axis=1) + preset.phase_from_bin
     waves = np.concatenate([target[np.arange(len(bins)), :, bins] for target in targets], axis=1)
 
     def compare(units: slice) -> tuple[Floats, Floats]:
-        spectra = [
-            short_time_transform(series, preset)[:, :, bins] for series in unit_series(used, units, preset)
-        ]
+        spectra = [short_time_transform(one, preset)[:, :, bins] for one in unit_series(used, units, preset)]
         return _correlate(np.concatenate(spectra, axis=1), waves)
 
     units = used[0].activations.shape[1]

@@ -59,10 +59,7 @@ def drive_forest_episode(
 ) -> tuple[ForestEpisode, tuple[Event, ...]]:
     """Drive one episode, up to a fall, the far end of the forest, or the last step; return score and events.
 
-    Args:
-        loop: a drive in the forest, before its first step.
-        operator: presses the keys; None leaves the policy alone.
-        recorder: records every step; the caller closes it.
+    The drive is before its first step. Without an operator no key is pressed; the caller closes the recorder.
     """
     column = loop.robot.attribute_index("distance")
     yaw = loop.robot.attribute_index("yaw")

@@ -81,9 +81,7 @@ def summarise_condition(
 
     def spread(name: str) -> RepeatStatistics:
         values = np.array([float(getattr(run, name)) for run in runs]).reshape(repeats, -1).mean(axis=1)
-        return RepeatStatistics(
-            float(values.mean()), float(values.std(ddof=1)) if repeats > 1 else float("nan")
-        )
+        return RepeatStatistics(float(values.mean()), float(values.std(ddof=1)) if repeats > 1 else math.nan)
 
     return ForestConditionSummary(
         condition,

@@ -149,9 +149,5 @@ def _stretches(drives: Sequence[ObservedDrive], dt: float) -> _Stretches:
             speeds.append(np.hypot(moved[:, 0], moved[:, 1]))
             drifts.append(np.angle(np.exp(1j * (course - path[after, 2]))))
     return _Stretches(
-        tuple(starts),
-        np.array(choices, int).T,
-        np.array(headings).T,
-        np.array(speeds).T,
-        np.array(drifts).T,
+        tuple(starts), np.array(choices, int).T, np.array(headings).T, np.array(speeds).T, np.array(drifts).T
     )

@@ -81,11 +81,9 @@ class RobotMotion:
 
 
 def estimate_motion(places: Floats, dt: float) -> RobotMotion:
-    """Estimate a robot's motion from its last places.
+    """Estimate a robot's motion from its last places, `dt` s apart.
 
-    Args:
-        places: x, y and heading, the newest last, shape (N, 3), N ≥ 2; the last `STEPS_OBSERVED` + 1 count.
-        dt: time between places, s.
+    They are x, y and heading, the newest last, shape (N, 3), N ≥ 2; the last `STEPS_OBSERVED` + 1 count.
     """
     places = places[-STEPS_OBSERVED - 1 :]
     headings = np.unwrap(places[:, 2])
@@ -106,10 +104,8 @@ def predict_motion(
     """Predict where C schedules of keys lead.
 
     Args:
-        key_models: models of the keys, by their indices in the schedule.
         start: motion before the first step.
-        schedule: index of the key latched in each of T steps, shape (C, T).
-        dt: duration of a step of the schedule, s.
+        schedule: index of the key latched in each of T steps of `dt` s, shape (C, T).
 
     Returns:
         x, y and heading after each step, shape (C, T, 3), and the motion at the end of the first schedule.
@@ -131,10 +127,7 @@ def predict_motion(
 def integrate_heading(latched: Floats, heading: Floats, rate: Floats, dt: float) -> tuple[Floats, Floats]:
     """Return headings in rad and yaw rates in rad/s after each of T steps, shapes (T, C).
 
-    Args:
-        latched: pull, hold and lag in each step, shape (T, C, 3).
-        heading, rate: heading and yaw rate before the first step, shapes (C,).
-        dt: duration of a step, s.
+    Pull, hold and lag in each step have the shape (T, C, 3), heading and rate before the first step (C,).
     """
     pull, hold, lag = np.moveaxis(latched, -1, 0)
     kept = np.exp(-dt / lag)

@@ -30,12 +30,7 @@ _AHEAD, _ASIDE = 12.0, 5.0
 
 
 class KeyPlanner:
-    """Chooses the key to latch.
-
-    Args:
-        key_models: models of the keys; index 0 is the default key.
-        trees: x, y and radius of the trees, m, shape (N, 3).
-    """
+    """Chooses the key to latch; index 0 is the default key. Trees are x, y and radius in m, shape (N, 3)."""
 
     def __init__(self, key_models: Sequence[KeyMotionModel], trees: Floats) -> None:
         self._key_models, self._trees = tuple(key_models), trees

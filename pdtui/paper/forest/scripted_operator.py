@@ -92,8 +92,7 @@ class ScriptedOperator:
     def choose_key(self, x: float, y: float, heading: float) -> str:
         """Observe where the robot is, and decide which key to press before the next control step.
 
-        Returns:
-            Name of the key's behavior, ``default`` for the default key, or an empty string.
+        It is named by its behavior: ``default`` for the default key, an empty string for no key.
         """
         step = len(self._seen)
         self._seen.append((x, y, heading))
@@ -142,10 +141,6 @@ class TreeContactRecovery:
     A robot that cannot sense trees keeps walking against one, and a prediction without contacts expects it to
     pass. Turning frees it, on the spot if need be. Some directions do not work in some places, so that after
     a while the other direction is tried.
-
-    Args:
-        trees: x, y and radius of the trees, m, shape (N, 3).
-        dt: duration of a control step, s.
     """
 
     def __init__(self, trees: Floats, dt: float) -> None:
@@ -156,10 +151,8 @@ class TreeContactRecovery:
     def choose_turn(self, seen: Floats, heading: float, halted: bool) -> int:
         """Return which way to turn now: 1 left, −1 right, 0 if the robot is not stuck.
 
-        Args:
-            seen: x, y and heading of the places seen so far, shape (S, 3).
-            heading: predicted heading now, rad.
-            halted: whether a key latched lately made it stand still.
+        The places seen so far are x, y and heading, shape (S, 3); the heading is the one predicted for now, in
+        rad; the robot is halted if a key latched lately made it stand still.
         """
         x, y, saw = seen[-1].tolist()
         time = len(seen) * self._dt
