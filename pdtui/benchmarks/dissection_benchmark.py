@@ -63,8 +63,6 @@ class ScalingCurve:
     """How the time of matching grows with one size.
 
     Attributes:
-        grows: name of the size.
-        sizes: its values.
         ms: median time over rounds at each of them, ms.
         fixed_ms, each_ms: the line of least relative error, ms = fixed + each · size.
         deviation: largest relative distance from that line.
@@ -83,7 +81,6 @@ class DissectionBenchmark:
     """The result of `bench_dissection`.
 
     Attributes:
-        recorded: description of the data.
         compared: matching against the loop, per preset.
         curves: time of matching by number of units, attributes and episodes.
         memory_units: number of units of the episode that was matched and correlated in a fresh process.

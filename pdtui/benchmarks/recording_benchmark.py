@@ -35,8 +35,6 @@ class RecordingCost:
     """The cost of one way to record, in the small batches of a drive on the screen.
 
     Attributes:
-        activations: how activations are recorded.
-        driven: what the operator does.
         cpu_share: time of all threads at `RATE`, as a share of one core.
         mb_a_minute: growth of the file at `RATE`, including its end, MB per minute.
     """
@@ -49,11 +47,7 @@ class RecordingCost:
 
 @dataclass(frozen=True)
 class RecordingBenchmark:
-    """The result of `bench_record`.
-
-    Attributes:
-        costs: cost of each way to record.
-    """
+    """The result of `bench_record`."""
 
     units: int
     steps: int
@@ -65,12 +59,9 @@ class MemoryBenchmark:
     """Resident memory over a long drive without a screen.
 
     Attributes:
-        steps: control steps.
         file_bytes: size of the session, bytes.
         seconds: time of recording, examining and replaying, s.
         resident: resident memory at ten moments of recording and of replaying, bytes.
-        verdict: verdict of the replay.
-        whole: whether the session is whole.
     """
 
     steps: int

@@ -12,8 +12,8 @@ from pdtui.core.intervals import bootstrap_interval
 from pdtui.core.units import Stimulation
 from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.dissection_config import DissectionSettings
-from pdtui.probing.confirmation import exceeds_random_units
 from pdtui.probing.effect_probe import EffectProbe, PlanEffects, UnitEffects
+from pdtui.probing.primitive_confirmation import exceeds_random_units
 from pdtui.probing.start_states import StartState
 from pdtui.spectra.monitor import MonitoredEpisode
 from pdtui.stimulation.stimulation_map import MeasuredEffect
@@ -74,13 +74,11 @@ def _runs_on(series: Floats) -> bool:
     half = len(series) // 2
     if half < 2:
         return False
-    progress, changed = [], []
-    for part in (series[:half], series[half : 2 * half]):
-        progress.append(float(part[-1] - part[0]))
-        changed.append(float(np.abs(np.diff(part)).sum()))
+    halves = np.stack([series[:half], series[half : 2 * half]])
+    progress, changed = halves[:, -1] - halves[:, 0], np.abs(np.diff(halves)).sum(axis=1)
     first, second = progress
     steady = first * second > 0 and 0.5 < second / first < 2.0
-    return steady and all(abs(made) > 0.5 * all_ for made, all_ in zip(progress, changed, strict=True))
+    return bool(steady and (np.abs(progress) > 0.5 * changed).all())
 
 
 def find_attribute_movers(

@@ -22,8 +22,8 @@ from pdtui.dissection.dissection_result import Dissection, pick_sample_episode
 from pdtui.dissection.dissection_searches import DissectionSearches
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
-from pdtui.probing.confirmation import draw_control_units, select_units_to_refine
 from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.primitive_confirmation import draw_control_units, select_units_to_refine
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import StartState, collect_start_states, measure_walk_lengths

@@ -23,14 +23,7 @@ from pdtui.stimulation.map_reader import parse_map
 
 @dataclass(frozen=True)
 class WrittenDissection:
-    """A dissection, and the files that were written from it.
-
-    Attributes:
-        dissection: What was found.
-        output: File of the map.
-        behaviors: Names of the map's behaviors.
-        pictures: Files of the report and the figures.
-    """
+    """A dissection, and the map with these behaviors and the pictures that were written from it."""
 
     dissection: Dissection
     output: Path

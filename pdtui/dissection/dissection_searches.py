@@ -32,7 +32,6 @@ class DissectionSearches:
     """The searches of one dissection, and what they share.
 
     Attributes:
-        seed: seed of every random choice.
         budget: shares the time among the searches.
         stage: returns the progress callback of a stage, given its name.
         known: stimulations to begin with besides those that are drawn.

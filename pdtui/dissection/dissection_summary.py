@@ -8,7 +8,7 @@ from typing import Any
 from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.probing.confirmation import (
+from pdtui.probing.primitive_confirmation import (
     TOP_MATCHES,
     PrimitiveConfirmation,
     confirm_unit,
@@ -25,6 +25,7 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
 
     For each attribute at most `matches` matches are listed, the nearest first.
     """
+    matching, layers = dissection.matching, dissection.layers
     return {
         "robot": dissection.robot,
         "policy": dissection.policy,
@@ -33,12 +34,9 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
         "settings": preset_values(dissection.preset),
         "settings_changed": list(dissection.preset.changed),
         "seed": dissection.seed,
-        "episodes": list(dissection.matching.used),
-        "too_short": [list(pair) for pair in dissection.matching.skipped],
-        "unit_flaws": {
-            format_unit(unit, dissection.layers): flaw
-            for unit, flaw in dissection.matching.unit_flaws.items()
-        },
+        "episodes": list(matching.used),
+        "too_short": [list(pair) for pair in matching.skipped],
+        "unit_flaws": {format_unit(unit, layers): flaw for unit, flaw in matching.unit_flaws.items()},
         "attributes": [
             _attribute(dissection, column, matches) for column in range(len(dissection.attributes))
         ],
@@ -46,8 +44,8 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
         "movable": [dissection.attributes[column].name for column in dissection.movable],
         "steered": [_mover(dissection, one) for one in dissection.attribute_movers],
         "side_effects": _side_effects(dissection),
-        "behaviors": [_behavior(found, dissection.layers) for found in dissection.behaviors],
-        "holds": [_controller(found, dissection.layers) for found in dissection.controllers],
+        "behaviors": [_behavior(found, layers) for found in dissection.behaviors],
+        "holds": [_controller(found, layers) for found in dissection.controllers],
         "rollouts": dissection.rollouts,
         "control_steps": dissection.control_steps,
         "minutes": round(dissection.minutes, 2),

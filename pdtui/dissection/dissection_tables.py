@@ -13,7 +13,7 @@ from pdtui.core.text_tables import new_table
 from pdtui.core.units import MAX_LISTED, describe_units
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.probing.confirmation import TOP_MATCHES
+from pdtui.probing.primitive_confirmation import TOP_MATCHES
 
 _MATCHES = 3
 

@@ -10,7 +10,7 @@ from pdtui.core.attributes import BehaviorAim
 from pdtui.core.key_table import RESERVED_KEYS
 from pdtui.core.units import Stimulation, describe_units, format_unit
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.probing.confirmation import rank_probed_units
+from pdtui.probing.primitive_confirmation import rank_probed_units
 from pdtui.robots.robot_goals import HoldGoal
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult

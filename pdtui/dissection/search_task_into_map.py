@@ -29,10 +29,8 @@ class WrittenBehavior:
     """A behavior that was found for a task, and the map that it was written into.
 
     Attributes:
-        result: Result of the search.
         units: Outputs by unit address.
         seconds: Activation period, s; None lasts until another key is pressed.
-        output: File of the map.
     """
 
     result: TaskSearchResult

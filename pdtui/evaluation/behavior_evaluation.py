@@ -81,12 +81,7 @@ class MapEvaluation:
 
 @dataclass(frozen=True)
 class BehaviorRun:
-    """One episode.
-
-    Attributes:
-        mean: mean of each attribute over the measured steps, shape (J,).
-        fell: whether the robot fell.
-    """
+    """Means of attributes over the measured steps of one episode, shape (J,), and whether the robot fell."""
 
     mean: Floats
     fell: bool

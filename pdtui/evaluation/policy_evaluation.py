@@ -19,7 +19,6 @@ class PolicyEvaluation:
     """The performance of a policy without stimulation.
 
     Attributes:
-        steps: control steps per episode.
         mean_speed: mean of |v| over all steps, m/s; None for a robot without the attribute ``speed``.
         net_speed: distance between start and end over time, mean over episodes, m/s; None for a robot
             without poses.

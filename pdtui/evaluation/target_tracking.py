@@ -38,11 +38,9 @@ def evaluate_tracking(
     """
     behavior = find_pid_behaviors(config, attribute)[0]
     with TrackingDriveRunner(config, workers) as runner:
-        targets = tuple(targets) or choose_tracking_targets(runner, behavior, seeds[:3])
+        chosen = tuple(targets) or choose_tracking_targets(runner, behavior, seeds[:3])
         drives = [
-            TrackingDrive(attribute, name, seed, tuple(targets))
-            for name in (behavior.name, "")
-            for seed in seeds
+            TrackingDrive(attribute, name, seed, chosen) for name in (behavior.name, "") for seed in seeds
         ]
         results = runner.run(drives, progress)
         unit = runner.attribute(attribute).unit

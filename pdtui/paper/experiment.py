@@ -44,13 +44,7 @@ class ExperimentRequest:
 
 @dataclass(frozen=True)
 class ExperimentReport:
-    """The result of an experiment.
-
-    Attributes:
-        data: what ``--json`` prints.
-        table: what is printed otherwise.
-        pictures: the files that were written.
-    """
+    """What ``--json`` prints, the table that is printed otherwise, and the files of the pictures."""
 
     data: dict[str, Any] | list[dict[str, Any]]
     table: RenderableType

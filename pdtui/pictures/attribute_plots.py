@@ -110,10 +110,10 @@ def draw_effect_key(figure: Figure) -> None:
         Line2D([], [], color=color, marker="o", markersize=3, label=name)
         for name, color in (("best probed", _PROBED), ("first match", _MATCHED))
     ]
-    handles.append(
-        Line2D([], [], color="black", marker="x", linestyle="", markersize=4, label="fell from some starts")
+    cross = Line2D(
+        [], [], color="black", marker="x", linestyle="", markersize=4, label="fell from some starts"
     )
-    figure.legend(handles=handles, loc="outside lower left", ncols=len(handles))
+    figure.legend(handles=[*handles, cross], loc="outside lower left", ncols=3)
 
 
 def _leave_out(panel: Axes, dissection: Dissection, column: int) -> None:

@@ -11,7 +11,7 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.intervals import bootstrap_interval
 from pdtui.core.units import format_unit
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.probing.confirmation import rank_probed_units
+from pdtui.probing.primitive_confirmation import rank_probed_units
 from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.spectrogram import short_time_transform
 
@@ -64,7 +64,6 @@ class EffectCurve:
     """Change of one attribute with the output v of one unit, relative to unstimulated roll-outs.
 
     Attributes:
-        label: Address of the unit.
         role: Why the unit is shown.
         values: Outputs v in ascending order, shape (D,).
         means: Mean change over the starts whose roll-outs reached the measured steps, shape (D,); NaN where
@@ -90,7 +89,6 @@ class SideEffectMatrix:
 
     Attributes:
         units: Addresses, grouped by the attribute that each unit moves most, the strongest first.
-        attributes: Names of the attributes.
         by_value: One matrix per output v, shape (N, J); NaN for an attribute that never varies.
     """
 

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pdtui.core.attributes import Floats
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.pictures.attribute_plots import draw_effect_key, draw_effects, draw_ranking, draw_spectrograms
 from pdtui.pictures.dissection_chart_data import side_effect_matrix
 from pdtui.pictures.matplotlib_page import figure_page, policy_title
 from pdtui.pictures.plot_colors import GREEN, GREY, VERMILLION, diverging, to_hex
-from pdtui.probing.confirmation import TOP_MATCHES
+from pdtui.probing.primitive_confirmation import TOP_MATCHES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -127,21 +128,24 @@ def draw_matching_hits(target: Path | BytesIO, dissection: Dissection) -> None:
     """Draw how well matching finds the units that probing finds, one row per attribute."""
     attributes = summarise_dissection(dissection)["attributes"]
     names = [attribute["name"] for attribute in attributes]
-    hits = [attribute["hits"] for attribute in attributes]
+
+    def column(key: str) -> Floats:
+        """Return a figure of all attributes; NaN where there is none."""
+        return np.array([attribute["hits"][key] for attribute in attributes], np.float64)
+
     places = np.arange(len(names))
-    with figure_page(
-        target, 1.1 + 0.19 * len(names), f"{policy_title(dissection)}: how well matching finds units that act"
-    ) as figure:
+    title = f"{policy_title(dissection)}: how well matching finds units that act"
+    with figure_page(target, 1.1 + 0.19 * len(names), title) as figure:
         left, right = figure.subplots(1, 2, sharey=True)
         width = 0.8 / (1 + len(TOP_MATCHES))
         shades = ("#c85200", "#ff9a4d", "#ffc79b")
         bars = [("first", "first match"), *((f"best_{one}", f"first {one} matches") for one in TOP_MATCHES)]
         for number, (key, label) in enumerate(bars):
-            shares = 100 * np.array([_or_nan(hit[key]) for hit in hits])
             offset = (number - len(TOP_MATCHES) / 2) * width
-            left.barh(places + offset, shares, width, color=shades[number], label=label)
-        random = 100 * np.array([_or_nan(hit["random"]) for hit in hits])
-        left.plot(random, places, "|", color="black", markersize=9, label="a unit drawn at random")
+            left.barh(places + offset, 100 * column(key), width, color=shades[number], label=label)
+        left.plot(
+            100 * column("random"), places, "|", color="black", markersize=9, label="a unit drawn at random"
+        )
         left.set(xlabel="hits (%)", xlim=(0, 102), title="Share among the strongest tenth")
         left.set_yticks(places, names)
         left.invert_yaxis()
@@ -149,9 +153,7 @@ def draw_matching_hits(target: Path | BytesIO, dissection: Dissection) -> None:
             ("held_out_matching", "ranked by matching", _MATCHED, "o"),
             ("held_out_probing", "ranked by probing", _PROBED, "s"),
         ):
-            right.plot(
-                [_or_nan(hit[key]) for hit in hits], places, marker, color=color, markersize=4, label=label
-            )
+            right.plot(column(key), places, marker, color=color, markersize=4, label=label)
         right.axvline(0, color=_FAINT, linewidth=0.6)
         right.set(xlabel="rank correlation with the effect on other starts", xlim=(-1.05, 1.05))
         right.set_title(f"Held out: {len(dissection.controls)} units drawn at random")
@@ -159,7 +161,3 @@ def draw_matching_hits(target: Path | BytesIO, dissection: Dissection) -> None:
             panel.grid(axis="y", linewidth=0.3, alpha=0.5)
             panel.set_axisbelow(True)
             panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
-
-
-def _or_nan(value: float | None) -> float:
-    return float("nan") if value is None else float(value)

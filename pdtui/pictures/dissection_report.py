@@ -164,16 +164,13 @@ def dissection_markdown(dissection: Dissection) -> str:
 
 
 def _origin(dissection: Dissection, summary: dict[str, Any]) -> str:
-    preset, dt = dissection.preset, dissection.dt
+    preset, dt, shown = dissection.preset, dissection.dt, dissection.sample_episode.seed
     versions = collect_versions()
     episodes = ", ".join(str(seed) for seed in summary["episodes"])
     rows = [
         ("policy", f"{summary['policy']}, SHA-256 `{summary['sha256']}`"),
         ("hidden layers", " · ".join(f"{width} units" for width in dissection.layers)),
-        (
-            "seed",
-            f"{summary['seed']}; episodes of seeds {episodes}, pictured: {dissection.sample_episode.seed}",
-        ),
+        ("seed", f"{summary['seed']}; episodes of seeds {episodes}, pictured: {shown}"),
         (
             "spectrum",
             f"preset `{preset}`: {preset.window.title()} window of {preset.length} steps, hop "
@@ -187,13 +184,7 @@ def _origin(dissection: Dissection, summary: dict[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class PictureOutputs:
-    """Where the pictures of one dissection go.
-
-    Attributes:
-        report: File of the report, a recording.
-        figures: Folder of the PNG files; None draws none.
-        overwrite: Whether existing files are replaced.
-    """
+    """Where the pictures of one dissection go: the report and, unless it is None, a folder of PNG files."""
 
     report: Path
     figures: Path | None

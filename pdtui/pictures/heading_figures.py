@@ -59,10 +59,8 @@ class HeadingFigure:
     """Everything that the pictures show.
 
     Attributes:
-        title: Text above everything.
         target: Target heading at each control step in rad, shape (T,).
         dt: Seconds per control step.
-        held: The behaviors to compare.
         figures: The table that the command prints.
         summary: What ``--json`` prints.
     """
@@ -70,14 +68,14 @@ class HeadingFigure:
     title: str
     target: Floats
     dt: float
-    held: tuple[TrackedHeading, ...]
+    behaviors: tuple[TrackedHeading, ...]
     figures: Table
     summary: Mapping[str, Any]
 
     @property
     def seeds(self) -> int:
         """Number of drives of each behavior."""
-        return len(self.held[0].values)
+        return len(self.behaviors[0].values)
 
 
 def check_heading_pictures(paths: Sequence[Path], overwrite: bool) -> None:
@@ -112,10 +110,10 @@ def _draw_heading_figure(path: Path, shown: HeadingFigure) -> None:
     with figure_page(path, 4.2, shown.title) as figure:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         above.plot(times, shown.target, color="black", linewidth=0.9, linestyle="--", label="target")
-        for held, color in zip(shown.held, cycle(map(to_hex, CYCLE)), strict=False):
-            mean, low, high, error = held.statistics(shown.target)
+        for behavior, color in zip(shown.behaviors, cycle(map(to_hex, CYCLE)), strict=False):
+            mean, low, high, error = behavior.statistics(shown.target)
             above.fill_between(times, low, high, color=color, alpha=0.2, linewidth=0.0)
-            above.plot(times, mean, color=color, label=f"{held.name}: {held.note}")
+            above.plot(times, mean, color=color, label=f"{behavior.name}: {behavior.note}")
             below.plot(times, error, color=color)
         above.set_title(f"{shown.seeds} seeds: mean and middle 90 %")
         above.set_ylabel("heading (rad)")
@@ -143,15 +141,15 @@ def _write_heading_recording(path: Path, shown: HeadingFigure) -> None:
         table = rr.TextDocument(table_to_markdown(shown.figures), media_type=rr.MediaType.MARKDOWN)
         rr.log(_FIGURES, table, static=True, recording=recording, strict=True)
         curve(f"{_HEADINGS}/target", shown.target, "target", GREY, 1.5)
-        for held, color in zip(shown.held, cycle(CYCLE), strict=False):
-            mean, low, high, error = held.statistics(shown.target)
-            part = rr.escape_entity_path_part(held.name)
+        for behavior, color in zip(shown.behaviors, cycle(CYCLE), strict=False):
+            mean, low, high, error = behavior.statistics(shown.target)
+            part = rr.escape_entity_path_part(behavior.name)
             red, green, blue = color
             faint = (red // 2, green // 2, blue // 2)
             for end, values in (("low", low), ("high", high)):
-                curve(f"{_HEADINGS}/{part}/{end}", values, f"{held.name}, {end} end of 90 %", faint, 0.7)
-            curve(f"{_HEADINGS}/{part}/mean", mean, held.name, color, 2.0)
-            curve(f"{_ERRORS}/{part}", error, held.name, color, 1.5)
+                curve(f"{_HEADINGS}/{part}/{end}", values, f"{behavior.name}, {end} end of 90 %", faint, 0.7)
+            curve(f"{_HEADINGS}/{part}/mean", mean, behavior.name, color, 2.0)
+            curve(f"{_ERRORS}/{part}", error, behavior.name, color, 1.5)
 
 
 def _layout(shown: HeadingFigure) -> rrb.Vertical:

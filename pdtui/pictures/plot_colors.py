@@ -34,5 +34,4 @@ def diverging(values: Floats, limit: float) -> NDArray[np.uint8]:
     part = np.clip(np.nan_to_num(values) / limit, -1.0, 1.0)[..., None]
     ends = np.where(part < 0, np.array(VERMILLION), np.array(BLUE))
     colors = np.rint(255 + np.abs(part) * (ends - 255.0)).astype(np.uint8)
-    result: NDArray[np.uint8] = np.where(np.isfinite(values)[..., None], colors, np.uint8(GREY[0]))
-    return result
+    return np.asarray(np.where(np.isfinite(values)[..., None], colors, np.uint8(GREY[0])))

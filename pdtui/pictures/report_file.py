@@ -22,8 +22,8 @@ TIME = "time"
 def open_report_file(path: Path, app: str, layout: rrb.Tabs | rrb.Vertical) -> Iterator[rr.RecordingStream]:
     """Yield a recording that is in its file when the block ends without an error.
 
-    The file's folder is made, and an existing file is replaced once the recording is whole. Viewers remember a
-    user's own layout by the name of the app.
+    The file's folder is made, and an existing file is replaced once the recording is whole. Viewers remember
+    a user's own layout by the name of the app.
 
     Raises:
         PictureError: The file cannot be written.

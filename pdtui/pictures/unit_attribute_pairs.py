@@ -57,13 +57,12 @@ class UnitAttributePair:
 
 
 @dataclass(frozen=True)
-class EpisodePairs:
+class UnitAttributePairs:
     """One episode with the pairs that the figure shows.
 
     Attributes:
         seed: Seed of the episode: the first one that was matched.
         times: Seconds since the reset, shape (T,).
-        pairs: Attributes with their units.
     """
 
     robot: str
@@ -85,7 +84,7 @@ def pair_units_with_attributes(
     steps: int = 1000,
     seed: int = 1000,
     progress: StepProgress | None = None,
-) -> EpisodePairs:
+) -> UnitAttributePairs:
     """Roll a policy out and pair attributes with units.
 
     Args:
@@ -129,11 +128,11 @@ def pair_units_with_attributes(
             for column, unit in zip(columns, flats, strict=True)
         ]
         times = (np.arange(shown.steps, dtype=np.float64) + 1) * world.control_dt
-        return EpisodePairs(robot, network.name, shown.seed, times, tuple(pairs))
+        return UnitAttributePairs(robot, network.name, shown.seed, times, tuple(pairs))
 
 
 def draw_unit_attribute_pairs(
-    path: Path, curves: EpisodePairs, *, start: float = 0.0, seconds: float | None = 10.0
+    path: Path, curves: UnitAttributePairs, *, start: float = 0.0, seconds: float | None = 10.0
 ) -> None:
     """Draw one panel per pair: the attribute as a solid line, the unit as a dashed one, in the same colour.
 

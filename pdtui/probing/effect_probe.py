@@ -68,8 +68,7 @@ class UnitEffects:
     def robust_strengths(self, column: int) -> Floats:
         """Return the largest robust effect of each unit over its values and both directions, shape (N,)."""
         both = np.maximum(self.robust_effects(column, 1.0), self.robust_effects(column, -1.0))
-        strengths: Floats = np.maximum(both.max(axis=1), 0.0)
-        return strengths
+        return np.asarray(np.maximum(both.max(axis=1), 0.0))
 
     def mean_strengths(self, column: int, values: Sequence[float]) -> Floats:
         """Return the largest mean effect of each unit over the starts, in size, at some values, shape (N,).
@@ -79,8 +78,7 @@ class UnitEffects:
         """
         doses = [self.values.index(value) for value in values]
         effects = np.where(self.falls, 0.0, np.nan_to_num(self.effects[..., column]))[:, doses]
-        strengths: Floats = np.abs(effects.mean(axis=-1)).max(axis=1)
-        return strengths
+        return np.asarray(np.abs(effects.mean(axis=-1)).max(axis=1))
 
     def safe_magnitude(self, unit: int) -> float:
         """Return the largest |v| of a unit up to which the robot never fell; 0 if there is none."""

@@ -56,10 +56,6 @@ class RolloutPool(Closable):
     Each worker process loads robot and policy by name. If one of the two is given as an object, all roll-outs
     run in this process. The import options say what the weights file leaves open.
 
-    Attributes:
-        rollouts: number of roll-outs so far.
-        control_steps: number of control steps in them.
-
     Raises:
         RobotError: no such robot.
         PolicyError: no such policy, or one that does not fit the robot.

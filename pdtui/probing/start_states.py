@@ -17,7 +17,6 @@ class StartState:
     """A state of an unstimulated walk in which stimulated roll-outs start.
 
     Attributes:
-        seed: seed of the reset.
         step: control steps since the reset.
         snapshot: the robot's whole state.
         policy_state: hidden state of a recurrent policy.
@@ -63,7 +62,7 @@ def measure_walk_lengths(
 ) -> list[int]:
     """Return for how many control steps unstimulated walks last, in the order of their seeds.
 
-    Walks are broken off after `most` steps. After `enough` walks of that length no more are taken; 0 is never.
+    Walks are broken off after `most` steps. After `enough` walks of that length no more follow; 0 is never.
     """
     lengths: list[int] = []
     for seed in seeds:

@@ -89,8 +89,7 @@ class MatchingPreset:
 
     def frequencies(self, dt: float) -> Floats:
         """Return the frequency of each bin in Hz for samples `dt` seconds apart, shape (F,)."""
-        frequencies: Floats = np.asarray(np.fft.rfftfreq(self.length, dt), np.float64)
-        return frequencies
+        return np.asarray(np.fft.rfftfreq(self.length, dt), np.float64)
 
 
 # Section 3.2 and appendix of the paper, and what its authors' released code computes.

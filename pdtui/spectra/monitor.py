@@ -23,7 +23,6 @@ class MonitoredEpisode:
     of the state that this action led to, so that a torque is beside the activations that commanded it.
 
     Attributes:
-        seed: seed of the reset.
         activations: outputs of the hidden units after their activation functions, shape (T, U).
         attributes: in their physical units, shape (T, J). Angles are unwrapped, because their jumps at ±π are
             no motion of the robot but would dominate the spectrum.

@@ -98,8 +98,7 @@ def short_time_transform(series: NDArray[Any], preset: MatchingPreset) -> Comple
     # ShortTimeFFT, whose result would still have to be transposed to (N, D, F).
     samples = np.ascontiguousarray(series.T, np.float64)
     windows = sliding_window_view(samples, preset.length, axis=1)[:, :: preset.hop]
-    spectra: Complexes = scipy.fft.rfft(windows * preset.weights, axis=-1, overwrite_x=True)
-    return spectra
+    return np.asarray(scipy.fft.rfft(windows * preset.weights, axis=-1, overwrite_x=True))
 
 
 def spectrogram(spectra: Complexes, preset: MatchingPreset) -> Floats:

@@ -10,8 +10,8 @@ from pdtui.core.key_table import RESERVED_KEYS
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
 from pdtui.dissection.dissection_config import QUICK_DISSECTION
 from pdtui.dissection.draft_map import KeyAllocator
-from pdtui.probing.confirmation import select_units_to_refine
 from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.primitive_confirmation import select_units_to_refine
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
 from pdtui.spectra.matching import match_units

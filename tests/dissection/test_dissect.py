@@ -20,8 +20,8 @@ from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.dissection.dissection_tables import render_dissection
 from pdtui.dissection.draft_map import draft_map
 from pdtui.policies.weights.weights_file import hash_file
-from pdtui.probing.confirmation import rank_correlation
 from pdtui.probing.effect_probe import EffectProbe, PlanEffects
+from pdtui.probing.primitive_confirmation import rank_correlation
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
 from pdtui.robots.robot_goals import WALKING_GOALS

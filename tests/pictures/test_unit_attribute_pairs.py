@@ -11,19 +11,19 @@ from pdtui.cli import main
 from pdtui.core.errors import PictureError, PolicyError, RobotError
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.pictures.unit_attribute_pairs import (
-    EpisodePairs,
+    UnitAttributePairs,
     draw_unit_attribute_pairs,
     pair_units_with_attributes,
 )
 
 
 @pytest.fixture(scope="module")
-def curves(policy_file: Path) -> EpisodePairs:
+def curves(policy_file: Path) -> UnitAttributePairs:
     return pair_units_with_attributes("ant", str(policy_file), episodes=2, steps=130, seed=1000)
 
 
 def test_main_attributes_come_with_the_units_that_match_them(
-    curves: EpisodePairs, dissection: Dissection
+    curves: UnitAttributePairs, dissection: Dissection
 ) -> None:
     """The same roll-outs as those of the dissection, so the same matches."""
     assert [pair.attribute.name for pair in curves.pairs] == ["vx", "vy", "speed", "yaw", "yaw rate", "roll"]
@@ -63,7 +63,7 @@ def test_what_does_not_exist_is_named(
         )
 
 
-def test_each_pair_is_drawn_in_its_colour(curves: EpisodePairs, tmp_path: Path) -> None:
+def test_each_pair_is_drawn_in_its_colour(curves: UnitAttributePairs, tmp_path: Path) -> None:
     path = tmp_path / "new" / "episode.png"
     draw_unit_attribute_pairs(path, curves)
     with Image.open(path) as image:
@@ -75,7 +75,7 @@ def test_each_pair_is_drawn_in_its_colour(curves: EpisodePairs, tmp_path: Path) 
         assert np.ptp(rows) < picture.shape[0] / 5, color
 
 
-def test_an_episode_that_is_over_says_so(curves: EpisodePairs, tmp_path: Path) -> None:
+def test_an_episode_that_is_over_says_so(curves: UnitAttributePairs, tmp_path: Path) -> None:
     with pytest.raises(PictureError, match=r"the episode lasts 6\.5 s; nothing is left to show from 7 s on"):
         draw_unit_attribute_pairs(tmp_path / "x.png", curves, start=7.0)
     assert list(tmp_path.iterdir()) == []

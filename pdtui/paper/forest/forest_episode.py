@@ -34,9 +34,7 @@ class ForestEpisode:
     Attributes:
         distance: distance along x, m.
         collisions: number of trees that the robot ran into.
-        fell: whether the episode ended with a fall.
         crossed: whether it ended at the far end of the forest.
-        presses: number of key presses.
         pressed_steps: number of control steps before which a key was pressed.
     """
 

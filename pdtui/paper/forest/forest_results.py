@@ -29,9 +29,7 @@ class ForestConditionSummary:
     Attributes:
         distance: distance along x, m.
         collisions: number of trees that the robot ran into.
-        presses: number of key presses.
         involvement: number of control steps before which a key was pressed.
-        crossed: number of episodes that reached the far end of the forest.
     """
 
     condition: str
@@ -56,7 +54,6 @@ class ForestExperimentResult:
         repeats: number of repeats into which the seeds are divided in their order.
         steps: largest number of control steps per episode.
         seconds: the same in simulated time, s.
-        conditions: the figures of each condition.
         left_out: the conditions that were not measured, and the reasons.
         keys: the operator's models of its keys; empty if the operator was not measured.
         key_seeds: seeds of the drives to which these models were fitted.

@@ -116,8 +116,7 @@ def _minimise(
         loss="soft_l1",
         f_scale=0.2,
     )
-    table: Floats = found.x.reshape(shape)
-    return table
+    return np.asarray(found.x.reshape(shape))
 
 
 def _falls(drives: Sequence[ObservedDrive], number: int) -> tuple[int, int]:

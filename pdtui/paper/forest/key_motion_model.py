@@ -52,7 +52,6 @@ class ObservedDrive:
     Attributes:
         places: x and y in m and heading in rad before each step and after the last, shape (S + 1, 3).
         choices: index of the key that was latched in each step, shape (S,).
-        fell: whether the drive ended with a fall.
     """
 
     places: Floats

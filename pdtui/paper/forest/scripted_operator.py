@@ -108,10 +108,8 @@ class ScriptedOperator:
         old = step - self._delay
         if old < 1 or step % _STEPS_PER_DECISION:
             return now
-        if (
-            len(self._pressed) >= PRESSES_PER_SECOND
-            and step - self._pressed[-PRESSES_PER_SECOND] < self._second
-        ):
+        presses = self._pressed[-PRESSES_PER_SECOND:]
+        if len(presses) == PRESSES_PER_SECOND and step - presses[0] < self._second:
             return now
         place = self._predict_now(old)
         lately = self._latched[max(0, old - round(STUCK_TIME / self._dt)) : old]
@@ -151,8 +149,8 @@ class TreeContactRecovery:
     def choose_turn(self, seen: Floats, heading: float, halted: bool) -> int:
         """Return which way to turn now: 1 left, −1 right, 0 if the robot is not stuck.
 
-        The places seen so far are x, y and heading, shape (S, 3); the heading is the one predicted for now, in
-        rad; the robot is halted if a key latched lately made it stand still.
+        The places seen so far are x, y and heading, shape (S, 3); the heading is the one predicted for now,
+        in rad; the robot is halted if a key latched lately made it stand still.
         """
         x, y, saw = seen[-1].tolist()
         time = len(seen) * self._dt
