@@ -6,7 +6,7 @@ Other pages show one kind of plot for several attributes.
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -44,20 +44,14 @@ def draw_spectrograms(figure: Figure, left: Axes, right: Axes, dissection: Disse
         _leave_out(left, dissection, column)
         right.set_axis_off()
         return
-    mesh = None
-    attribute = pair.attribute
+    mesh, attribute = None, pair.attribute
+    style: dict[str, Any] = {"cmap": "viridis", "vmin": pair.low, "vmax": pair.high, "rasterized": True}
     for panel, name, chart in (
         (left, f"{attribute.name} ({attribute.unit})", pair.of_attribute),
         (right, f"unit {pair.label}", pair.of_unit),
     ):
         mesh = panel.pcolormesh(
-            chart.times,
-            chart.frequencies,
-            np.maximum(chart.decibels.T, pair.low),
-            cmap="viridis",
-            vmin=pair.low,
-            vmax=pair.high,
-            rasterized=True,
+            chart.times, chart.frequencies, np.maximum(chart.decibels.T, pair.low), **style
         )
         panel.set_title(name)
         panel.set_xlabel("time (s)")

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MATCHED, _PROBED, _FAINT = to_hex(VERMILLION), to_hex(GREEN), to_hex(GREY)
-
-
 _A_PAGE = 8
 """Attributes per page."""
 NAMES = ("spectrograms", "discrepancies", "effects", "side-effects", "hit-rates")
@@ -114,13 +112,8 @@ def _colorbar(figure: Figure, panels: Sequence[Axes], limit: float) -> None:
     from matplotlib.colors import ListedColormap, Normalize
 
     shades = diverging(np.linspace(-limit, limit, 201), limit) / 255
-    bar = figure.colorbar(
-        ScalarMappable(Normalize(-limit, limit), ListedColormap(shades)),
-        ax=list(panels),
-        aspect=40,
-        pad=0.015,
-        extend="both",
-    )
+    mappable = ScalarMappable(Normalize(-limit, limit), ListedColormap(shades))
+    bar = figure.colorbar(mappable, ax=list(panels), aspect=40, pad=0.015, extend="both")
     bar.set_label("change, in standard deviations of the attribute")
 
 
