@@ -45,7 +45,7 @@ def replay_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def replay(session: Path, watch: bool, options: dict[str, Any]) -> None:
     """Run SESSION again and compare every step.
 
-    Exit codes: 0 if the drive repeats; 1 if it does not.
+    Exit codes: 0 if the drive repeats; 1 if it does not, or cannot be replayed.
     """
     from pdtui.driving.replay import replay_config, replay_session
 

@@ -19,7 +19,6 @@ from pdtui.sessions.session_schema import ACTIVATIONS_KEPT
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
-    from pdtui.stimulation.stimulation_map import StimulationMap
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -166,38 +165,28 @@ def drive_config(
     """
     from pdtui.driving.drive_config import DriveConfig
     from pdtui.robots import check_robot, file_stem, trust_module
-    from pdtui.stimulation.map_library import find_map
+    from pdtui.stimulation.map_library import bare_map, find_map
     from pdtui.stimulation.map_policy_lookup import resolve_map_policy
     from pdtui.stimulation.map_reader import load_map
 
     if map_name is None and robot.endswith(".toml"):
         stimulation_map = load_map(find_map(robot))
-        robot = stimulation_map.robot
+        robot = check_robot(stimulation_map.robot)
     else:
         # Typed by the user, unlike the name inside a map.
         trust_module(robot)
         check_robot(robot)
-        stimulation_map = _map_of(
-            robot, map_name or file_stem(robot), policy if without_map and map_name is None else ""
-        )
-    return DriveConfig(
-        check_robot(robot), resolve_map_policy(stimulation_map, policy, import_options), seed, **options
-    )
-
-
-def _map_of(robot: str, name: str, policy: str) -> StimulationMap:
-    """Return the map of this name, or an empty one if there is none but a policy is given."""
-    from pdtui.stimulation.map_library import bare_map, find_map
-    from pdtui.stimulation.map_reader import load_map
-
-    try:
-        path = find_map(name)
-    except MapError as error:
-        if not policy:
-            raise
-        click.echo(make_printable(f"{error}; driving without behaviors"), err=True)
-        return bare_map(robot, policy)
-    return load_map(path)
+        try:
+            path = find_map(map_name or file_stem(robot))
+        except MapError as error:
+            if map_name is not None or not (without_map and policy):
+                raise
+            click.echo(make_printable(f"{error}; driving without behaviors"), err=True)
+            stimulation_map = bare_map(robot, policy)
+        else:
+            stimulation_map = load_map(path)
+    stimulation_map = resolve_map_policy(stimulation_map, policy, import_options)
+    return DriveConfig(robot, stimulation_map, seed, **options)
 
 
 def show_result(data: dict[str, Any] | list[dict[str, Any]], as_json: bool, table: Callable[[], Any]) -> None:

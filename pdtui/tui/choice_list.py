@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, ClassVar
 
 from rich.text import Text
@@ -79,7 +80,7 @@ class ChoiceList(Vertical):
         title: str,
         keys: str,
         placeholder: str,
-        find_choices: Callable[[str], Sequence[Choice]],
+        find_choices: Callable[[str], Iterable[Choice]],
         *,
         nothing_found: str,
         nothing_there: str = "",
@@ -119,7 +120,7 @@ class ChoiceList(Vertical):
         self.post_message(self.Chosen(event.option.value))
 
     def _show_choices(self, query: str) -> None:
-        choices = self._find_choices(query)[:MAX_CHOICES]
+        choices = list(islice(self._find_choices(query), MAX_CHOICES))
         options = self.query_one(OptionList)
         options.clear_options()
         options.add_options(choices)

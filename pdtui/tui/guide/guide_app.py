@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import ClassVar
 
 from rich.text import Text
@@ -15,7 +15,7 @@ from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
 from pdtui.guide.guide_pages import GUIDE_FOLDER, GuidePage, search_guide
-from pdtui.tui.choice_list import MAX_CHOICES, Choice, ChoiceList, has_all_words
+from pdtui.tui.choice_list import Choice, ChoiceList, has_all_words
 from pdtui.tui.guide.guide_viewer import GuideViewer, line_link
 from pdtui.tui.style_sheets import WIDTHS
 from pdtui.tui.theme import STYLES, THEME
@@ -88,13 +88,13 @@ class GuideApp(App[None]):
 
     def action_search(self) -> None:
         """Find text in all pages."""
-        self._choose("search the guide", self._find_text)
-
-    def _find_text(self, query: str) -> list[Choice]:
-        return [
-            _choice(hit.text, f"{self._pages[hit.topic].title} › {hit.heading}", line_link(hit))
-            for hit in search_guide(self._pages, query)[:MAX_CHOICES]
-        ]
+        self._choose(
+            "search the guide",
+            lambda query: (
+                _choice(hit.text, f"{self._pages[hit.topic].title} › {hit.heading}", line_link(hit))
+                for hit in search_guide(self._pages, query)
+            ),
+        )
 
     def action_links(self) -> None:
         """Choose a link of this page."""
@@ -113,7 +113,7 @@ class GuideApp(App[None]):
 
     def _choose_among(self, title: str, links: Sequence[tuple[str, str, str]]) -> None:
         """Offer links, each a text, the place that it leads to, and the target."""
-        self._choose(title, lambda query: [_choice(*link) for link in links if has_all_words(link[0], query)])
+        self._choose(title, lambda query: (_choice(*link) for link in links if has_all_words(link[0], query)))
 
     async def action_back(self) -> None:
         """Go back to where the last link was followed."""
@@ -127,7 +127,7 @@ class GuideApp(App[None]):
             await self.query_one(GuideViewer).follow(f"{topics[place]}.md")
 
     @work
-    async def _choose(self, title: str, find_choices: Callable[[str], Sequence[Choice]]) -> None:
+    async def _choose(self, title: str, find_choices: Callable[[str], Iterable[Choice]]) -> None:
         target = await self.push_screen_wait(GuideChooser(title, find_choices))
         if target is not None:
             await self.query_one(GuideViewer).follow(target)
@@ -138,7 +138,7 @@ class GuideChooser(ModalScreen[str | None]):
 
     BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "closes the list", id="guide_close")]
 
-    def __init__(self, title: str, find_choices: Callable[[str], Sequence[Choice]]) -> None:
+    def __init__(self, title: str, find_choices: Callable[[str], Iterable[Choice]]) -> None:
         super().__init__()
         self._title, self._find_choices = title, find_choices
 

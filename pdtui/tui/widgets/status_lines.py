@@ -17,7 +17,6 @@ from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
 _NAME = 40
-Part = tuple[str, Style]
 
 
 class StatusLine(SnapshotWidget):
@@ -29,47 +28,50 @@ class StatusLine(SnapshotWidget):
         del height
         title = self.map.robot if self.facts is None else self.facts.title
         row = ScreenRow(width).add(" pdtui ", STYLES.caps[1]).add(f" {make_printable(title)}", STYLES.title)
-        shown: list[tuple[int, Part]] = []
+        parts = self._parts()
+        shown: set[int] = set()
         left = row.left - 1
-        for position, part in sorted(self._parts(), key=lambda item: item[0]):
-            length = cell_len(part[0]) + 2
+        for rank, text, _ in sorted(parts, key=lambda part: part[0]):
+            length = cell_len(text) + 2
             if length <= left:
                 left -= length
-                shown.append((position, part))
+                shown.add(rank)
         row.add(" " * max(0, left), STYLES.text)
-        order = (4, 8, 7, 6, 5, 1, 2, 3, 0)
-        for _, (text, style) in sorted(shown, key=lambda item: order.index(item[0])):
-            row.add("  " + text, style)
+        for rank, text, style in parts:
+            if rank in shown:
+                row.add("  " + text, style)
         return [row.strip()]
 
-    def _parts(self) -> list[tuple[int, Part]]:
-        """Return the parts of the line with their rank; 0 is the most important."""
-        if self.facts is None:
+    def _parts(self) -> list[tuple[int, str, Style]]:
+        """Return rank, text and style of each part, from left to right; rank 0 is the most important."""
+        facts, snapshot = self.facts, self.snapshot
+        if facts is None:
             return [
-                (0, ("loading the policy…", STYLES.warn)),
-                (4, (make_printable(self.map.policy), STYLES.muted)),
+                (4, make_printable(self.map.policy), STYLES.muted),
+                (0, "loading the policy…", STYLES.warn),
             ]
-        parts: list[tuple[int, Part]] = [
-            (4, (make_printable(PurePath(self.facts.policy).name), STYLES.muted)),
-            (6, (f"seed {self.facts.seed}", STYLES.muted)),
-        ]
-        snapshot = self.snapshot
+        policy = (4, make_printable(PurePath(facts.policy).name), STYLES.muted)
+        seed = (6, f"seed {facts.seed}", STYLES.muted)
         if snapshot is None:
-            return parts
-        parts += [
-            (0, self._pace()),
-            (1, (f"step {snapshot.step}", STYLES.text)),
-            (2, (f"{snapshot.time:.1f} s", STYLES.text)),
-            (5, (f"involvement {snapshot.involvement}", STYLES.muted)),
-            (7, (f"episode {snapshot.episode}", STYLES.muted)),
+            return [policy, seed]
+        recording = []
+        if facts.recording:
+            name = _shorten(make_printable(PurePath(facts.recording).name), _NAME)
+            size = filesize.decimal(snapshot.recorded_bytes)
+            recording = [(8, name, STYLES.muted), (3, f"● {size}", STYLES.bad)]
+        return [
+            policy,
+            *recording[:1],
+            (7, f"episode {snapshot.episode}", STYLES.muted),
+            seed,
+            (5, f"involvement {snapshot.involvement}", STYLES.muted),
+            (1, f"step {snapshot.step}", STYLES.text),
+            (2, f"{snapshot.time:.1f} s", STYLES.text),
+            *recording[1:],
+            (0, *self._pace()),
         ]
-        if self.facts.recording:
-            name = _shorten(make_printable(PurePath(self.facts.recording).name), _NAME)
-            parts.append((3, (f"● {filesize.decimal(snapshot.recorded_bytes)}", STYLES.bad)))
-            parts.append((8, (name, STYLES.muted)))
-        return parts
 
-    def _pace(self) -> Part:
+    def _pace(self) -> tuple[str, Style]:
         snapshot = self.snapshot
         assert snapshot is not None
         if snapshot.finished:
