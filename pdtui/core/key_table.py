@@ -33,11 +33,11 @@ class FixedKey:
         id: name of its binding, under which users can choose another key.
         key: Textual's name of the key.
         says: what it does, as the end of a sentence that starts with "it".
-        event: kind of the event by which it changes the run; None if it changes only what is seen.
+        event: kind of the event by which it changes the run; None if it affects only the screen.
         direction: 1 for up, left and more; −1 for down, right and less.
-        action: Textual action of a key that changes only what is seen.
-        hint: its word in the key line; empty to leave it out.
-        hint_rank: place in the key line, which a narrow terminal cuts short.
+        action: Textual's name of the action of a key that affects only the screen.
+        hint: label in the key line; empty if the key is not shown there.
+        hint_rank: position in the key line, which is cut short on a narrow terminal.
     """
 
     id: str

@@ -42,7 +42,8 @@ class LayerWidths(tuple[int, ...]):
 
 def describe_layers(layers: Sequence[int]) -> str:
     """Describe the layers for messages: ``layers 0..1 of 256 units``."""
-    named = [f" ({names[0]})" if (names := _names(layers, layer)) else "" for layer in range(len(layers))]
+    names = [_layer_names(layers, layer)[:1] for layer in range(len(layers))]
+    named = [f" ({name[0]})" if name else "" for name in names]
     if len(set(layers)) == 1 and len(layers) > 1 and not any(named):
         return f"layers 0..{len(layers) - 1} of {layers[0]} units"
     parts = enumerate(zip(named, layers, strict=True))
@@ -61,7 +62,7 @@ def parse_unit(address: str, layers: Sequence[int]) -> int:
     match = ADDRESS.fullmatch(address)
     if match is None:
         raise PolicyError(f"unit '{address}': expected layer:index, such as 0:12")
-    layer, index = _layer(match[1], layers), int(match[2])
+    layer, index = _find_layer(match[1], layers), int(match[2])
     if layer is None or index >= layers[layer]:
         raise PolicyError(f"unit {address} does not exist; the policy has {describe_layers(layers)}")
     return sum(layers[:layer]) + index
@@ -70,7 +71,7 @@ def parse_unit(address: str, layers: Sequence[int]) -> int:
 def format_unit(flat: int, layers: Sequence[int]) -> str:
     """Return ``layer:index`` of a flat index, by the layer's name where it has one."""
     layer, index = locate_unit(flat, layers)
-    return f"{next(iter(_names(layers, layer)), layer)}:{index}"
+    return f"{next(iter(_layer_names(layers, layer)), layer)}:{index}"
 
 
 def locate_unit(flat: int, layers: Sequence[int]) -> tuple[int, int]:
@@ -82,15 +83,15 @@ def locate_unit(flat: int, layers: Sequence[int]) -> tuple[int, int]:
     raise PolicyError(f"unit index beyond the policy's {describe_layers(layers)}")
 
 
-def _names(layers: Sequence[int], layer: int) -> tuple[str, ...]:
+def _layer_names(layers: Sequence[int], layer: int) -> tuple[str, ...]:
     names = layers.names if isinstance(layers, LayerWidths) else ()
     return names[layer] if layer < len(names) else ()
 
 
-def _layer(name: str, layers: Sequence[int]) -> int | None:
+def _find_layer(name: str, layers: Sequence[int]) -> int | None:
     if name.isdecimal():
         return int(name) if int(name) < len(layers) else None
-    return next((layer for layer in range(len(layers)) if name in _names(layers, layer)), None)
+    return next((layer for layer in range(len(layers)) if name in _layer_names(layers, layer)), None)
 
 
 @dataclass(frozen=True)

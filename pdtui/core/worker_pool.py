@@ -193,10 +193,10 @@ def _serve_calls(connection: Connection, build: Callable[..., Any], arguments: t
                     # Tracebacks are not pickled.
                     error.add_note(f"In a worker process:\n{traceback.format_exc()}")
                 answer = False, error
-            _send(connection, answer)
+            _send_answer(connection, answer)
 
 
-def _send(connection: Connection, answer: tuple[bool, Any]) -> None:
+def _send_answer(connection: Connection, answer: tuple[bool, Any]) -> None:
     try:
         connection.send(answer)
     except OSError:

@@ -111,8 +111,8 @@ def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, s
         map_text=_read_value(properties, "map", str),
         stochastic=_read_value(properties, "stochastic", bool),
         dt=dt,
-        attributes=_read_list(properties, "attributes", _attribute),
-        links=_read_list(properties, "links", _link),
+        attributes=_read_list(properties, "attributes", _decode_attribute),
+        links=_read_list(properties, "links", _decode_link),
         layers=tuple(layers),
         activations=kept,
         # Older sessions lack the following properties.
@@ -144,27 +144,27 @@ def _read_list(
         raise SessionError(f"property '{name}': invalid: {error!r}") from error
 
 
-def _attribute(item: dict[str, Any]) -> Attribute:
+def _decode_attribute(item: dict[str, Any]) -> Attribute:
     wraps = item["wraps"]
     if type(wraps) is not bool:
         raise ValueError("'wraps' is not a boolean")
-    (scale,) = _numbers([item["scale"]], 1)
-    return Attribute(_text(item["name"]), _text(item["unit"]), scale, wraps)
+    (scale,) = _check_numbers([item["scale"]], 1)
+    return Attribute(_check_text(item["name"]), _check_text(item["unit"]), scale, wraps)
 
 
-def _link(item: dict[str, Any]) -> Link:
+def _decode_link(item: dict[str, Any]) -> Link:
     shape, body = item["shape"], item["body"]
     if shape not in _SIZES:
         raise ValueError(f"unknown shape {shape!r}")
     if type(body) is not int or not 0 <= body < _MAX_LINKS:
         raise ValueError("'body' is not a row number")
-    size = _numbers(item["size"], _SIZES[shape])
-    x, y, z = _numbers(item["position"], 3)
-    a, b, c, d = _numbers(item["quaternion"], 4)
-    return Link(_text(item["name"]), body, shape, size, (x, y, z), (a, b, c, d))
+    size = _check_numbers(item["size"], _SIZES[shape])
+    x, y, z = _check_numbers(item["position"], 3)
+    a, b, c, d = _check_numbers(item["quaternion"], 4)
+    return Link(_check_text(item["name"]), body, shape, size, (x, y, z), (a, b, c, d))
 
 
-def _text(value: Any) -> str:
+def _check_text(value: Any) -> str:
     if not isinstance(value, str):
         raise ValueError(f"expected text, found {type(value).__name__}")
     if len(value) > _MAX_TEXT:
@@ -173,7 +173,7 @@ def _text(value: Any) -> str:
     return value
 
 
-def _numbers(values: Any, count: int) -> tuple[float, ...]:
+def _check_numbers(values: Any, count: int) -> tuple[float, ...]:
     if not isinstance(values, list) or len(values) != count:
         raise ValueError(f"expected {count} numbers")
     if not all(type(value) in (int, float) and math.isfinite(value) for value in values):

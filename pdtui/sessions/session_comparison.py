@@ -121,11 +121,16 @@ def compare_sessions(a: Session, b: Session) -> SessionComparison:
         change = attribute_differences(values_a, values_b, a.info.attributes)
         found = summarise_deviations(change, a.info.attributes, first, measure_spread(a.attributes))
     return SessionComparison(
-        steps, (a.steps, b.steps), first, found, _first_event(a.events, b.events, steps), _circumstances(a, b)
+        steps,
+        (a.steps, b.steps),
+        first,
+        found,
+        _describe_first_event(a.events, b.events, steps),
+        _list_circumstances(a, b),
     )
 
 
-def _first_event(a: Sequence[Event], b: Sequence[Event], steps: int) -> str:
+def _describe_first_event(a: Sequence[Event], b: Sequence[Event], steps: int) -> str:
     of_a, of_b = ([event for event in events if event.step < steps] for events in (a, b))
     for number, pair in enumerate(zip_longest(of_a, of_b)):
         if pair[0] != pair[1]:
@@ -137,7 +142,7 @@ def _first_event(a: Sequence[Event], b: Sequence[Event], steps: int) -> str:
     return ""
 
 
-def _circumstances(a: Session, b: Session) -> tuple[str, ...]:
+def _list_circumstances(a: Session, b: Session) -> tuple[str, ...]:
     lines = [
         f"{name}: {getattr(a.info, name)} and {getattr(b.info, name)}"
         for name in ("robot", "seed", "policy", "policy_hash", "stochastic", "start", "dt")

@@ -57,16 +57,16 @@ def export_stream(path: Path, stream: str, output: Path, *, overwrite: bool = Fa
     return int(table.num_rows)
 
 
-def _attributes(session: Session) -> Columns:
+def _attribute_columns(session: Session) -> Columns:
     names = [f"{attribute.name} ({attribute.unit})" for attribute in session.info.attributes]
     return _name_columns(session.attributes, names)
 
 
-def _actions(session: Session) -> Columns:
+def _action_columns(session: Session) -> Columns:
     return _name_columns(session.actions, [f"action {index}" for index in range(session.actions.shape[1])])
 
 
-def _rewards(session: Session) -> Columns:
+def _reward_columns(session: Session) -> Columns:
     return {
         "reward": session.rewards,
         "cost": session.costs,
@@ -75,13 +75,13 @@ def _rewards(session: Session) -> Columns:
     }
 
 
-def _activations(session: Session) -> Columns:
+def _activation_columns(session: Session) -> Columns:
     activations = read_activations(session.path)
     units = [format_unit(unit, session.info.layers) for unit in range(activations.shape[1])]
     return _name_columns(activations, units)
 
 
-def _behaviors(session: Session) -> Columns:
+def _behavior_columns(session: Session) -> Columns:
     rows = [(step, view) for step, views in enumerate(session.active) for view in views]
     columns: Columns = {"step": [step for step, _ in rows], "behavior": [view.name for _, view in rows]}
     for field in ACTIVE_FIELDS:
@@ -89,7 +89,7 @@ def _behaviors(session: Session) -> Columns:
     return columns
 
 
-def _stimulation(session: Session) -> Columns:
+def _unit_columns(session: Session) -> Columns:
     rows = [
         (step, format_unit(unit, session.info.layers), value, natural)
         for step, (stimulation, would) in enumerate(zip(session.stimulations, session.natural, strict=True))
@@ -104,7 +104,7 @@ def _stimulation(session: Session) -> Columns:
     }
 
 
-def _events(session: Session) -> Columns:
+def _event_columns(session: Session) -> Columns:
     columns: Columns = {"step": [event.step for event in session.events]}
     kinds = {"kind": pa.utf8(), "name": pa.utf8(), "value": pa.float64(), "key": pa.utf8()}
     for field, kind in kinds.items():
@@ -117,13 +117,13 @@ def _name_columns(block: np.ndarray[Any, Any], names: list[str]) -> Columns:
 
 
 STREAMS: dict[str, tuple[str, Callable[[Session], Columns]]] = {
-    "attributes": ("kinematic attributes after each step", _attributes),
-    "actions": ("what the policy commanded", _actions),
-    "gains": ("reward, cost, episode, and why it ended", _rewards),
+    "attributes": ("kinematic attributes after each step", _attribute_columns),
+    "actions": ("what the policy commanded", _action_columns),
+    "gains": ("reward, cost, episode, and why it ended", _reward_columns),
     "digests": ("digest of the simulator's state after each step", lambda one: {"digest": one.digests}),
-    "activations": ("output of every hidden unit, as the next layer received it", _activations),
-    "behaviors": ("active behaviors with their controllers, one row each", _behaviors),
-    "stimulation": ("stimulated units, with natural and overwritten outputs, one row each", _stimulation),
-    "events": ("everything that changed the run, one row per event", _events),
+    "activations": ("output of every hidden unit, as the next layer received it", _activation_columns),
+    "behaviors": ("active behaviors with their controllers, one row each", _behavior_columns),
+    "stimulation": ("stimulated units, with natural and overwritten outputs, one row each", _unit_columns),
+    "events": ("everything that changed the run, one row per event", _event_columns),
 }
 """The streams by name: what each contains, and the function that returns its columns."""

@@ -70,7 +70,7 @@ def read_session(path: Path | str) -> Session:
             raise SessionError(f"stream '{DRIVE}/{REWARD_COST_ACTION}': expected reward and cost first")
         gains = gains if header.steps else np.empty((0, 2))
         counters = drive.read_matrix(DIGEST_EPISODE, np.int64, 2)
-        stimulations, natural = _stimulations(drive, sum(info.layers))
+        stimulations, natural = _read_stimulations(drive, sum(info.layers))
         return Session(
             **vars(header),
             digests=counters[:, 0],
@@ -79,7 +79,7 @@ def read_session(path: Path | str) -> Session:
             rewards=gains[:, 0],
             costs=gains[:, 1],
             episodes=counters[:, 1],
-            active=_active(drive),
+            active=_read_active_behaviors(drive),
             stimulations=stimulations,
             natural=natural,
         )
@@ -110,7 +110,7 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
         raise SessionError(f"{path}: {error}") from error
 
 
-def _active(drive: EntityTable) -> tuple[tuple[ActiveBehavior, ...], ...]:
+def _read_active_behaviors(drive: EntityTable) -> tuple[tuple[ActiveBehavior, ...], ...]:
     width = len(ACTIVE_FIELDS)
     steps = []
     states = drive.read_lists("active", float, optional=True)
@@ -118,17 +118,17 @@ def _active(drive: EntityTable) -> tuple[tuple[ActiveBehavior, ...], ...]:
         if len(flat) != len(names) * width:
             raise SessionError(f"stream 'active': expected {width} numbers per behavior")
         parts = [flat[start : start + width] for start in range(0, len(flat), width)]
-        steps.append(tuple(map(_behavior, names, parts)))
+        steps.append(tuple(map(_decode_active_behavior, names, parts)))
     return tuple(steps)
 
 
-def _behavior(name: str, values: Sequence[float]) -> ActiveBehavior:
+def _decode_active_behavior(name: str, values: Sequence[float]) -> ActiveBehavior:
     remaining, factor, *controller = (None if math.isnan(value) else value for value in values)
     steps = None if remaining is None or math.isinf(remaining) else int(remaining)
     return ActiveBehavior(name, steps, math.nan if factor is None else factor, *controller)
 
 
-def _stimulations(
+def _read_stimulations(
     drive: EntityTable, units: int
 ) -> tuple[tuple[Stimulation, ...], tuple[tuple[float, ...], ...]]:
     stimulations, natural = [], []

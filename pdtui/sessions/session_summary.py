@@ -61,12 +61,12 @@ def summarise_session(session: Session) -> SessionSummary:
         total_reward=float(session.rewards.sum()),
         total_cost=float(session.costs.sum()),
         stimulated=sum(bool(stimulation.units) for stimulation in session.stimulations),
-        tallies=_tallies(session, keyed),
-        attributes=_attributes(session),
+        tallies=_count_episodes(session, keyed),
+        attributes=_summarise_attributes(session),
     )
 
 
-def _tallies(session: Session, keyed: set[int]) -> tuple[EpisodeStatistics, ...]:
+def _count_episodes(session: Session, keyed: set[int]) -> tuple[EpisodeStatistics, ...]:
     counter = EpisodeStatisticsCounter(session.info)
     steps = zip(session.episodes.tolist(), session.costs.tolist(), session.attributes, strict=True)
     for step, (episode, cost, attributes) in enumerate(steps):
@@ -74,7 +74,7 @@ def _tallies(session: Session, keyed: set[int]) -> tuple[EpisodeStatistics, ...]
     return counter.all
 
 
-def _attributes(session: Session) -> tuple[AttributeSummary, ...]:
+def _summarise_attributes(session: Session) -> tuple[AttributeSummary, ...]:
     found = []
     for column, attribute in enumerate(session.info.attributes):
         values = session.attributes[:, column]

@@ -109,14 +109,14 @@ class Latch:
 
     def set_target(self, name: str, target: float) -> None:
         """Set the target of a latched behavior of mode ``pid``; for any other, raise a `KeystrokeError`."""
-        controller = self._find(name).controller
+        controller = self._find_latched(name).controller
         if controller is None:
             raise KeystrokeError(f"behavior '{name}' holds no target; its mode is fixed")
         controller.set_target(target)
 
     def set_factor(self, name: str, factor: float) -> None:
         """Set the factor on the magnitudes of a behavior; one that is not latched is a `KeystrokeError`."""
-        self._find(name).factor = factor
+        self._find_latched(name).factor = factor
 
     def stimulate(self, attributes: Floats) -> Stimulation:
         """Return what this control step overwrites, given the robot's present attributes, shape (J,).
@@ -152,7 +152,7 @@ class Latch:
         """Restore a state that `copy_state` returned."""
         self._latched = [latched.copy() for latched in state]
 
-    def _find(self, name: str) -> _LatchedBehavior:
+    def _find_latched(self, name: str) -> _LatchedBehavior:
         for latched in self._latched:
             if latched.behavior.name == name:
                 return latched

@@ -42,14 +42,14 @@ def locate_map_policy(
     """Do the same as `resolve_map_policy`, but leave the text of the map as it is."""
     source = stimulation_map.source
     folder = Path(source).parent
-    name = policy or _from_here(stimulation_map.policy, folder, source)
+    name = policy or _path_from_here(stimulation_map.policy, folder, source)
     merged = import_options.or_else(stimulation_map.import_options)
     if merged.normaliser != NO_NORMALISER and not import_options.normaliser:
-        merged = replace(merged, normaliser=_from_here(merged.normaliser, folder, source))
+        merged = replace(merged, normaliser=_path_from_here(merged.normaliser, folder, source))
     return replace(stimulation_map, policy=name, import_options=merged)
 
 
-def _from_here(name: str, folder: Path, source: str) -> str:
+def _path_from_here(name: str, folder: Path, source: str) -> str:
     """Return a file's name as seen from the working directory; unchanged if found that way, or nowhere."""
     found = find_inside(name, (folder,), source) if name else None
     if found is None or found == Path(name):

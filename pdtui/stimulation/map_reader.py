@@ -78,10 +78,10 @@ def parse_map(text: str, source: str) -> StimulationMap:
         for kind in ("primitives", "behaviors")
     }
     top.done()
-    primitives = {p.name: p for p in (_primitive(table) for table in tables["primitives"])}
+    primitives = {p.name: p for p in (_read_primitive(table) for table in tables["primitives"])}
     behaviors: dict[str, Behavior] = {}
     for table in tables["behaviors"]:
-        behavior = _behavior(table, primitives)
+        behavior = _read_behavior(table, primitives)
         if behavior.name in behaviors:
             raise table.error("name", f"'{behavior.name}' is taken by another behavior")
         behaviors[behavior.name] = behavior
@@ -106,7 +106,7 @@ def _has_long_key(text: str) -> bool:
     return False
 
 
-def _primitive(table: MapTableReader) -> MotorPrimitive:
+def _read_primitive(table: MapTableReader) -> MotorPrimitive:
     unit = table.text("unit")
     if not ADDRESS.fullmatch(unit):
         raise table.error("unit", f"expected layer:index, such as 0:12, found '{unit}'")
@@ -114,12 +114,12 @@ def _primitive(table: MapTableReader) -> MotorPrimitive:
     discrepancy, value = table.number("discrepancy", None), table.number("value", None)
     if not -1.0 <= rho <= 1.0:
         raise table.error("rho", f"expected a number from −1 to 1, found {rho}")
-    primitive = MotorPrimitive(name, attribute, unit, rho, discrepancy, value, _measured(table))
+    primitive = MotorPrimitive(name, attribute, unit, rho, discrepancy, value, _read_effect(table))
     table.done()
     return primitive
 
 
-def _measured(parent: MapTableReader) -> MeasuredEffect | None:
+def _read_effect(parent: MapTableReader) -> MeasuredEffect | None:
     table = parent.table("measured", None)
     if table is None:
         return None
@@ -129,7 +129,7 @@ def _measured(parent: MapTableReader) -> MeasuredEffect | None:
     return measured
 
 
-def _behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive]) -> Behavior:
+def _read_behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive]) -> Behavior:
     name = table.text("name")
     magnitudes = table.numbers("magnitudes", {})
     for key in magnitudes:
@@ -178,7 +178,7 @@ def _behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive]) -> B
         together=tuple(together),
         mode=mode,
         aim=aim,
-        measured=_measured(table),
+        measured=_read_effect(table),
         pid=pid,
         task=table.text("task", ""),
         commands=commands,

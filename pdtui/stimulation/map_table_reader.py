@@ -33,7 +33,7 @@ class MapTableReader:
         self._source, self._text, self._where = source, text, where
         self._header, self._number = header, number
         if not isinstance(data, dict):
-            raise MapError(f"{source}: {where}: expected a table, found {_kind(data)}")
+            raise MapError(f"{source}: {where}: expected a table, found {_type_of_value(data)}")
         self._data = dict(data)
 
     def take(self, name: str, kind: type | tuple[type, ...], default: Any = ...) -> Any:
@@ -44,7 +44,7 @@ class MapTableReader:
             return default
         value = self._data.pop(name)
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-            raise self.error(name, f"expected {_name(kind)}, found {_kind(value)}")
+            raise self.error(name, f"expected {_type_in_words(kind)}, found {_type_of_value(value)}")
         if isinstance(value, NUMBER) and not _is_usable(value):
             raise self.error(name, f"expected a finite number; whole numbers are at most {_MAX_WHOLE}")
         if isinstance(value, list | dict) and len(value) > MAX_ENTRIES:
@@ -86,7 +86,7 @@ class MapTableReader:
         data = self.take(name, dict, default)
         for key, value in data.items():
             if isinstance(value, bool) or not isinstance(value, NUMBER) or not _is_usable(value):
-                raise self.error(name, f"'{key[:80]}': expected a finite number, found {_shown(value)}")
+                raise self.error(name, f"'{key[:80]}': expected a finite number, found {_describe(value)}")
         return {key: float(value) for key, value in data.items()}
 
     def done(self) -> None:
@@ -122,14 +122,14 @@ def _line_of(text: str, header: str, number: int, field: str) -> int:
     return start + 1
 
 
-def _shown(value: Any) -> str:
-    return repr(value[:40]) if isinstance(value, str) else _kind(value)
+def _describe(value: Any) -> str:
+    return repr(value[:40]) if isinstance(value, str) else _type_of_value(value)
 
 
-def _name(kind: type | tuple[type, ...]) -> str:
+def _type_in_words(kind: type | tuple[type, ...]) -> str:
     names = {str: "text", int: "a whole number", dict: "a table", list: "a list", bool: "true or false"}
     return "a number" if isinstance(kind, tuple) else names.get(kind, kind.__name__)
 
 
-def _kind(value: Any) -> str:
-    return "a number" if type(value) in NUMBER else _name(type(value))
+def _type_of_value(value: Any) -> str:
+    return "a number" if type(value) in NUMBER else _type_in_words(type(value))

@@ -81,18 +81,18 @@ class Behavior:
     Attributes:
         name: Name on the screen.
         key: Key that latches it.
-        says: One sentence on what one sees.
+        says: One sentence that says what the robot does.
         magnitudes: Magnitudes c by the names of primitives, and outputs v by ``layer:index``. In mode
             ``pid``, weights that are multiplied by the controller's output.
         base: In mode ``pid``, the outputs v, by ``layer:index``, to which weight × output is added; 0 for a
             unit that is not named.
-        commands: What the policy is asked for meanwhile, by the names of the robot's commands. In mode
-            ``pid``, weights that are multiplied by the controller's output.
+        commands: Values of the robot's commands, by name, while it is latched. In mode ``pid``, weights that
+            are multiplied by the controller's output.
         period: Activation period T, s; None lasts until another key is pressed.
         together: Names of behaviors that may stay latched with this one.
         mode: ``fixed`` for fixed magnitudes, or ``pid``.
-        aim: What it is meant to do to an attribute.
-        task: Name of the task that it is meant to do; empty for none.
+        aim: The change of an attribute that it is meant to cause.
+        task: Name of the task that it is meant to perform; empty for none.
         measured: Change of the aim's attribute, compared with the policy alone.
         pid: The controller of mode ``pid``.
     """
@@ -159,8 +159,8 @@ class StimulationMap:
         """
         if self.robot != robot:
             raise MapError(f"{self.source}: made for robot '{self.robot}', not for '{robot}'")
-        said = self.policy_hash or self.behaviors
-        if said and self.policy_hash != policy_hash and not force:
+        hash_matters = self.policy_hash or self.behaviors
+        if hash_matters and self.policy_hash != policy_hash and not force:
             raise MapError(
                 f"{self.source}: made for a policy with SHA-256 {self.policy_hash[:12]}…, "
                 f"the policy here has {policy_hash[:12]}…; --force uses it anyway"

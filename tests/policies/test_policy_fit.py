@@ -8,8 +8,7 @@ from torch import nn
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.runtime.action_decoders import categorical, mean_action
-from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.runtime.policy_fit import check_fit
+from pdtui.policies.runtime.policy import Policy, check_fit
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots import make_robot
 

@@ -53,7 +53,7 @@ def import_network(
     """
     source = str(path)
     try:
-        found = _find(read_bounded(path), source, import_options)
+        found = _read_policy(read_bounded(path), source, import_options)
         if normaliser is not None and import_options.normaliser != NO_NORMALISER:
             found = replace(found, statistics=read_statistics(normaliser, found.layers[0].shape[1]))
         return assemble_network(found, import_options, spaces, source)
@@ -63,7 +63,7 @@ def import_network(
         raise error if named else PolicyError(f"{source}: {text}") from error
 
 
-def _find(content: bytes, source: str, import_options: ImportOptions) -> PartialPolicy:
+def _read_policy(content: bytes, source: str, import_options: ImportOptions) -> PartialPolicy:
     match file_kind_of(content):
         case FileKind.ZIP:
             return _from_zip(content, source, import_options)

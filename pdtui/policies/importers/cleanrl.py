@@ -36,22 +36,22 @@ def import_cleanrl(tensors: Tensors) -> PartialPolicy | None:
     last = next((name for name in ("fc_mean", "fc_mu") if f"{name}.weight" in named), None)
     if last is None or "fc1.weight" not in named:
         return None
-    return _off_policy(named, last)
+    return _import_off_policy(named, last)
 
 
-def _off_policy(named: Tensors, last: str) -> PartialPolicy:
+def _import_off_policy(named: Tensors, last: str) -> PartialPolicy:
     numbers = sorted(int(match[1]) for name in named if (match := re.fullmatch(r"fc(\d{1,4})\.weight", name)))
     hidden = [read_linear_layer(named, f"fc{number}") for number in numbers]
     if last == "fc_mu":
         layers = check_layer_chain([*hidden, read_linear_layer(named, last)], "fc")
-        return PartialPolicy("CleanRL TD3 or DDPG", layers, "action", "", "tanh", *_bounds(named))
+        return PartialPolicy("CleanRL TD3 or DDPG", layers, "action", "", "tanh", *_action_bounds(named))
     head = join_mean_and_deviation(read_linear_layer(named, last), read_linear_layer(named, "fc_logstd"))
     layers = check_layer_chain([*hidden, head], "fc")
-    policy = PartialPolicy("CleanRL SAC", layers, "gaussian pair", "", "tanh", *_bounds(named))
+    policy = PartialPolicy("CleanRL SAC", layers, "gaussian pair", "", "tanh", *_action_bounds(named))
     return replace(policy, log_std_low=-5.0, log_std_high=2.0, log_std_rule="tanh")
 
 
-def _bounds(named: Tensors) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _action_bounds(named: Tensors) -> tuple[tuple[float, ...], tuple[float, ...]]:
     if "action_scale" not in named or "action_bias" not in named:
         return (), ()
     scale, bias = named["action_scale"].reshape(-1), named["action_bias"].reshape(-1)

@@ -22,19 +22,19 @@ def assemble_network(
         raise PolicyError(
             f"{source}: expected a hidden layer before the head, found {len(found.layers)} layers"
         )
-    output = _output(found, spaces)
+    output = _output_kind(found, spaces)
     outputs, observations = found.layers[-1].shape[0], found.layers[0].shape[1]
     actions = outputs // 2 if output == "gaussian pair" else outputs
     discrete = output == "categorical"
     if spaces is not None:
         spaces.check(source, observations, 1 if discrete else actions, actions if discrete else 0)
-    head, squash = _head(found, output, import_options, source)
-    low, high = _bounds(found, squash, spaces, actions, source) if not discrete else ((), ())
+    head, squash = _choose_head(found, output, import_options, source)
+    low, high = _action_bounds(found, squash, spaces, actions, source) if not discrete else ((), ())
     spec = NetworkSpec(
         robot="",
         observations=observations,
         layers=tuple(layer.shape[0] for layer in found.layers[:-1]),
-        activation=_activation(found, import_options, source),
+        activation=_choose_activation(found, import_options, source),
         actions=actions,
         head=head,
         action_low=low,
@@ -48,11 +48,11 @@ def assemble_network(
         observation_clip=found.statistics.clip if found.statistics else 0.0,
     )
     network = PolicyNetwork(spec)
-    network.load_tensors(_tensors(found, network, source))
+    network.load_tensors(_network_tensors(found, network, source))
     return network.eval()
 
 
-def _output(found: PartialPolicy, spaces: WorldSpaces | None) -> str:
+def _output_kind(found: PartialPolicy, spaces: WorldSpaces | None) -> str:
     """Return what the head's outputs are; the world's spaces decide where the file does not say."""
     if found.output != "unknown pair":
         return found.output
@@ -64,7 +64,9 @@ def _output(found: PartialPolicy, spaces: WorldSpaces | None) -> str:
     return "action"
 
 
-def _head(found: PartialPolicy, output: str, import_options: ImportOptions, source: str) -> tuple[Head, str]:
+def _choose_head(
+    found: PartialPolicy, output: str, import_options: ImportOptions, source: str
+) -> tuple[Head, str]:
     if output == "categorical":
         return "categorical", "none"
     squash = import_options.squash or found.squash
@@ -80,7 +82,7 @@ def _head(found: PartialPolicy, output: str, import_options: ImportOptions, sour
     return ("gaussian" if drawn else "mean"), squash
 
 
-def _bounds(
+def _action_bounds(
     found: PartialPolicy, squash: str, spaces: WorldSpaces | None, actions: int, source: str
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     if squash == "none":
@@ -98,7 +100,7 @@ def _bounds(
     return low, high
 
 
-def _activation(found: PartialPolicy, import_options: ImportOptions, source: str) -> str:
+def _choose_activation(found: PartialPolicy, import_options: ImportOptions, source: str) -> str:
     if activation := import_options.activation or found.activation:
         return activation
     raise PolicyError(
@@ -107,7 +109,7 @@ def _activation(found: PartialPolicy, import_options: ImportOptions, source: str
     )
 
 
-def _tensors(found: PartialPolicy, network: PolicyNetwork, source: str) -> dict[str, torch.Tensor]:
+def _network_tensors(found: PartialPolicy, network: PolicyNetwork, source: str) -> dict[str, torch.Tensor]:
     tensors = dict(network.state_dict())
     for number, layer in enumerate(found.layers[:-1]):
         tensors[f"hidden.{number}.weight"], tensors[f"hidden.{number}.bias"] = layer.weight, layer.bias

@@ -35,7 +35,7 @@ HOW_TO_CONVERT = (
 
 def read_statistics(path: Path, observations: int) -> ObservationStatistics:
     """Read the statistics of observations of this length."""
-    tensors = _tensors(path)
+    tensors = _read_tensors(path)
     if "mean" not in tensors or not {"var", "std"} & tensors.keys():
         raise PolicyError(
             f"{path}: expected 'mean' and 'var' of the observation, found {', '.join(tensors) or 'nothing'}"
@@ -48,12 +48,13 @@ def read_statistics(path: Path, observations: int) -> ObservationStatistics:
             raise PolicyError(f"{path}: '{name}': expected {expected}, found {tuple(tensor.shape)}")
         if not bool(torch.isfinite(tensor).all()) or (name != "mean" and bool((tensor < 0).any())):
             raise PolicyError(f"{path}: '{name}': expected finite numbers and no negative variance")
-    clip, epsilon = _number(tensors, "clip_obs", 0.0, path), _number(tensors, "epsilon", _EPSILON, path)
+    clip = _read_number(tensors, "clip_obs", 0.0, path)
+    epsilon = _read_number(tensors, "epsilon", _EPSILON, path)
     std = torch.sqrt(spread + epsilon) if "var" in tensors else spread
     return ObservationStatistics(mean.float(), std.float(), clip)
 
 
-def _tensors(path: Path) -> Tensors:
+def _read_tensors(path: Path) -> Tensors:
     content = read_bounded(path)
     match file_kind_of(content):
         case FileKind.ZIP:
@@ -66,10 +67,10 @@ def _tensors(path: Path) -> Tensors:
                 f"{HOW_TO_CONVERT}"
             )
         case _:
-            return _from_json(content, path)
+            return _read_json(content, path)
 
 
-def _from_json(content: bytes, path: Path) -> Tensors:
+def _read_json(content: bytes, path: Path) -> Tensors:
     try:
         data = json.loads(content)
         if not isinstance(data, dict):
@@ -80,7 +81,7 @@ def _from_json(content: bytes, path: Path) -> Tensors:
         raise PolicyError(f"{path}: expected statistics as .npz, .json or .safetensors: {error}") from error
 
 
-def _number(tensors: Tensors, name: str, default: float, path: Path) -> float:
+def _read_number(tensors: Tensors, name: str, default: float, path: Path) -> float:
     if name not in tensors:
         return default
     tensor = tensors[name]

@@ -30,12 +30,12 @@ def import_plain_state_dict(tensors: Tensors, source: str) -> PartialPolicy:
     own = {name: tensor for name, tensor in tensors.items() if not _OTHER.search(name.lower())}
     named = {name: tensor for name, tensor in own.items() if _ACTOR.search(name.lower())}
     for candidates in (named, own, tensors):
-        chains = _chains(candidates)
+        chains = _find_chains(candidates)
         if len(chains) == 1:
             layers, names = chains[0]
             check_layer_chain(layers, names[0])
             return PartialPolicy(
-                f"a plain state dict ({names[0]} … {names[-1]})", layers, log_std=_log_std(own, layers)
+                f"a plain state dict ({names[0]} … {names[-1]})", layers, log_std=_find_log_std(own, layers)
             )
         if len(chains) > 1:
             listed = "; ".join(f"{names[0]} … {names[-1]}" for _, names in chains)
@@ -46,10 +46,10 @@ def import_plain_state_dict(tensors: Tensors, source: str) -> PartialPolicy:
     )
 
 
-def _chains(tensors: Tensors) -> list[tuple[tuple[LinearLayer, ...], list[str]]]:
+def _find_chains(tensors: Tensors) -> list[tuple[tuple[LinearLayer, ...], list[str]]]:
     """Return successive layers as chains; a layer whose inputs do not fit begins a new one."""
     chains: list[tuple[tuple[LinearLayer, ...], list[str]]] = []
-    for name in _ordered(tensors):
+    for name in _ordered_layer_names(tensors):
         layer = read_linear_layer(tensors, name)
         if chains and chains[-1][0][-1].shape[0] == layer.shape[1]:
             layers, names = chains.pop()
@@ -59,7 +59,7 @@ def _chains(tensors: Tensors) -> list[tuple[tuple[LinearLayer, ...], list[str]]]
     return [chain for chain in chains if len(chain[0]) > 1]
 
 
-def _ordered(tensors: Tensors) -> list[str]:
+def _ordered_layer_names(tensors: Tensors) -> list[str]:
     weights = [name for name, tensor in tensors.items() if name.endswith(".weight") and tensor.ndim == 2]
     containers: dict[str, list[tuple[int, str]]] = {}
     for position, name in enumerate(name.removesuffix(".weight") for name in weights):
@@ -69,7 +69,7 @@ def _ordered(tensors: Tensors) -> list[str]:
     return [name for members in containers.values() for _, name in sorted(members)]
 
 
-def _log_std(tensors: Tensors, layers: tuple[LinearLayer, ...]) -> torch.Tensor | None:
+def _find_log_std(tensors: Tensors, layers: tuple[LinearLayer, ...]) -> torch.Tensor | None:
     actions = layers[-1].shape[0]
     for name, tensor in tensors.items():
         if _LOG_STD.fullmatch(name) and tensor.numel() == actions and tensor.is_floating_point():

@@ -28,14 +28,14 @@ def import_rllib(tensors: Tensors) -> PartialPolicy | None:
 
     A policy and its target network have the same layers; the first in the file is the policy.
     """
-    if layers := _actor(tensors, _SAC):
+    if layers := _actor_layers(tensors, _SAC):
         policy = PartialPolicy("RLlib SAC", layers, "gaussian pair", squash="tanh")
         return replace(policy, log_std_low=-5.0, log_std_high=2.0)
-    layers = _actor(tensors, _PPO)
+    layers = _actor_layers(tensors, _PPO)
     return PartialPolicy("RLlib PPO", layers, "unknown pair") if layers else None
 
 
-def _actor(tensors: Tensors, pattern: re.Pattern[str]) -> tuple[LinearLayer, ...]:
+def _actor_layers(tensors: Tensors, pattern: re.Pattern[str]) -> tuple[LinearLayer, ...]:
     layers: dict[str, LinearLayer] = {}
     scope = None
     for name in tensors:
@@ -44,14 +44,14 @@ def _actor(tensors: Tensors, pattern: re.Pattern[str]) -> tuple[LinearLayer, ...
             here = prefix.rpartition("/")[0]
             scope = here if scope is None else scope
             if here == scope:
-                layers[match[3]] = _transposed(tensors, prefix)
+                layers[match[3]] = _read_transposed_layer(tensors, prefix)
     if "out" not in layers:
         return ()
     order = sorted((key for key in layers if key != "out"), key=int)
     return check_layer_chain([layers[key] for key in [*order, "out"]], scope or "")
 
 
-def _transposed(tensors: Tensors, prefix: str) -> LinearLayer:
+def _read_transposed_layer(tensors: Tensors, prefix: str) -> LinearLayer:
     kernel, bias = tensors[f"{prefix}/kernel"], tensors.get(f"{prefix}/bias")
     if kernel.ndim != 2:
         raise PolicyError(

@@ -24,27 +24,28 @@ _NORMALISERS = ("actor_obs_normalizer", "obs_normalizer", "obs_norm_state_dict")
 
 def import_rsl_rl(tensors: Tensors) -> PartialPolicy | None:
     """Return the actor in rsl_rl's weights; None if the tensors have other names."""
-    named = _unwrapped(tensors)
+    named = _strip_wrappers(tensors)
     prefix = next((prefix for prefix in ("actor", "mlp") if f"{prefix}.0.weight" in named), None)
-    log_std = _log_std(named)
+    log_std = _find_log_std(named)
     if prefix is None or log_std is None:
         return None
     layers = read_layer_sequence(named, prefix)
-    return PartialPolicy("rsl_rl", layers, squash="none", log_std=log_std, statistics=_statistics(named))
+    statistics = _observation_statistics(named)
+    return PartialPolicy("rsl_rl", layers, squash="none", log_std=log_std, statistics=statistics)
 
 
-def _unwrapped(tensors: Tensors) -> Tensors:
+def _strip_wrappers(tensors: Tensors) -> Tensors:
     """Return the tensors without the prefixes that a checkpoint puts before the actor's names."""
     return {re.sub(r"^(model|actor)_state_dict\.", "", name): tensor for name, tensor in tensors.items()}
 
 
-def _log_std(named: Tensors) -> torch.Tensor | None:
+def _find_log_std(named: Tensors) -> torch.Tensor | None:
     stated = (named[name] for name in _LOG_STDS if name in named)
     derived = (torch.log(named[name].clamp(min=1e-6)) for name in _STDS if name in named)
     return next(chain(stated, derived), None)
 
 
-def _statistics(named: Tensors) -> ObservationStatistics | None:
+def _observation_statistics(named: Tensors) -> ObservationStatistics | None:
     for prefix in _NORMALISERS:
         mean, std = named.get(f"{prefix}._mean"), named.get(f"{prefix}._std")
         if mean is not None and std is not None:

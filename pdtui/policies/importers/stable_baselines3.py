@@ -45,18 +45,18 @@ def import_sb3(archive: ZipArchive, import_options: ImportOptions) -> PartialPol
 
     The options tell whether the user gave the statistics of VecNormalize, which the archive lacks.
     """
-    source, data = archive.source, _data(archive)
+    source, data = archive.source, _read_data(archive)
     tensors = flatten_tensors(from_torch(archive.read("policy.pth"), f"{source}: policy.pth"))
     _check_flat(tensors, data, source)
-    if _normalised(data) and not import_options.normaliser:
+    if _is_normalised(data) and not import_options.normaliser:
         raise PolicyError(
             f"{source}: trained behind VecNormalize, whose statistics are another file: give them with "
             f"--normaliser FILE, or --normaliser {NO_NORMALISER} if it normalised rewards only"
         )
-    return _Reader(source, data, tensors).found()
+    return _ArchiveReader(source, data, tensors).read_policy()
 
 
-def _normalised(data: dict[str, Any]) -> bool:
+def _is_normalised(data: dict[str, Any]) -> bool:
     """Whether the model was trained behind VecNormalize, as far as the readable part of the file shows.
 
     PPO and A2C keep an observation of before the normalisation only there. The off-policy algorithms keep
@@ -70,13 +70,13 @@ def _normalised(data: dict[str, Any]) -> bool:
     return len(texts[0]) != len(texts[1])
 
 
-class _Reader:
+class _ArchiveReader:
     def __init__(self, source: str, data: dict[str, Any], tensors: Tensors) -> None:
         self._source, self._data, self._tensors = source, data, tensors
-        self._kwargs = _parts(data, "policy_kwargs")
-        self._actions = _parts(data, "action_space")
+        self._kwargs = _readable_parts(data, "policy_kwargs")
+        self._actions = _readable_parts(data, "action_space")
 
-    def found(self) -> PartialPolicy:
+    def read_policy(self) -> PartialPolicy:
         if "action_net.weight" in self._tensors:
             return self._actor_critic()
         if "actor.latent_pi.0.weight" in self._tensors:
@@ -131,7 +131,7 @@ class _Reader:
         """Return what `policy_kwargs` says, else the default of Stable-Baselines3's own policy classes."""
         text = self._kwargs.get("activation_fn")
         if text is None:
-            module = str(_parts(self._data, "policy_class").get("__module__", ""))
+            module = str(_readable_parts(self._data, "policy_class").get("__module__", ""))
             return default if module.startswith("stable_baselines3.") else ""
         match = _CLASS.fullmatch(str(text))
         kind = getattr(nn, match[1].rpartition(".")[2], None) if match else None
@@ -140,7 +140,7 @@ class _Reader:
 
     def _bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Return the bounds of the action space; none where its text is abbreviated or says infinity."""
-        low, high = (_numbers(self._actions.get(side)) for side in ("low", "high"))
+        low, high = (_parse_numbers(self._actions.get(side)) for side in ("low", "high"))
         return ((), ()) if self._unbounded() or len(low) != len(high) else (low, high)
 
     def _unbounded(self) -> bool:
@@ -148,11 +148,11 @@ class _Reader:
 
 
 def _policy_class(data: dict[str, Any]) -> str:
-    match = _FUNCTION.search(str(_parts(data, "policy_class").get("__init__", "")))
+    match = _FUNCTION.search(str(_readable_parts(data, "policy_class").get("__init__", "")))
     return match[1] if match else "a policy of unknown class"
 
 
-def _data(archive: ZipArchive) -> dict[str, Any]:
+def _read_data(archive: ZipArchive) -> dict[str, Any]:
     content = archive.read("data")
     if len(content) > _MAX_DATA:
         raise PolicyError(f"{archive.source}: entry 'data': expected at most {_MAX_DATA >> 20} MiB")
@@ -177,14 +177,14 @@ def _check_flat(tensors: Tensors, data: dict[str, Any], source: str) -> None:
             )
 
 
-def _parts(data: dict[str, Any], name: str) -> dict[str, Any]:
+def _readable_parts(data: dict[str, Any], name: str) -> dict[str, Any]:
     """Return the readable parts of a field, without its pickle."""
     value = data.get(name)
     parts = value.items() if isinstance(value, dict) else ()
     return {key: part for key, part in parts if key != ":serialized:"}
 
 
-def _numbers(text: Any) -> tuple[float, ...]:
+def _parse_numbers(text: Any) -> tuple[float, ...]:
     words = str("" if text is None else text).replace("[", " ").replace("]", " ").split()
     try:
         numbers = tuple(map(float, words))

@@ -69,12 +69,14 @@ def file_kind_of(content: bytes) -> FileKind:
 def from_npz(archive: ZipArchive) -> Tensors:
     """Return the arrays of an ``.npz`` in the order of the file; arrays of Python objects are refused."""
     return {
-        name.removesuffix(".npy"): torch.from_numpy(_array(archive.read(name), f"{archive.source}: '{name}'"))
+        name.removesuffix(".npy"): torch.from_numpy(
+            _read_array(archive.read(name), f"{archive.source}: '{name}'")
+        )
         for name in archive.names
     }
 
 
-def _array(content: bytes, where: str) -> np.ndarray[Any, Any]:
+def _read_array(content: bytes, where: str) -> np.ndarray[Any, Any]:
     stream = io.BytesIO(content)
     try:
         version = np.lib.format.read_magic(stream)
@@ -117,11 +119,11 @@ def from_torch(content: bytes, source: str) -> dict[str, Any]:
     try:
         loaded = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True, mmap=False)
     except Exception as error:
-        raise PolicyError(f"{source}: {_reason(error)}; it holds {archive.listing()}") from error
+        raise PolicyError(f"{source}: {_explain_failure(error)}; it holds {archive.listing()}") from error
     return loaded if isinstance(loaded, dict) else {"": loaded}
 
 
-def _reason(error: Exception) -> str:
+def _explain_failure(error: Exception) -> str:
     """Return in one line why PyTorch's safe reader gave up."""
     text = str(error)
     found = next((line.strip() for line in text.splitlines() if "GLOBAL" in line), "")
@@ -136,7 +138,7 @@ def _reason(error: Exception) -> str:
 def flatten_tensors(content: Any, prefix: str = "", depth: int = 0) -> Tensors:
     """Return all tensors in nested containers by dotted names, floating-point ones as float32."""
     if isinstance(content, torch.Tensor):
-        return {prefix: _checked(content, prefix)}
+        return {prefix: _check_tensor(content, prefix)}
     if depth > _MAX_NESTING:
         return {}
     if isinstance(content, Mapping):
@@ -151,7 +153,7 @@ def flatten_tensors(content: Any, prefix: str = "", depth: int = 0) -> Tensors:
     return tensors
 
 
-def _checked(tensor: torch.Tensor, name: str) -> torch.Tensor:
+def _check_tensor(tensor: torch.Tensor, name: str) -> torch.Tensor:
     if tensor.layout is not torch.strided or tensor.is_quantized or tensor.is_meta:
         raise PolicyError(f"tensor '{name}': expected plain numbers, found {tensor.layout}")
     stored = tensor.untyped_storage().nbytes() // tensor.element_size()

@@ -23,7 +23,7 @@ _TRIALS = 8
 """Observations on which the fast pass is compared with the module."""
 
 
-class _Part(NamedTuple):
+class _LayerCalls(NamedTuple):
     """The calls that compute one layer of units, with flat indices low to high − 1."""
 
     calls: tuple[Callable[[], Any], ...]
@@ -40,24 +40,24 @@ class FastMlp:
     """
 
     def __init__(self, stages: list[nn.Module], observations: int) -> None:
-        widths = _widths(stages, observations)
+        widths = _stage_widths(stages, observations)
         units = [isinstance(stage, ACTIVATION_TYPES) for stage in stages]
         self.layers = tuple(width for width, has_units in zip(widths, units, strict=True) if has_units)
         self._activations = np.empty(sum(self.layers), np.float32)
         whole = torch.from_numpy(self._activations)
         x = torch.empty(observations)
         self._input: NDArray[np.float32] = x.numpy()
-        parts: list[_Part] = []
+        parts: list[_LayerCalls] = []
         calls: list[Callable[[], Any]] = []
         low = 0
         for number, (stage, width) in enumerate(zip(stages, widths, strict=True)):
             feeds_units = units[number + 1 : number + 2] == [True] and widths[number + 1] == width
             # A layer is computed where its activation function then works in place.
             out = whole[low : low + width] if units[number] or feeds_units else torch.empty(width)
-            calls.append(_call(stage, x, out))
+            calls.append(_build_call(stage, x, out))
             x = out
             if units[number]:
-                parts.append(_Part(tuple(calls), low, low + width))
+                parts.append(_LayerCalls(tuple(calls), low, low + width))
                 calls, low = [], low + width
         self._parts, self._rest, self._output = tuple(parts), tuple(calls), x
 
@@ -122,7 +122,7 @@ def _is_plain(stage: nn.Module) -> bool:
     return type(stage) is nn.Linear or next(stage.parameters(), None) is None
 
 
-def _widths(stages: list[nn.Module], observations: int) -> list[int]:
+def _stage_widths(stages: list[nn.Module], observations: int) -> list[int]:
     widths = []
     with torch.inference_mode():
         x = torch.zeros(observations)
@@ -134,7 +134,7 @@ def _widths(stages: list[nn.Module], observations: int) -> list[int]:
     return widths
 
 
-def _call(stage: nn.Module, x: torch.Tensor, out: torch.Tensor) -> Callable[[], Any]:
+def _build_call(stage: nn.Module, x: torch.Tensor, out: torch.Tensor) -> Callable[[], Any]:
     """Return a call that computes the stage into `out`, in place where `x` is `out`."""
     if type(stage) is nn.Linear and stage.bias is not None:
         return partial(torch.addmv, stage.bias.detach(), stage.weight.detach(), x, out=out)

@@ -58,13 +58,13 @@ def read_torchscript(path: Path) -> torch.nn.Module:
         raise PolicyError(f"{path}: expected a TorchScript archive: {error}") from error
     if "data.pkl" not in entries:
         raise PolicyError(f"{path}: expected a TorchScript archive, found {', '.join(sorted(entries)[:6])}")
-    root = read_pickle(entries["data.pkl"], _storages(entries, "data"), f"{path}: data.pkl")
+    root = read_pickle(entries["data.pkl"], _storage_reader(entries, "data"), f"{path}: data.pkl")
     if not isinstance(root, PickledObject):
         raise PolicyError(f"{path}: expected a TorchScript module, found {type(root).__name__}")
     constants: Any = ()
     if "constants.pkl" in entries:
         source = f"{path}: constants.pkl"
-        constants = read_pickle(entries["constants.pkl"], _storages(entries, "constants"), source)
+        constants = read_pickle(entries["constants.pkl"], _storage_reader(entries, "constants"), source)
     texts = {
         name.removeprefix("code/").removesuffix(".py").replace("/", "."): content.decode("utf-8", "replace")
         for name, content in entries.items()
@@ -76,7 +76,7 @@ def read_torchscript(path: Path) -> torch.nn.Module:
         raise PolicyError(f"{path}: {error}") from error
 
 
-def _storages(entries: dict[str, bytes], folder: str) -> Storage:
+def _storage_reader(entries: dict[str, bytes], folder: str) -> Storage:
     def storage(key: str, kind: str, count: int) -> torch.Tensor:
         dtype = _KINDS.get(kind.rpartition(".")[2])
         if dtype is None:

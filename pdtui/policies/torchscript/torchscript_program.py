@@ -120,27 +120,27 @@ class _StackFrame:
 
     def run(self, body: list[ast.stmt]) -> Any:
         try:
-            self._block(body)
+            self._run_block(body)
         except _Return as done:
             return done.args[0]
         return None
 
-    def _block(self, body: list[ast.stmt]) -> None:
+    def _run_block(self, body: list[ast.stmt]) -> None:
         for node in body:
             self._program.statements += 1
             if self._program.statements > _MOST_STATEMENTS:
                 raise PolicyError(f"its code runs more than {_MOST_STATEMENTS} statements per step")
             match node:
                 case ast.Return():
-                    raise _Return(None if node.value is None else self._value(node.value))
+                    raise _Return(None if node.value is None else self._evaluate(node.value))
                 case ast.Assign(targets=[target]):
-                    self._assign(target, self._value(node.value))
+                    self._assign(target, self._evaluate(node.value))
                 case ast.AnnAssign(value=ast.expr() as value):
-                    self._assign(node.target, self._value(value))
+                    self._assign(node.target, self._evaluate(value))
                 case ast.If():
-                    self._block(node.body if self._value(node.test) else node.orelse)
+                    self._run_block(node.body if self._evaluate(node.test) else node.orelse)
                 case ast.Expr():
-                    self._value(node.value)
+                    self._evaluate(node.value)
                 case ast.Pass():
                     pass
                 case _:
@@ -156,7 +156,7 @@ class _StackFrame:
         else:
             raise PolicyError("its code changes an attribute, which pdtui does not do for a file")
 
-    def _value(self, node: ast.expr) -> Any:  # noqa: PLR0912 - one case per kind of expression
+    def _evaluate(self, node: ast.expr) -> Any:  # noqa: PLR0912 - one case per kind of expression
         match node:
             case ast.Constant():
                 return node.value
@@ -165,23 +165,23 @@ class _StackFrame:
                     raise PolicyError(f"its code reads '{node.id[:80]}' before it is set")
                 return self._values[node.id]
             case ast.Tuple():
-                return tuple(self._value(one) for one in node.elts)
+                return tuple(self._evaluate(one) for one in node.elts)
             case ast.List():
-                return [self._value(one) for one in node.elts]
+                return [self._evaluate(one) for one in node.elts]
             case ast.UnaryOp(op=ast.USub()):
-                return -self._value(node.operand)
+                return -self._evaluate(node.operand)
             case ast.IfExp():
-                return self._value(node.body if self._value(node.test) else node.orelse)
+                return self._evaluate(node.body if self._evaluate(node.test) else node.orelse)
             case ast.Subscript():
-                owner, place = self._value(node.value), self._value(node.slice)
+                owner, place = self._evaluate(node.value), self._evaluate(node.slice)
                 if isinstance(owner, list | tuple) and isinstance(place, int):
                     return owner[place]
             case ast.Attribute(value=ast.Name(id="CONSTANTS")):
                 return self._program.constants[int(node.attr.removeprefix("c"))]
-            case ast.Attribute() if _dotted(node).startswith("__torch__."):
-                return _Function(_dotted(node))
+            case ast.Attribute() if _dotted_name(node).startswith("__torch__."):
+                return _Function(_dotted_name(node))
             case ast.Attribute():
-                owner = self._value(node.value)
+                owner = self._evaluate(node.value)
                 if isinstance(owner, ScriptedModule):
                     return owner.read(node.attr)
             case ast.Call():
@@ -189,26 +189,26 @@ class _StackFrame:
         raise PolicyError(f"its code says '{ast.unparse(node)[:80]}', which pdtui does not run")
 
     def _call(self, node: ast.Call) -> Any:
-        name = _dotted(node.func)
+        name = _dotted_name(node.func)
         if name in ("annotate", "unchecked_cast"):
-            return self._value(node.args[1])
+            return self._evaluate(node.args[1])
         if name == "uninitialized":
             return None
-        arguments = [self._value(one) for one in node.args]
-        keywords = {one.arg: self._value(one.value) for one in node.keywords if one.arg is not None}
+        arguments = [self._evaluate(one) for one in node.args]
+        keywords = {one.arg: self._evaluate(one.value) for one in node.keywords if one.arg is not None}
         if name == "getattr" and isinstance(arguments[0], ScriptedModule):
             return arguments[0].read(str(arguments[1]))
         if name in _CASTS:
             return _CASTS[name](*arguments)
         if name.startswith("ops.prim."):
-            return _primitive(name.removeprefix("ops.prim."), arguments)
+            return _call_primitive(name.removeprefix("ops.prim."), arguments)
         if name.startswith("torch."):
             return call_operator(name.removeprefix("torch."), arguments, keywords)
         held = self._values.get(name)
         if name.startswith("__torch__.") or isinstance(held, _Function):
             return self._program.call(held or name, arguments, keywords)
         if isinstance(node.func, ast.Attribute) and not name.startswith("ops."):
-            owner = self._value(node.func.value)
+            owner = self._evaluate(node.func.value)
             if isinstance(owner, ScriptedModule):
                 method = node.func.attr
                 # Called as a module, so that hooks see the output; forward__0 is an overload.
@@ -219,7 +219,7 @@ class _StackFrame:
         raise PolicyError(f"its code calls '{called}', which pdtui does not do")
 
 
-def _primitive(name: str, arguments: list[Any]) -> Any:
+def _call_primitive(name: str, arguments: list[Any]) -> Any:
     if name == "NumToTensor":
         return torch.tensor(arguments[0])
     if name in ("dtype", "device") and isinstance(arguments[0], torch.Tensor):
@@ -229,7 +229,7 @@ def _primitive(name: str, arguments: list[Any]) -> Any:
     raise PolicyError(f"its code uses 'prim::{name[:80]}', which pdtui does not run")
 
 
-def _dotted(node: ast.expr) -> str:
+def _dotted_name(node: ast.expr) -> str:
     parts: list[str] = []
     while isinstance(node, ast.Attribute):
         parts.append(node.attr)

@@ -71,7 +71,7 @@ def load_network(path: Path) -> PolicyNetwork:
 
     A file that is no safetensors file, lacks pdtui's metadata or has other tensors is a `PolicyError`.
     """
-    metadata, tensors = _read(path)
+    metadata, tensors = _read_safetensors(path)
     if _KEY not in metadata:
         found = ", ".join(sorted(tensors)[:6])
         raise PolicyError(f"{path}: expected metadata '{_KEY}' in the file; it holds tensors {found}")
@@ -94,7 +94,7 @@ def load_network(path: Path) -> PolicyNetwork:
     return network.eval()
 
 
-def _read(path: Path) -> tuple[dict[str, str], dict[str, torch.Tensor]]:
+def _read_safetensors(path: Path) -> tuple[dict[str, str], dict[str, torch.Tensor]]:
     try:
         with open_regular_file(path) as file:
             size = fstat(file.fileno()).st_size

@@ -95,13 +95,13 @@ def read_batch_header(metadata: memoryview) -> tuple[int, bool]:
     """
     try:
         (root,) = struct.unpack_from("<I", metadata, 0)
-        kind, header = _field(metadata, root, _HEADER_TYPE), _field(metadata, root, _HEADER)
+        kind, header = _locate_field(metadata, root, _HEADER_TYPE), _locate_field(metadata, root, _HEADER)
         if kind is None or header is None or metadata[kind] != _RECORD_BATCH:
             raise ValueError("expected the metadata of a record batch")
         header += struct.unpack_from("<I", metadata, header)[0]
-        length = _field(metadata, header, _LENGTH)
+        length = _locate_field(metadata, header, _LENGTH)
         rows = 0 if length is None else struct.unpack_from("<q", metadata, length)[0]
-        compressed = _field(metadata, header, _COMPRESSION) is not None
+        compressed = _locate_field(metadata, header, _COMPRESSION) is not None
     except (struct.error, IndexError) as error:
         raise ValueError(f"the header of a message is damaged: {error}") from error
     if not 0 <= rows <= MAX_ROWS:
@@ -109,7 +109,7 @@ def read_batch_header(metadata: memoryview) -> tuple[int, bool]:
     return int(rows), compressed
 
 
-def _field(view: memoryview, table: int, number: int) -> int | None:
+def _locate_field(view: memoryview, table: int, number: int) -> int | None:
     """Return the position of a field in a table of a flatbuffer; None if the table lacks the field."""
     (back,) = struct.unpack_from("<i", view, table)
     places = table - back

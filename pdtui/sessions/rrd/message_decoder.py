@@ -137,13 +137,13 @@ def decompress_start(packed: memoryview) -> pa.Buffer:
             if len(out) >= needed:
                 break
         token = packed[place]
-        literals, place = _length(packed, place + 1, token >> 4)
+        literals, place = _read_length(packed, place + 1, token >> 4)
         out += packed[place : place + literals]
         place += literals
         if place + 2 >= len(packed):
             break
         begin = len(out) - (packed[place] | packed[place + 1] << 8)
-        count, place = _length(packed, place + 2, token & 15)
+        count, place = _read_length(packed, place + 2, token & 15)
         count += _SHORTEST_MATCH
         if not 0 <= begin < len(out):
             raise ValueError("a match begins before the block")
@@ -163,7 +163,7 @@ def _metadata_end(data: bytearray | pa.Buffer, messages: int) -> int:
     return end
 
 
-def _length(packed: memoryview, place: int, length: int) -> tuple[int, int]:
+def _read_length(packed: memoryview, place: int, length: int) -> tuple[int, int]:
     if length == _SHORT:
         while True:
             length += packed[place]

@@ -67,15 +67,17 @@ def read_message_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
         file.seek(place)
         header = file.read(_HEADER.size)
         if len(header) < _HEADER.size:
-            raise _torn(place, f"{len(header)} bytes of a message's header are left")
+            raise _torn_error(place, f"{len(header)} bytes of a message's header are left")
         kind, length = _HEADER.unpack(header)
         frame = MessageFrame(kind, place + _HEADER.size, length)
         if kind >= _KINDS:
-            raise _torn(place, f"expected the header of a message, found kind {kind}")
+            raise _torn_error(place, f"expected the header of a message, found kind {kind}")
         if frame.end > size:
-            raise _torn(place, f"a message of {length} bytes begins there, {size - frame.start} are left")
+            left = size - frame.start
+            raise _torn_error(place, f"a message of {length} bytes begins there, {left} are left")
         if kind == LAST and frame.end < size:
-            raise _torn(place, f"the file's end is said to be here, but {size - frame.end} bytes follow it")
+            extra = size - frame.end
+            raise _torn_error(place, f"the file's end is said to be here, but {extra} bytes follow it")
         yield frame
         place = frame.end
 
@@ -112,5 +114,5 @@ def undamaged_length(path: Path) -> int:
         raise SessionError(f"{path}: cannot be read: {error.strerror}") from error
 
 
-def _torn(place: int, why: str) -> SessionError:
+def _torn_error(place: int, why: str) -> SessionError:
     return SessionError(f"the file is torn: byte {place}: {why}; {RESCUE}")

@@ -16,13 +16,13 @@ def read_fields(message: memoryview, *, cut: bool = False) -> dict[int, Value]:
     found: dict[int, Value] = {}
     place = 0
     while place < len(message):
-        tag, place = _varint(message, place)
+        tag, place = _read_varint(message, place)
         kind = tag & 7
         if kind == _VARINT:
-            found[tag >> 3], place = _varint(message, place)
+            found[tag >> 3], place = _read_varint(message, place)
             continue
         if kind == _BYTES:
-            length, place = _varint(message, place)
+            length, place = _read_varint(message, place)
         elif kind in (_EIGHT, _FOUR):
             length = 8 if kind == _EIGHT else 4
         else:
@@ -55,7 +55,7 @@ def text_field(found: dict[int, Value], field: int) -> str:
     return str(bytes_field(found, field), "utf-8")
 
 
-def _varint(message: memoryview, place: int) -> tuple[int, int]:
+def _read_varint(message: memoryview, place: int) -> tuple[int, int]:
     value = 0
     for shift in range(_VARINT_BYTES):
         if place >= len(message):

@@ -61,7 +61,7 @@ class RrdContents:
         stream = ChunkStream(path, needed if entities else None)
         try:
             for chunk in stream:
-                self._take(path, chunk, only, skip)
+                self._keep_chunk(path, chunk, only, skip)
         except SessionError:
             if not torn or stream.store is None:
                 raise
@@ -76,7 +76,7 @@ class RrdContents:
         """Return the rows of an entity; no rows if the file does not have the entity."""
         return EntityTable(entity, self._batches.get(entity, []))
 
-    def _take(self, path: Path, chunk: EntityChunk, only: Sequence[str], skip: Sequence[str]) -> None:
+    def _keep_chunk(self, path: Path, chunk: EntityChunk, only: Sequence[str], skip: Sequence[str]) -> None:
         entity, batch = chunk.entity, chunk.batch
         if entity.startswith(_PROPERTIES):
             group = self._properties.setdefault(entity.removeprefix(_PROPERTIES), {})

@@ -104,12 +104,12 @@ def _lay_out_robot(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
                 rrb.VisibleTimeRanges(trails),
             ]
         },
-        visual_bounds=_bounds(content),
+        visual_bounds=_path_bounds(content),
     )
     return rrb.Vertical(robot, rrb.Horizontal(above, keys, column_shares=[3, 4]), row_shares=[3, 2])
 
 
-def _bounds(content: DriveContent) -> rrb.VisualBounds2D | None:
+def _path_bounds(content: DriveContent) -> rrb.VisualBounds2D | None:
     """Return the bounds of the whole path, so that the view does not move during playback."""
     if content.path is None:
         return None
@@ -123,7 +123,8 @@ def _bounds(content: DriveContent) -> rrb.VisualBounds2D | None:
 def _lay_out_stimulation(content: DriveContent) -> rrb.Vertical | None:
     rows: list[tuple[int, rrb.View]] = []
     if content.begun or content.magnitudes:
-        rows.append((2, rrb.StateTimelineView(origin=schema.BEHAVIORS, name="Behaviors", time_view=_time())))
+        behaviors = rrb.StateTimelineView(origin=schema.BEHAVIORS, name="Behaviors", time_view=_time_axis())
+        rows.append((2, behaviors))
     if content.begun or content.units:
         which = "Four units per behavior" if content.units_left_out else "Stimulated units"
         name = f"{which}: overwritten (bright), natural (dark)"
@@ -162,7 +163,7 @@ def _lay_out_measurements(info: DriveInfo, content: DriveContent) -> rrb.Vertica
             for one, color, column in zip(shown, cycle(_CURVES), columns, strict=False)
         ]
         named = 1 < len(curves) + len(targets) <= _MOST_NAMED - 2
-        plots.append(_plot(_title(shown), schema.DRIVE, *targets, curves=curves, named=named))
+        plots.append(_plot(_plot_title(shown), schema.DRIVE, *targets, curves=curves, named=named))
     gains = [
         _curve(name, schema.REWARD_COST_ACTION, color, column)
         for column, (name, color) in enumerate(zip(("reward", "cost"), _CURVES, strict=False))
@@ -171,7 +172,7 @@ def _lay_out_measurements(info: DriveInfo, content: DriveContent) -> rrb.Vertica
     return rrb.Vertical(*plots)
 
 
-def _title(attributes: Sequence[Attribute]) -> str:
+def _plot_title(attributes: Sequence[Attribute]) -> str:
     """Return a title of names and unit; many names that end in the same word are summarised by it."""
     names = [attribute.name for attribute in attributes]
     if len(names) > 4:
@@ -188,12 +189,12 @@ def _plot(
         contents=list(contents),
         name=name,
         overrides={schema.DRIVE: list(curves)} if curves else None,
-        axis_x=_time(),
+        axis_x=_time_axis(),
         plot_legend=rrb.PlotLegend(corner="LeftTop", visible=named),
     )
 
 
-def _time() -> rrb.TimeAxis:
+def _time_axis() -> rrb.TimeAxis:
     """Return a time axis that is shared with the other plots."""
     return rrb.TimeAxis(link="LinkToGlobal")
 

@@ -63,7 +63,7 @@ class ViewerCurves(Generic[CurveKey]):
                 self._rows[key].append((step, self._gap))
         for key, row in values.items():
             if key not in self._rows:
-                self._start(key)
+                self._start_curve(key)
             self._rows[key].append((step, row))
         self._last = tuple(values)
 
@@ -83,7 +83,7 @@ class ViewerCurves(Generic[CurveKey]):
                 )
                 self._rows[key] = []
 
-    def _start(self, key: CurveKey) -> None:
+    def _start_curve(self, key: CurveKey) -> None:
         names = [f"{self._label(key)} {field}".rstrip() for field in self._fields]
         shades = _shades(self._color(key), len(names))
         self._log_static(self._entity_of(key), rr.SeriesLines(names=names, colors=shades))
