@@ -92,8 +92,8 @@ def _behavior_columns(session: Session) -> Columns:
 def _unit_columns(session: Session) -> Columns:
     rows = [
         (step, format_unit(unit, session.info.layers), value, natural)
-        for step, (stimulation, would) in enumerate(zip(session.stimulations, session.natural, strict=True))
-        for unit, value, natural in zip(stimulation.units, stimulation.values, would, strict=True)
+        for step, (stimulation, outputs) in enumerate(zip(session.stimulations, session.natural, strict=True))
+        for unit, value, natural in zip(stimulation.units, stimulation.values, outputs, strict=True)
     ]
     steps, units, values, natural = zip(*rows, strict=True) if rows else ((), (), (), ())
     return {

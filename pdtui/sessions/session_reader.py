@@ -133,9 +133,9 @@ def _read_stimulations(
 ) -> tuple[tuple[Stimulation, ...], tuple[tuple[float, ...], ...]]:
     stimulations, natural = [], []
     for flat in drive.read_lists("stimulation", float, optional=True):
-        chosen, values, would = flat[::3], flat[1::3], flat[2::3]
+        chosen, values, unstimulated = flat[::3], flat[1::3], flat[2::3]
         if len(flat) % 3 or not all(unit.is_integer() and 0 <= unit < units for unit in chosen):
             raise SessionError(f"stream 'stimulation': expected units 0..{units - 1} with two values each")
         stimulations.append(Stimulation(tuple(int(unit) for unit in chosen), tuple(values)))
-        natural.append(tuple(would))
+        natural.append(tuple(unstimulated))
     return tuple(stimulations), tuple(natural)

@@ -1,4 +1,4 @@
-"""Finds the policy of a map: the one that was asked for, or the map's own, where its file lies."""
+"""Finds the policy of a map: the one that the user names, or the one that the map names."""
 
 from __future__ import annotations
 
