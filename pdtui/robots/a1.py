@@ -26,7 +26,7 @@ _STANCE = np.array([0.0, 0.9, -1.8] * 4)
 _ACTION_SCALE = np.array([0.05, 0.5, 0.5] * 4)
 # The action of each joint. Diagonal legs share theirs: FR and RL the first three, FL and RR the last three.
 _DIAGONALS = np.array([0, 1, 2, 3, 4, 5, 3, 4, 5, 0, 1, 2])
-_STIFFNESS, _DAMPING = 80.0, 0.4  # N m/rad, N m s/rad
+_KP, _KD = 80.0, 0.4  # gains of the joints' controllers, N m/rad and N m s/rad
 # Physics step (s), physics steps per control step, and age of what is observed, in physics steps.
 _DT, _SUBSTEPS, _LATENCY = 0.001, 16, 2
 _START_HEIGHT = 0.28  # of the trunk, m
@@ -133,9 +133,8 @@ class A1(BulletRobot):
         if start == "forest":
             self.obstacles = scatter_trees(rng, self._density)
         self._trees = add_trees(bullet, self.obstacles)
-        robot: int = bullet.loadURDF(
-            str(self._urdf), [0, 0, _START_HEIGHT], flags=bullet.URDF_IGNORE_VISUAL_SHAPES
-        )
+        flags = bullet.URDF_IGNORE_VISUAL_SHAPES
+        robot: int = bullet.loadURDF(str(self._urdf), [0, 0, _START_HEIGHT], flags=flags)
         names = {bullet.getJointInfo(robot, j)[12].decode(): j for j in range(bullet.getNumJoints(robot))}
         self._joints = [names[joint] for joint in _JOINTS]
         self._shins = [{names[f"{leg}_lower"], names[f"{leg}_toe"]} for leg in _LEGS]
@@ -170,10 +169,7 @@ class A1(BulletRobot):
             states = self._joint_states()
             if substep == _SUBSTEPS - _LATENCY:
                 sensed_angles, sensed_attitude = [state[0] for state in states], self._attitude()
-            torques = [
-                _STIFFNESS * (goal - now[0]) - _DAMPING * now[1]
-                for goal, now in zip(goals, states, strict=True)
-            ]
+            torques = [_KP * (goal - now[0]) - _KD * now[1] for goal, now in zip(goals, states, strict=True)]
             energy += sum(abs(torque * now[1]) for torque, now in zip(torques, states, strict=True))
             bullet.setJointMotorControlArray(robot, self._joints, bullet.TORQUE_CONTROL, forces=torques)
             bullet.stepSimulation()
@@ -182,9 +178,7 @@ class A1(BulletRobot):
                     touched[tree] = True
         place = np.array(self._base()[0])
         if not np.isfinite(place).all():
-            raise SimulationDiverged(
-                f"{self.name}: the simulation diverged: the trunk's position is not finite"
-            )
+            raise SimulationDiverged(f"{self.name}: the simulation diverged: the trunk is at no finite place")
         moved, self._place = place - self._place, place
         self._displacements = np.vstack([moved, self._displacements[:2]])
         self._attitudes = np.vstack([sensed_attitude, self._attitudes[:2]])
@@ -239,10 +233,8 @@ class A1(BulletRobot):
         return 0.0 if self.ground is None else self.ground.height(x, y)
 
     def _near_trees(self) -> list[int]:
-        """Return the numbers of the trees that the robot may touch in this control step."""
         away = np.hypot(*(self.obstacles[:, :2] - self._place[:2]).T)
-        near: list[int] = np.flatnonzero(away - self.obstacles[:, 2] < _REACH).tolist()
-        return near
+        return np.flatnonzero(away - self.obstacles[:, 2] < _REACH).tolist()
 
     def _sense_contacts(self) -> Floats:
         links = {point[3] for point in self.bullet.getContactPoints(self.robot_id) if point[9] > 0.0}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Floats
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.robot import TRUNK_ATTRIBUTES, TrainingRecipe, torque_attributes
-from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, read_model_links, silence_warnings
+from pdtui.robots.simulators.mujoco_robot import MujocoRobot, motor_gears, read_model_links, silence_warnings
 
 _LEGS = {"1": "front left", "2": "back left", "3": "back right", "4": "front right"}
 
@@ -37,13 +37,13 @@ class Ant(MujocoRobot, AntEnv):
         super().__init__(include_cfrc_ext_in_observation=False)
         self._forward = forward
         self.links = read_model_links(self.model)
-        self._motors = GearedMotors(self.model)
-        names = [f"{_LEGS[joint[-1]]} {joint[:-2]}" for joint in self._motors.joints]
-        self.attributes = (*TRUNK_ATTRIBUTES, *torque_attributes(names, self._motors.gears))
+        gears = motor_gears(self.model)
+        self._gears = np.array(list(gears.values()))
+        names = [f"{_LEGS[joint[-1]]} {joint[:-2]}" for joint in gears]
+        self.attributes = (*TRUNK_ATTRIBUTES, *torque_attributes(names, gears.values()))
 
     def observe(self) -> Floats:
-        observation: Floats = self._get_obs()
-        return observation
+        return np.asarray(self._get_obs())
 
     def step(self, action: NDArray[np.float32]) -> tuple[Floats, Any, bool, bool, dict[str, Any]]:
         before = self.data.qpos[:2].copy()
@@ -76,7 +76,7 @@ class Ant(MujocoRobot, AntEnv):
         roll, pitch, yaw = roll_pitch_yaw(w, x, y, z)
         # MuJoCo's angular velocity is in the body's frame; this is the third row of the rotation matrix.
         yaw_rate = 2 * (x * z - w * y) * a + 2 * (y * z + w * x) * b + (1 - 2 * (x * x + y * y)) * c
-        torques = self._motors.torques(self.data)
+        torques = self._gears * np.clip(self.data.ctrl, -1.0, 1.0)
         return np.array([vx, vy, math.hypot(vx, vy), yaw, yaw_rate, roll, pitch, height, *torques])
 
     def _find_fall(self) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.robots.robot import TrainingRecipe, torque_attributes
-from pdtui.robots.simulators.mujoco_robot import GearedMotors, MujocoRobot, read_model_links, silence_warnings
+from pdtui.robots.simulators.mujoco_robot import MujocoRobot, motor_gears, read_model_links, silence_warnings
 from pdtui.robots.task import RunTrace, Task, TaskVerdict
 
 _FEET = {"right": "foot_geom", "left": "foot_left_geom"}
@@ -47,7 +47,7 @@ def hops(trace: RunTrace) -> TaskVerdict:
     window = slice(_HOP_FROM, end)
     off = [trace[f"{side} foot clearance"][window] > 0.0 for side in ("right", "left")]
     speed = trace.mean("vx", window)
-    stretch = max(_longest(foot) for foot in off) / _HOP_STEPS
+    stretch = max(_longest_run(foot) for foot in off) / _HOP_STEPS
     up = trace.stays_up(end)
     done = up and stretch >= _HOP_SHARE and speed > _HOP_SPEED
     score = stretch / _HOP_SHARE
@@ -63,8 +63,7 @@ def hops(trace: RunTrace) -> TaskVerdict:
     return TaskVerdict(done, score, figures)
 
 
-def _longest(flags: NDArray[np.bool_]) -> int:
-    """Return the length of the longest run of true values."""
+def _longest_run(flags: NDArray[np.bool_]) -> int:
     edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
@@ -118,7 +117,8 @@ class Walker(MujocoRobot, Walker2dEnv):
         self._in_air = np.zeros(len(_FEET))
         self.links = read_model_links(self.model)
         self._feet = [self.model.geom(geom).id for geom in _FEET.values()]
-        self._motors = GearedMotors(self.model)
+        gears = motor_gears(self.model)
+        self._gears = np.array(list(gears.values()))
         self.attributes = (
             Attribute("vx", "m/s"),
             Attribute("speed", "m/s"),
@@ -126,12 +126,11 @@ class Walker(MujocoRobot, Walker2dEnv):
             Attribute("pitch", "rad", wraps=True),
             Attribute("pitch rate", "rad/s"),
             *(Attribute(f"{side} foot clearance", "m") for side in _FEET),
-            *torque_attributes(map(_label_joint, self._motors.joints), self._motors.gears),
+            *torque_attributes(map(_label_joint, gears), gears.values()),
         )
 
     def observe(self) -> Floats:
-        observation: Floats = self._get_obs()
-        return observation
+        return np.asarray(self._get_obs())
 
     def step(self, action: NDArray[np.float32]) -> tuple[Floats, Any, bool, bool, dict[str, Any]]:
         observation, reward, terminated, truncated, info = super().step(action)
@@ -154,7 +153,7 @@ class Walker(MujocoRobot, Walker2dEnv):
         mujoco.mj_kinematics(self.model, self.data)
         _, height, pitch = self.data.qpos[:3].tolist()
         vx, vz, pitch_rate = self.data.qvel[:3].tolist()
-        torques = self._motors.torques(self.data)
+        torques = self._gears * np.clip(self.data.ctrl, -1.0, 1.0)
         clearances = [self._clearance(foot) for foot in self._feet]
         return np.array(
             [vx, math.hypot(vx, vz), height, wrap_angle(pitch), pitch_rate, *clearances, *torques]
@@ -163,8 +162,7 @@ class Walker(MujocoRobot, Walker2dEnv):
     def reset_model(self) -> Floats:
         silence_warnings(self.data)
         self._in_air = np.zeros(len(_FEET))
-        observation: Floats = super().reset_model()
-        return observation
+        return np.asarray(super().reset_model())
 
     def _long_strides(self) -> float:
         """Return 1 if a foot has been off the ground for too long, else 0."""

@@ -25,15 +25,7 @@ from pdtui.robots.anymal import (
     Anymal,
     foot_sensors,
 )
-from pdtui.robots.legged.observations_and_rewards import (
-    ANGULAR_SCALE,
-    JOINT_SPEED_SCALE,
-    LINEAR_SCALE,
-    LeggedMotion,
-    compute_observations,
-    compute_rewards,
-    has_fallen,
-)
+from pdtui.robots.legged import observations_and_rewards as legged
 from pdtui.robots.simulators.mujoco_robot import suppress_warnings
 from pdtui.training.robot_batch import RobotBatchState, TransitionBatch
 
@@ -48,9 +40,10 @@ _FRICTIONS = (0.5, 1.25, 8)
 _PUSH_EVERY, _MAX_PUSH = 400, 0.8
 # Control steps between new commands, and share of robots whose command is zero.
 _COMMAND_EVERY, _STANDING_SHARE = 250, 0.1
-# Half width of the uniform noise, before scaling, on height (m), velocity (m/s), angular velocity (rad/s),
-# direction of gravity, joint angles (rad) and joint velocities (rad/s).
-_NOISE = (0.01, 0.05, 0.1, 0.03, 0.01, 0.5)
+# Half width of the uniform noise on height (m), velocity (m/s), angular velocity (rad/s), direction of
+# gravity, joint angles (rad) and joint velocities (rad/s), each scaled as it is observed.
+_VELOCITY_NOISE = (legged.LINEAR_SCALE * 0.05, legged.ANGULAR_SCALE * 0.1)
+_NOISE = (0.01, *_VELOCITY_NOISE, 0.03, 0.01, legged.JOINT_SPEED_SCALE * 0.5)
 # Deviations of the joints' angles (rad) and of all velocities (m/s, rad/s) at the start of an episode.
 _START_ANGLE_NOISE, _START_VELOCITY_NOISE = 0.2, 0.3
 
@@ -79,17 +72,9 @@ class AnymalBatch:
         self._data = [mujoco.MjData(shared[0]) for _ in range(_THREADS)]
         self._dt = SUBSTEPS * float(shared[0].opt.timestep)
         self._feet, self._feet_velocity = foot_sensors(shared[0])
-        height, velocity, turning, gravity, angle, speed = _NOISE
-        scaled = [
-            height,
-            LINEAR_SCALE * velocity,
-            ANGULAR_SCALE * turning,
-            gravity,
-            0.0,
-            angle,
-            JOINT_SPEED_SCALE * speed,
-        ]
-        self._noise = np.repeat([*scaled, 0.0], [1, 3, 3, 3, self._commands, 12, 12, 12])
+        # In the order of the observation: commands and the last action are observed without noise.
+        counts = [1, 3, 3, 3, self._commands, 12, 12, 12]
+        self._noise = np.repeat([*_NOISE[:4], 0.0, *_NOISE[4:], 0.0], counts)
         self._rng = np.random.default_rng(seed)
         self._physics = np.zeros((count, 1 + _NQ + _NV))
         self._command = np.zeros((count, len(COMMANDS)))
@@ -110,26 +95,24 @@ class AnymalBatch:
         targets = DEFAULT_ANGLES + ACTION_SCALE * self._action
         control = np.repeat(targets[:, None], SUBSTEPS, axis=1)
         with suppress_warnings():  # a robot that diverges starts over
-            states, sensors = rollout.rollout(
-                self._models, self._data, self._physics, control, persistent_pool=True
-            )
+            worlds = (self._models, self._data, self._physics, control)
+            states, sensors = rollout.rollout(*worlds, persistent_pool=True)
         self._physics = states[:, -1].copy()
         angles, speeds = self._physics[:, 8 : 1 + _NQ], self._physics[:, 1 + _NQ + 6 :]
         torque = np.clip(_STIFFNESS * (targets - angles) - _DAMPING * speeds, -_MAX_TORQUE, _MAX_TORQUE)
         motion = self._motion(sensors[:, -1], torque)
-        reward, self._air_time = compute_rewards(
+        reward, self._air_time = legged.compute_rewards(
             motion, self._air_time, self._dt, TARGET_HEIGHT, DEFAULT_ANGLES
         )
-        fell = has_fallen(motion) | ~np.isfinite(self._physics).all(axis=1)
+        fell = legged.has_fallen(motion) | ~np.isfinite(self._physics).all(axis=1)
         self._age += 1
         self.restarted = fell | (self._age >= self._episode)
         following = self._observe(motion)
         self._start_over(self.restarted)
         self._disturb()
         self.observations = self._observe(self._motion(sensors[:, -1], torque))
-        return TransitionBatch(
-            before, actions, reward.astype(np.float32), (~fell).astype(np.float32), np.nan_to_num(following)
-        )
+        outcome = (reward.astype(np.float32), (~fell).astype(np.float32), np.nan_to_num(following))
+        return TransitionBatch(before, actions, *outcome)
 
     def state(self) -> RobotBatchState:
         """Return the state of all robots as one snapshot, since they share their random numbers."""
@@ -153,8 +136,8 @@ class AnymalBatch:
         self._age, self.observations = age.astype(np.int64), observations.astype(np.float32)
         self._rng.bit_generator.state = kept.rng
 
-    def _motion(self, sensors: Floats, torque: Floats) -> LeggedMotion:
-        return LeggedMotion(
+    def _motion(self, sensors: Floats, torque: Floats) -> legged.LeggedMotion:
+        return legged.LeggedMotion(
             self._physics[:, 1 : 1 + _NQ],
             self._physics[:, 1 + _NQ :],
             self._action,
@@ -165,8 +148,8 @@ class AnymalBatch:
             sensors[:, self._feet_velocity].reshape(-1, 4, 3),
         )
 
-    def _observe(self, motion: LeggedMotion) -> NDArray[np.float32]:
-        clean = compute_observations(motion, DEFAULT_ANGLES, self._commands)
+    def _observe(self, motion: legged.LeggedMotion) -> NDArray[np.float32]:
+        clean = legged.compute_observations(motion, DEFAULT_ANGLES, self._commands)
         noise = self._noise * self._rng.uniform(-1.0, 1.0, clean.shape)
         noisy: NDArray[np.float32] = (clean + noise).astype(np.float32)
         return noisy

@@ -103,7 +103,7 @@ class PpoLearner:
         return [{"w": weight, "b": first["b"] - state.mean @ weight}, *middle, head]
 
     def _update(self, state: PpoState, rollout: PpoRollout) -> tuple[PpoState, jax.Array]:
-        """Learn from a roll-out once; also returns the mean divergence."""
+        """Learn from a roll-out; also returns the mean divergence."""
         state = self._observe(state, rollout.observation.reshape(-1, self.observations))
         samples = self._samples(state, rollout)
         total = samples.advantage.shape[0]

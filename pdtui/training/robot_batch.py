@@ -104,7 +104,8 @@ class RemoteRobotBatch(RobotBatch):
     """
 
     def __init__(self, robot: str, options: dict[str, Any], count: int, seed: int) -> None:
-        self.worker = WorkerProcess(f"worlds of {robot}", _build_batch, robot, options, count, seed)
+        make = partial(make_robot, robot, **options)
+        self.worker = WorkerProcess(f"worlds of {robot}", RobotBatch, make, count, seed)
         self._call("")
 
     def step(self, actions: NDArray[np.float32]) -> TransitionBatch:
@@ -125,10 +126,6 @@ class RemoteRobotBatch(RobotBatch):
                 f"{error}; give the same command again to continue the run from its last checkpoint"
             ) from error
         return answer
-
-
-def _build_batch(robot: str, options: dict[str, Any], count: int, seed: int) -> RobotBatch:
-    return RobotBatch(partial(make_robot, robot, **options), count, seed)
 
 
 def _call_batch(batch: RobotBatch, name: str, *arguments: Any) -> tuple[Any, Any, Any]:

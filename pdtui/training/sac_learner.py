@@ -68,9 +68,9 @@ class SacLearner:
 
     def __init__(self, config: SacConfig, observations: int, actions: int) -> None:
         self.config, self.observations, self.actions = config, observations, actions
-        updates, first = config.total_steps // config.steps_per_update, config.learning_rate
+        updates, rate = config.total_steps // config.steps_per_update, config.learning_rate
         self._critic_tx, self._actor_tx, self._alpha_tx = (
-            optax.adam(optax.schedules.linear_schedule(first, first * config.final_rate, count))
+            optax.adam(optax.schedules.linear_schedule(rate, rate * config.final_rate, count))
             for count in (updates, max(updates // 2, 1), max(updates // 2, 1))
         )
         self.update = jax.jit(self._update)
@@ -82,15 +82,8 @@ class SacLearner:
         actor = init_mlp(actor_key, (self.observations, *config.layers, 2 * self.actions), False)
         widths = (self.observations + self.actions, *config.layers, 1)
         critics = jax.vmap(partial(init_mlp, widths=widths, layer_norm=True))(jnp.stack(critic_keys))
-        targets, average, log_alpha = (
-            *(jax.tree.map(jnp.copy, one) for one in (critics, actor)),
-            jnp.zeros(()),
-        )
-        optimisers = (
-            self._actor_tx.init(actor),
-            self._critic_tx.init(critics),
-            self._alpha_tx.init(log_alpha),
-        )
+        (targets, average), log_alpha = jax.tree.map(jnp.copy, (critics, actor)), jnp.zeros(())
+        optimisers = self._actor_tx.init(actor), self._critic_tx.init(critics), self._alpha_tx.init(log_alpha)
         return SacState(actor, critics, targets, log_alpha, *optimisers, key, average)
 
     def _critic_step(self, state: SacState, batch: TransitionBatch) -> SacState:

@@ -15,24 +15,10 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.core.robot_data import RobotState
+from pdtui.robots.environments import gymnasium_spaces
 from pdtui.robots.environments.actions_since_reset import ActionsSinceReset
-from pdtui.robots.environments.gymnasium_spaces import (
-    action_to_vector,
-    check_action_space,
-    flatten_observation_space,
-    numeric_entries,
-    to_number,
-    vector_to_action,
-)
 from pdtui.robots.robot import ResetResult, Robot, StepResult
-from pdtui.robots.simulators.python_state import (
-    copy_python_state,
-    digest_values,
-    find_uncopyable_attributes,
-    plain_attributes,
-    restore_python_state,
-    wrapper_layers,
-)
+from pdtui.robots.simulators import python_state
 
 # Control step of an environment that does not tell its own, and the longest that is believed, s.
 _DEFAULT_DT, _MAX_DT = 1.0 / 30.0, 60.0
@@ -87,8 +73,9 @@ class GymnasiumRobot(Robot):
         self._environment = environment or name
         self.env = self.make_world()
         self._flattened = not isinstance(self.env.observation_space, spaces.Box)
-        self.observation_space: Any = flatten_observation_space(self.env.observation_space, self.name)
-        self.action_space = check_action_space(self.env.action_space, self.name)
+        observed = self.env.observation_space
+        self.observation_space: Any = gymnasium_spaces.flatten_observation_space(observed, self.name)
+        self.action_space = gymnasium_spaces.check_action_space(self.env.action_space, self.name)
         self.links, self.attributes = (), ()
         self.reward = 0.0
         self.info: Mapping[str, Any] = {}
@@ -151,12 +138,12 @@ class GymnasiumRobot(Robot):
         """
         if self._repeats:
             self._actions.append(action)
-        taken = vector_to_action(self.env.action_space, action, self.name)
+        taken = gymnasium_spaces.vector_to_action(self.env.action_space, action, self.name)
         observation, reward, terminated, truncated, info = self.env.step(taken)
         self.reward, self.info = float(reward), info
         self._see(observation)
         self._check_finite()
-        details = {**info, "cost": to_number(info.get("cost", 0.0)) or 0.0}
+        details = {**info, "cost": gymnasium_spaces.to_number(info.get("cost", 0.0)) or 0.0}
         details["finished"] = bool(info.get("finished", info.get("is_success", False)))
         if terminated or truncated:
             details["reason"] = str(info.get("reason", "the environment ended the episode"))
@@ -168,8 +155,9 @@ class GymnasiumRobot(Robot):
         mark = np.array([digest, self._seed, start], np.int64).view(np.float64)
         if self._repeats:
             return RobotState(self.name, self._actions.so_far(), (mark,), self.np_random.bit_generator.state)
-        mine = {"reward": self.reward, "info": numeric_entries(self.info), "seen": self._observation.copy()}
-        memory = {"environment": copy_python_state(self.env), "robot": mine}
+        info, seen = gymnasium_spaces.numeric_entries(self.info), self._observation.copy()
+        mine = {"reward": self.reward, "info": info, "seen": seen}
+        memory = {"environment": python_state.copy_state(self.env), "robot": mine}
         state, extras = self._simulator_state()
         return RobotState(self.name, state, (mark, *extras), self.np_random.bit_generator.state, memory)
 
@@ -184,7 +172,7 @@ class GymnasiumRobot(Robot):
                 self.step(action)
         else:
             self._set_simulator_state(snapshot.state, snapshot.extras[1:])
-            restore_python_state(self.env, snapshot.memory["environment"])
+            python_state.restore_state(self.env, snapshot.memory["environment"])
             mine = snapshot.memory["robot"]
             self.reward, self.info, self._observation = mine["reward"], mine["info"], mine["seen"].copy()
         self.np_random.bit_generator.state = snapshot.rng
@@ -196,9 +184,10 @@ class GymnasiumRobot(Robot):
 
     def digest(self) -> int:
         if self._repeats:
-            return digest_values(self._seed, len(self._actions), self._observation, self.reward)
-        memory = [sorted(plain_attributes(layer).items()) for layer in wrapper_layers(self.env)]
-        return digest_values(memory, self._observation, self.reward)
+            return python_state.digest_values(self._seed, len(self._actions), self._observation, self.reward)
+        layers = map(python_state.plain_attributes, python_state.wrapper_layers(self.env))
+        memory = [sorted(attributes.items()) for attributes in layers]
+        return python_state.digest_values(memory, self._observation, self.reward)
 
     def _restored_apart(self) -> tuple[type, ...]:
         """Return types of attributes that have no state, or whose state `_simulator_state` returns."""
@@ -213,9 +202,7 @@ class GymnasiumRobot(Robot):
 
     def _check_finite(self) -> None:
         if not np.isfinite(self._observation).all() or not math.isfinite(self.reward):
-            raise SimulationDiverged(
-                f"{self.name}: the simulation diverged: observation or reward is not finite"
-            )
+            raise SimulationDiverged(f"{self.name}: the simulation diverged: its output is not finite")
 
     def _see(self, observation: Any) -> None:
         if self._flattened:
@@ -227,15 +214,15 @@ class GymnasiumRobot(Robot):
         """Find out, once, how snapshots of this environment are made."""
         if self._repeats is None:
             self._repeats = False
-            handled = self._restored_apart()
-            self._repeats = bool(find_uncopyable_attributes(self.env, handled)) or not self._copies_restore()
+            uncopyable = python_state.has_uncopyable_attributes(self.env, self._restored_apart())
+            self._repeats = uncopyable or not self._copies_restore()
 
     def _copies_restore(self) -> bool:
         """Return whether a restored copy goes on exactly like the original, for a few random actions."""
         try:
             space = self.env.action_space
             space.seed(0)
-            actions = [action_to_vector(space, space.sample()) for _ in range(_TRIAL_STEPS)]
+            actions = [gymnasium_spaces.action_to_vector(space, space.sample()) for _ in range(_TRIAL_STEPS)]
             before, after = actions[:_STEPS_BEFORE_COPY], actions[_STEPS_BEFORE_COPY:]
             self.reset(seed=0)
             if self._digest_steps(before)[1]:
@@ -251,7 +238,7 @@ class GymnasiumRobot(Robot):
         digests = []
         for action in actions:
             _, _, terminated, truncated, _ = self.step(action)
-            digests.append(digest_values(self._observation, self.reward, terminated, truncated))
+            digests.append(python_state.digest_values(self._observation, self.reward, terminated, truncated))
             if terminated or truncated:
                 return digests, True
         return digests, False

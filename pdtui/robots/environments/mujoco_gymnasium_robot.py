@@ -11,17 +11,8 @@ import numpy as np
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
 from pdtui.robots.robot import ResetResult
+from pdtui.robots.simulators import mujoco_robot
 from pdtui.robots.simulators.mujoco_attributes import find_model_attributes
-from pdtui.robots.simulators.mujoco_robot import (
-    body_poses,
-    check_finite,
-    digest_state,
-    read_model_links,
-    read_state,
-    silence_warnings,
-    suppress_warnings,
-    write_state,
-)
 
 
 def is_mujoco(env: gymnasium.Env[Any, Any]) -> bool:
@@ -45,18 +36,18 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
         model = self.world.model
         self._measured = find_model_attributes(model)
         self.attributes = (*(one.attribute for one in self._measured), Attribute("reward", ""))
-        self.links = read_model_links(model)
+        self.links = mujoco_robot.read_model_links(model)
         fresh = mujoco.MjData(model)
         self._derived = tuple(name for name in dir(fresh) if _is_derived(getattr(fresh, name)))
         self._posed = fresh
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> ResetResult:
         first = super().reset(seed=seed, options=options)
-        silence_warnings(self.world.data)
+        mujoco_robot.silence_warnings(self.world.data)
         return first
 
     def make_world(self) -> gymnasium.Env[Any, Any]:
-        with suppress_warnings():  # they are advice to the model's author
+        with mujoco_robot.suppress_warnings():  # they are advice to the model's author
             return super().make_world()
 
     @property
@@ -76,12 +67,12 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
         posed.qpos[:], posed.mocap_pos[:] = world.data.qpos, world.data.mocap_pos
         posed.mocap_quat[:] = world.data.mocap_quat
         mujoco.mj_kinematics(world.model, posed)
-        return body_poses(posed)
+        return mujoco_robot.body_poses(posed)
 
     def digest(self) -> int:
         if self._repeats:
             return super().digest()
-        return digest_state(read_state(self.world.model, self.world.data))
+        return mujoco_robot.digest_state(mujoco_robot.read_state(self.world.model, self.world.data))
 
     def _restored_apart(self) -> tuple[type, ...]:
         from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
@@ -91,11 +82,11 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
     def _simulator_state(self) -> tuple[Floats, tuple[Floats, ...]]:
         data = self.world.data
         derived = np.concatenate([getattr(data, name).ravel() for name in self._derived])
-        return read_state(self.world.model, data), (derived,)
+        return mujoco_robot.read_state(self.world.model, data), (derived,)
 
     def _set_simulator_state(self, state: Floats, extras: tuple[Floats, ...]) -> None:
         data = self.world.data
-        write_state(self.world.model, data, state, self.name)
+        mujoco_robot.write_state(self.world.model, data, state, self.name)
         done = 0
         for name in self._derived:
             values = getattr(data, name)
@@ -103,7 +94,7 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
             done += values.size
 
     def _check_finite(self) -> None:
-        check_finite(self.world.data, self.name)
+        mujoco_robot.check_finite(self.world.data, self.name)
         super()._check_finite()
 
 

@@ -31,17 +31,17 @@ def _silence() -> Iterator[None]:
     """Keep off the screen what a C library writes past Python's streams."""
     flush = ctypes.CDLL(None).fflush
     flush(None)
-    kept, nowhere = [os.dup(1), os.dup(2)], os.open(os.devnull, os.O_WRONLY)
+    kept = {stream: os.dup(stream) for stream in (1, 2)}
     try:
-        for stream in (1, 2):
-            os.dup2(nowhere, stream)
+        with Path(os.devnull).open("w") as nowhere:
+            for stream in kept:
+                os.dup2(nowhere.fileno(), stream)
         yield
         flush(None)
     finally:
-        for stream, before in zip((1, 2), kept, strict=True):
+        for stream, before in kept.items():
             os.dup2(before, stream)
             os.close(before)
-        os.close(nowhere)
 
 
 def data_folder() -> Path:

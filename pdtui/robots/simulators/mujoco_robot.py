@@ -126,23 +126,10 @@ def check_finite(data: mujoco.MjData, owner: str) -> None:
             )
 
 
-class GearedMotors:
-    """Motors that turn joints: the torque is the gear times a command between −1 and 1.
-
-    Attributes:
-        joints: Names of the joints, in the order of the motors.
-        gears: Largest torques, N m.
-    """
-
-    def __init__(self, model: mujoco.MjModel) -> None:
-        motors = [model.actuator(index) for index in range(model.nu)]
-        self.joints = [str(model.joint(int(motor.trnid[0])).name) for motor in motors]
-        self.gears = [float(motor.gear[0]) for motor in motors]
-
-    def torques(self, data: mujoco.MjData) -> list[float]:
-        """Return the torques of the current commands, N m."""
-        commands = (min(1.0, max(-1.0, command)) for command in data.ctrl.tolist())
-        return [gear * command for gear, command in zip(self.gears, commands, strict=True)]
+def motor_gears(model: mujoco.MjModel) -> dict[str, float]:
+    """Return the gear of every motor by the name of its joint: its torque for a command of 1, N m."""
+    motors = (model.actuator(index) for index in range(model.nu))
+    return {str(model.joint(int(motor.trnid[0])).name): float(motor.gear[0]) for motor in motors}
 
 
 class MujocoRobot(Robot):

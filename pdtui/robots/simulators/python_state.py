@@ -66,24 +66,21 @@ def _is_simple(kind: type) -> bool:
     return found is kind
 
 
-def find_uncopyable_attributes(env: gymnasium.Env[Any, Any], ignored: tuple[type, ...] = ()) -> list[str]:
-    """Return the names of attributes that are neither plain nor fixed, so that copies miss their state."""
-    return [
-        f"{type(layer).__name__}.{name}"
-        for layer in wrapper_layers(env)
-        for name, value in vars(layer).items()
-        if not _is_fixed(name, value) and not isinstance(value, ignored) and not is_plain_data(value)
-    ]
+def has_uncopyable_attributes(env: gymnasium.Env[Any, Any], ignored: tuple[type, ...] = ()) -> bool:
+    """Return whether some attribute is neither plain nor fixed, so that a copy misses its state."""
+    attributes = (attribute for layer in wrapper_layers(env) for attribute in vars(layer).items())
+    values = (value for name, value in attributes if not _is_fixed(name, value))
+    return any(not isinstance(value, ignored) and not is_plain_data(value) for value in values)
 
 
-def copy_python_state(env: gymnasium.Env[Any, Any]) -> PythonState:
+def copy_state(env: gymnasium.Env[Any, Any]) -> PythonState:
     """Return a copy of every plain attribute of an environment and its wrappers."""
     # Copied together, so that copies share what two attributes share.
     layers = enumerate(wrapper_layers(env))
     return copy.deepcopy({str(number): plain_attributes(layer) for number, layer in layers})
 
 
-def restore_python_state(env: gymnasium.Env[Any, Any], state: PythonState) -> None:
+def restore_state(env: gymnasium.Env[Any, Any], state: PythonState) -> None:
     """Put copied attributes back, and delete plain ones that were added since."""
     # Copy again, or the next step would change what the snapshot holds.
     kept = copy.deepcopy(state)
