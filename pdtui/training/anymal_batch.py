@@ -181,9 +181,8 @@ class AnymalBatch:
 
     def _disturb(self) -> None:
         """Give new commands and pushes to the robots whose turn it is."""
-        again, pushed = (
-            (self._age % every == 0) & (self._age > 0) for every in (_COMMAND_EVERY, _PUSH_EVERY)
-        )
+        intervals = (_COMMAND_EVERY, _PUSH_EVERY)
+        again, pushed = ((self._age % interval == 0) & (self._age > 0) for interval in intervals)
         if again.any():
             self._draw_commands(again)
         if pushed.any():

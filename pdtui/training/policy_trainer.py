@@ -129,9 +129,8 @@ class PolicyTrainer(ABC, Generic[Config]):
         folder.mkdir(parents=True, exist_ok=True)
         self.build()
         if self.checkpoint.exists():
-            self.state, progress, arrays = load_checkpoint(
-                self.checkpoint, self.state, self.batches, self.rng
-            )
+            kept = load_checkpoint(self.checkpoint, self.state, self.batches, self.rng)
+            self.state, progress, arrays = kept
             self.steps, self.best = int(progress["steps"]), progress["best"]
             self.restore_further(arrays, progress)
 

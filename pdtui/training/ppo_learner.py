@@ -128,11 +128,8 @@ class PpoLearner:
         merged = (
             state.variance * state.rows_seen + variance * count + delta**2 * state.rows_seen * count / total
         ) / total
-        return state._replace(
-            mean=state.mean + delta * count / total,
-            variance=merged,
-            rows_seen=jnp.minimum(total, _MAX_ROWS_SEEN),
-        )
+        mean, rows_seen = state.mean + delta * count / total, jnp.minimum(total, _MAX_ROWS_SEEN)
+        return state._replace(mean=mean, variance=merged, rows_seen=rows_seen)
 
     def _samples(self, state: PpoState, rollout: PpoRollout) -> _Sample:
         config = self.config

@@ -45,9 +45,8 @@ def train_policy(
     defaults = PpoConfig() if algorithm == "ppo" else SacConfig()
     given = {"total_steps": steps, "learning_rate": learning_rate}
     changes = {name: value for name, value in recipe.settings.items() if hasattr(defaults, name)}
-    config = replace(
-        defaults, **changes | {name: value for name, value in given.items() if value is not None}
-    )
+    changes |= {name: value for name, value in given.items() if value is not None}
+    config = replace(defaults, **changes)
     command = (
         f"pdtui train {robot} --algorithm {algorithm} --seed {seed} --steps {config.total_steps} "
         f"--learning-rate {config.learning_rate:g}" + (f" --forward {forward}" if forward else "")

@@ -84,9 +84,8 @@ def load_checkpoint(
             snapshots.append(RobotState(kept["robot"], arrays[f"states.{number}.{index}"], extras, robot_rng))
         batch.restore(RobotBatchState(snapshots, kept["ages"]))
     rng.bit_generator.state = record["rng"]
-    further = {
-        name.removeprefix("memory."): array for name, array in arrays.items() if name.startswith("memory.")
-    }
+    names = (name for name in arrays if name.startswith("memory."))
+    further = {name.removeprefix("memory."): arrays[name] for name in names}
     return jax.tree.unflatten(tree, [jax.numpy.asarray(new) for new in saved]), record["progress"], further
 
 

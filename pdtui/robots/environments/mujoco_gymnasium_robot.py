@@ -18,9 +18,8 @@ from pdtui.robots.simulators.mujoco_attributes import find_model_attributes
 def is_mujoco(env: gymnasium.Env[Any, Any]) -> bool:
     """Return whether an environment exposes its MuJoCo model and data, as Gymnasium's `MujocoEnv` does."""
     world: Any = env.unwrapped
-    return isinstance(getattr(world, "model", None), mujoco.MjModel) and isinstance(
-        getattr(world, "data", None), mujoco.MjData
-    )
+    kinds = {"model": mujoco.MjModel, "data": mujoco.MjData}
+    return all(isinstance(getattr(world, name, None), kind) for name, kind in kinds.items())
 
 
 class MujocoGymnasiumRobot(GymnasiumRobot):

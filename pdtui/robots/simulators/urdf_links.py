@@ -26,11 +26,8 @@ def read_urdf_links(path: Path, bodies: Sequence[str]) -> tuple[Link, ...]:
         bodies: Names of the links that have a pose, in the order of the poses.
     """
     root = ElementTree.parse(path).getroot()
-    fixed = {
-        joint.find("child").attrib["link"]: joint  # type: ignore[union-attr]
-        for joint in root.iter("joint")
-        if joint.get("type") == "fixed"
-    }
+    joints = root.iterfind(".//joint[@type='fixed']")
+    fixed = {cast(Any, joint.find("child")).attrib["link"]: joint for joint in joints}
     links = []
     for link in root.iter("link"):
         name, position = link.attrib["name"], np.zeros(3)
