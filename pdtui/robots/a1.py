@@ -178,7 +178,7 @@ class A1(BulletRobot):
                     touched[tree] = True
         place = np.array(self._base()[0])
         if not np.isfinite(place).all():
-            raise SimulationDiverged(f"{self.name}: the simulation diverged: the trunk is at no finite place")
+            raise SimulationDiverged(f"{self.name}: the simulation diverged: its position is not finite")
         moved, self._place = place - self._place, place
         self._displacements = np.vstack([moved, self._displacements[:2]])
         self._attitudes = np.vstack([sensed_attitude, self._attitudes[:2]])

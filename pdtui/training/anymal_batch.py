@@ -60,7 +60,7 @@ class AnymalBatch:
 
     def __init__(self, robot: Anymal, count: int, seed: int, episode: int | None = None) -> None:
         episode = episode or robot.episode_steps
-        self._name, self._count, self._episode = robot.name, count, episode
+        self._name, self._episode = robot.name, episode
         self._commands = len(robot.commands)
         low, high, number = _FRICTIONS
         shared = [mujoco.MjModel.from_xml_path(str(MODEL)) for _ in range(number)]

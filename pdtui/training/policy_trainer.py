@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import jax
 import numpy as np
@@ -107,7 +107,6 @@ class PolicyTrainer(ABC, Generic[Config]):
     one that was not.
     """
 
-    algorithm: ClassVar[str]
     state: Any
     batches: Sequence[RobotBatch]
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import pkgutil
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -33,8 +32,6 @@ _MIN_DEVIATION = 0.01
 
 class PpoTrainer(PolicyTrainer[PpoConfig]):
     """Trains a policy by PPO; see `PolicyTrainer`."""
-
-    algorithm: ClassVar[str] = "ppo"
 
     def build(self) -> None:
         share, recipe = self.config.worlds // THREADS, self.sample.training_recipe

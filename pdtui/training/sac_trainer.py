@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +52,6 @@ class ReplayBuffer:
 
 class SacTrainer(PolicyTrainer[SacConfig]):
     """Trains a policy by SAC; see `PolicyTrainer`."""
-
-    algorithm: ClassVar[str] = "sac"
 
     def build(self) -> None:
         config = self.config

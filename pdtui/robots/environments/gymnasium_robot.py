@@ -23,7 +23,7 @@ from pdtui.robots.simulators import python_state
 # Control step of an environment that does not tell its own, and the longest that is believed, s.
 _DEFAULT_DT, _MAX_DT = 1.0 / 30.0, 60.0
 _MAX_SEED = 2**31
-# Steps that tell whether a copy of an environment goes on like the original, and those before the copy.
+# Steps that tell whether a copy of an environment continues like the original, and steps before the copy.
 _TRIAL_STEPS, _STEPS_BEFORE_COPY = 24, 4
 
 
@@ -218,7 +218,7 @@ class GymnasiumRobot(Robot):
             self._repeats = uncopyable or not self._copies_restore()
 
     def _copies_restore(self) -> bool:
-        """Return whether a restored copy goes on exactly like the original, for a few random actions."""
+        """Return whether a restored copy continues exactly like the original, for a few random actions."""
         try:
             space = self.env.action_space
             space.seed(0)

@@ -1,6 +1,6 @@
 """The state that Python objects hold, as plain data: copied, restored and digested.
 
-Plain are numbers, text, arrays, random generators, containers of those, and objects of importable classes
+Plain data are numbers, text, arrays, random generators, containers of those, and objects of importable classes
 whose attributes are plain. Handles of libraries (a Box2D body, a window) are not: copying one does not copy
 its state.
 """
