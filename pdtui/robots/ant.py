@@ -76,7 +76,7 @@ class Ant(MujocoRobot, AntEnv):
         roll, pitch, yaw = roll_pitch_yaw(w, x, y, z)
         # MuJoCo's angular velocity is in the body's frame; this is the third row of the rotation matrix.
         yaw_rate = 2 * (x * z - w * y) * a + 2 * (y * z + w * x) * b + (1 - 2 * (x * x + y * y)) * c
-        torques = self._gears * np.clip(self.data.ctrl, -1.0, 1.0)
+        torques = (self._gears * self.data.ctrl.clip(-1.0, 1.0)).tolist()
         return np.array([vx, vy, math.hypot(vx, vy), yaw, yaw_rate, roll, pitch, height, *torques])
 
     def _find_fall(self) -> str:

@@ -153,7 +153,7 @@ class Walker(MujocoRobot, Walker2dEnv):
         mujoco.mj_kinematics(self.model, self.data)
         _, height, pitch = self.data.qpos[:3].tolist()
         vx, vz, pitch_rate = self.data.qvel[:3].tolist()
-        torques = self._gears * np.clip(self.data.ctrl, -1.0, 1.0)
+        torques = (self._gears * self.data.ctrl.clip(-1.0, 1.0)).tolist()
         clearances = [self._clearance(foot) for foot in self._feet]
         return np.array(
             [vx, math.hypot(vx, vz), height, wrap_angle(pitch), pitch_rate, *clearances, *torques]

@@ -1,8 +1,8 @@
 """The state that Python objects hold, as plain data: copied, restored and digested.
 
-Plain data are numbers, text, arrays, random generators, containers of those, and objects of importable classes
-whose attributes are plain. Handles of libraries (a Box2D body, a window) are not: copying one does not copy
-its state.
+Plain data are numbers, text, arrays, random generators, containers of those, and objects of importable
+classes whose attributes are plain. Handles of libraries (a Box2D body, a window) are not: copying one does
+not copy its state.
 """
 
 from __future__ import annotations
