@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import nullcontext
 from functools import wraps
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -114,8 +114,7 @@ def load_policy(
     if not isinstance(policy, nn.Module) and is_torchscript(Path(policy)):
         name, sha256 = name or Path(policy).stem, hash_file(Path(policy))
         policy = read_torchscript(Path(policy))
-    with ExitStack() as stack:
-        world = None if robot is None else stack.enter_context(open_robot(robot))
+    with nullcontext() if robot is None else open_robot(robot) as world:
         if not isinstance(policy, nn.Module):
             return policy_loading.load_policy(
                 policy,

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pdtui.policies.runtime.policy import Policy
     from pdtui.robots.robot import Robot
 
-_SHOWN = 8
+_SHOWN = 8  # attributes in the report of a difference
 
 
 class SessionCheck:

@@ -15,7 +15,7 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 
 MAX_BYTES = 10_000_000
 """Largest keystroke file; a key in every step of an hour takes about 2 million bytes."""
-FACTOR_STEP = 1.25
+FACTOR_STEP = 1.25  # by which a key strengthens or weakens a behavior
 REWIND_SECONDS = 3.0
 _LINE = re.compile(r"(\d{1,9})\s+(\S+)")
 

@@ -6,8 +6,7 @@ from typing import Literal, get_args
 
 PaceRequest = Literal["pause", "step", "slower", "faster"]
 SLOWEST, FASTEST = 1 / 16, 16.0
-_LAG_FORGIVEN = 0.25
-"""Longest delay that is caught up by faster steps, s."""
+_LONGEST_LAG = 0.25  # that is caught up by faster steps, s
 
 
 class Pacer:
@@ -54,7 +53,7 @@ class Pacer:
             self._single -= 1
             return
         self._due += self._dt / self.speed
-        if now - self._due > _LAG_FORGIVEN:
+        if now - self._due > _LONGEST_LAG:
             self._due = now  # too slow for this speed: continue from here rather than catch up
         self._marks = [*self._marks[-40:], now]
 

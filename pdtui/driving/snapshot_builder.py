@@ -12,7 +12,7 @@ from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_snapshot import DriveSnapshot, StimulatedUnit
 from pdtui.sessions.episode_statistics import EpisodeStatisticsCounter
 
-_ROWS_KEPT = 4000
+_ROWS_KEPT = 4000  # control steps between two snapshots that a stopped screen does not lose
 
 
 class SnapshotBuilder:

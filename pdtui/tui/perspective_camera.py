@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 
-_DISTANCE = 6.0
-_NEAREST = 0.15
+_DISTANCE = 6.0  # of the camera from the target, in extents
+_NEAREST = 0.15  # least distance of a point that is drawn, as a share of the target's
 
 
 @dataclass(frozen=True)

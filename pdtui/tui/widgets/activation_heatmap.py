@@ -20,7 +20,7 @@ from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import HEAT_LEVELS, STYLES
 from pdtui.tui.widgets.unit_table import behaviors_of_units
 
-_LABEL = 4
+_LABEL = 4  # width of the layers' numbers, in cells
 
 
 class ActivationHeatmap(SnapshotWidget):

@@ -15,12 +15,12 @@ from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
-_SECONDS = 12.0
-_ROWS_KEPT = 4096
-_VALUE, _UNIT, _TARGET = 7, 5, 10
+_SECONDS = 12.0  # length of the history that a line shows
+_ROWS_KEPT = 4096  # control steps
+_VALUE, _UNIT, _TARGET = 7, 5, 10  # widths of the columns, in cells
 _FORCES = ("N", "N m", "Nm")
 _LEVELS = np.array([ord(character) for character in " ▁▂▃▄▅▆▇█"], "<u4")
-_LEAST_SHARE = 0.05
+_LEAST_SHARE = 0.05  # of the range so far, to which a line is scaled at least
 
 
 class AttributeTable(SnapshotWidget):

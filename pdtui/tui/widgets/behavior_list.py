@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pdtui.core.step_record import ActiveBehavior
     from pdtui.stimulation.stimulation_map import Behavior
 
-_BAR = 10
+_BAR = 10  # length of the bar of the time left, in cells
 _BLOCKS = " ▏▎▍▌▋▊▉"
 
 

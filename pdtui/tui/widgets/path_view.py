@@ -18,9 +18,9 @@ from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
 _ARROWS = "→↗↑↖←↙↓↘"
-_LEAST_SIZE = 2.0
+_LEAST_SIZE = 2.0  # of the area shown, m
 MOST_POINTS = 5000
-_JUMP = 1.0
+_JUMP = 1.0  # longest step that is drawn as a line, m
 _PAST, _NONE, _MARK, _LABEL, _FIRST_BEHAVIOR = range(5)
 
 

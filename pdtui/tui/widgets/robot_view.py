@@ -20,14 +20,13 @@ from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
 View = Literal["side", "above"]
-_SIDE_ELEVATION = 14.0
-"""Of the camera at the side, degrees."""
+_SIDE_ELEVATION = 14.0  # of the camera at the side, degrees
 _GROUND, _AXIS, _SHADOW, _HEADING, _LABEL, _OBSTACLE, _FIRST_SHADE = range(7)
 _INKS = (
     *(STYLES.faint, STYLES.muted, STYLES.faint, STYLES.accent, STYLES.muted, STYLES.obstacle),
     *STYLES.depth,
 )
-_FARTHEST = 0.55
+_FARTHEST = 0.55  # least magnification of the ground grid that is drawn
 _AHEAD, _ASIDE = 16.0, 8.0
 """Length and width of the area seen from above with obstacles, in extents of the robot."""
 _FORWARD = 0.27

@@ -16,7 +16,7 @@ from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
-_NAME = 40
+_NAME = 40  # longest file name that is shown whole, in cells
 
 
 class StatusLine(SnapshotWidget):
@@ -139,7 +139,8 @@ class NoticeLine(SnapshotWidget):
         if self._counters():
             return f"seed {facts.seed} · {place}"
         share = 100.0 * self.snapshot.involvement / max(1, self.snapshot.step)
-        keyed = f"{self.snapshot.involvement} steps with a key ({share:.1f} %)"
+        steps = "1 step" if self.snapshot.involvement == 1 else f"{self.snapshot.involvement} steps"
+        keyed = f"{steps} with a key ({share:.1f} %)"
         return f"seed {facts.seed} · episode {self.snapshot.episode} · {keyed} · {place}"
 
 

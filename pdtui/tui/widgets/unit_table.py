@@ -16,8 +16,7 @@ from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
-_NUMBER = 8
-_ADDRESS = 8
+_NUMBER, _ADDRESS = 8, 8  # widths of the columns, in cells
 
 
 class UnitTable(SnapshotWidget):
