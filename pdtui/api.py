@@ -212,7 +212,7 @@ def drive(
         loop = build_loop(config, world, None if isinstance(policy, str | Path) else policy)
         presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
         if record is not None and Path(record).exists():
-            raise SessionError(f"{record}: exists already; a drive is recorded into a new file")
+            raise SessionError(f"{record}: already exists; a drive is recorded into a new file")
         recorder = SessionRecorder(Path(record), loop.info) if record is not None else None
         return collect_trajectory(loop, presses, steps, recorder)
 

@@ -86,7 +86,7 @@ def test_a_recorded_drive_of_a_live_network_replays_bit_for_bit_with_a_rewind(
     again_robot, again_policy, _ = world()
     result = pdtui.replay(path, robot=again_robot, policy=again_policy)
     assert (result.steps, result.first_difference) == (110, None)
-    with pytest.raises(SessionError, match=r"drive.rrd: exists already"):
+    with pytest.raises(SessionError, match=r"drive.rrd: already exists"):
         pdtui.drive(robot, stimulation_map, policy=policy, record=path)
 
 

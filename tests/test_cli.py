@@ -101,7 +101,7 @@ def test_bench_prints_all_parts(map_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["drive", "qqqqqqqq"], "pdtui: unknown robot 'qqqqqqqq'; there are a1, a1-vision"),
+        (["drive", "qqqqqqqq"], "pdtui: unknown robot 'qqqqqqqq'; available: a1, a1-vision"),
         (["drive", "ant", "--map", "nowhere.toml"], "pdtui: nowhere.toml: no such map"),
         (
             ["drive", "ant", "--map", "MAP"],
@@ -115,8 +115,8 @@ def test_bench_prints_all_parts(map_path: Path) -> None:
         (["drive", "ant", "--map", "MAP", "--headless", "--keys", "no.txt"], "pdtui: no.txt: cannot be read"),
         (["drive", "ant", "--map", "MAP", "--headless", "--keys", "BAD"], "bad.txt:2: expected 'STEP KEY'"),
         (["drive", "ant", "--map", "MAP", "--headless", "--record", "FOLDER"], "pdtui: "),
-        (["drive", "ant", "--map", "MAP", "--headless", "--record", "KEYS"], "keys.txt: exists already"),
-        (["dissect", "ant", "-o", "KEYS"], "keys.txt: exists already; --overwrite replaces it"),
+        (["drive", "ant", "--map", "MAP", "--headless", "--record", "KEYS"], "keys.txt: already exists"),
+        (["dissect", "ant", "-o", "KEYS"], "keys.txt: already exists; --overwrite replaces it"),
         (
             ["dissect", "ant", "--set", "window=kaiser", "-o", "OUT"],
             "setting 'window': expected blackman|hann",

@@ -96,7 +96,7 @@ def test_a_cut_file_is_repaired_and_then_verifies(folder: Path, tmp_path: Path) 
         verified = run("sessions", "verify", tmp_path / f"{number}.repaired.rrd")
         assert verified.exit_code == 0, verified.output
         assert "identical: " in verified.output
-    assert "exists already" in run("sessions", "repair", torn).output
+    assert "already exists" in run("sessions", "repair", torn).output
     assert run("sessions", "repair", torn, "--in-place").exit_code == 0
     assert "whole; nothing to repair" in run("sessions", "repair", torn).output
 
@@ -123,7 +123,7 @@ def test_streams_are_exported_as_they_are(folder: Path, tmp_path: Path) -> None:
     events = pyarrow.csv.read_csv(tmp_path / "e.csv").to_pylist()
     assert [(row["step"], row["key"]) for row in events][:2] == [(10, "w"), (20, "t")]
     again = run("sessions", "export", path, "--stream", "events", "-o", tmp_path / "e.csv")
-    assert "e.csv: exists already" in again.output
+    assert "e.csv: already exists" in again.output
     assert (
         "no stream 'poses'"
         in run("sessions", "export", path, "--stream", "poses", "-o", tmp_path / "p.csv").output

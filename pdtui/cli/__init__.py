@@ -1,4 +1,4 @@
-"""The command line: each command calls a room and prints the result.
+"""The command line: each command calls one package and prints the result.
 
 Commands, and the heavy libraries that they need, are loaded only when they are used.
 """

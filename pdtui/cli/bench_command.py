@@ -24,7 +24,7 @@ from pdtui.sessions.session_schema import ActivationsKept
 def bench() -> None:
     """Measure speed and memory.
 
-    What is compared is measured in turn in one run: compare ratios, not figures of different runs.
+    The variants are measured in turn within one run: compare ratios, not figures from different runs.
     """
 
 

@@ -85,7 +85,7 @@ def dissect(
     as_json: bool,
     **settings: Any,
 ) -> None:
-    """Find the units of ROBOT's policy that move something, and write a map and a report.
+    """Find the units of ROBOT's policy that steer it, and write a map and a report.
 
     An interrupted dissection continues where it stopped when the same command is run again.
     """

@@ -79,7 +79,7 @@ def drive(
     """Drive ROBOT with the keys of its map. ROBOT may also be a map file."""
     config = drive_config(robot, map_name, policy, import_options, without_map=True, **options)
     if record is not None and record.exists():
-        raise SessionError(f"{record}: exists already; a drive is recorded into a new file")
+        raise SessionError(f"{record}: already exists; a drive is recorded into a new file")
     if keys is not None and not headless:
         raise KeystrokeError("--keys needs --headless; on the screen, keys are pressed by hand")
     if viewer is not None:

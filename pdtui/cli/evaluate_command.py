@@ -120,13 +120,13 @@ def evaluate(
     if experiment is None and (others or pictures):
         raise click.UsageError(f"{'more than one map' if others else '-o'} needs --experiment")
     if sum([policy_only, target is not None, update, experiment is not None]) > 1:
-        raise click.UsageError("--target, --policy-only, --update and --experiment exclude each other")
+        raise click.UsageError("--target, --policy-only, --update and --experiment are mutually exclusive")
     if start and not policy_only:
         raise click.UsageError("--start needs --policy-only; tasks and experiments have their own starts")
     if update and force:
-        raise MapError("--update does not go with --force: the map would get another policy's figures")
+        raise MapError("--update cannot be used with --force: the map would get another policy's figures")
     if others and (map_name or policy):
-        raise click.UsageError("--map and --policy go with one map; compared maps name their policies")
+        raise click.UsageError("--map and --policy work with one map only; compared maps name their policies")
     if experiment is None and own_options:
         raise click.UsageError(f"{_flag(own_options)} needs --experiment")
     if experiment is not None:

@@ -40,7 +40,7 @@ from pdtui.cli.shared_options import (
 def pursue(
     robot: str, task: str, policy: str, quick: bool, output: Path | None, as_json: bool, **search: Any
 ) -> None:
-    """Search for a stimulation with which ROBOT does TASK, and write it into a map.
+    """Search for a stimulation that makes ROBOT accomplish TASK, and write it into a map.
 
     For example, `pdtui pursue walker hop`.
     """

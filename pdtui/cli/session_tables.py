@@ -68,7 +68,7 @@ def show_table(session: Session, summary: SessionSummary) -> Any:
     ]
     figures = [
         ("length", f"{summary.steps} steps, {summary.seconds:g} s"),
-        ("episodes", f"{summary.episodes}, of which {summary.falls} ended by themselves"),
+        ("episodes", f"{summary.episodes}, of which {summary.falls} ended on their own"),
         ("human involvement", _keyed(summary.involvement, summary.steps)),
         ("stimulated", f"{summary.stimulated} steps"),
         ("return", f"{summary.total_reward:.2f}"),

@@ -105,7 +105,7 @@ def show(file: Path, as_json: bool) -> None:
 def verify(files: tuple[Path, ...], options: dict[str, Any], as_json: bool) -> None:
     """Check that FILES are whole and that their drives repeat.
 
-    Exit codes: 0 if all do; 1 if a file is broken, not whole or cannot be replayed; 3 if a drive does not
+    Exit codes: 0 if all pass; 1 if a file is broken, incomplete or cannot be replayed; 3 if a drive does not
     repeat.
     """
     found = [_verify_file(file, options, as_json) for file in files]
@@ -147,17 +147,17 @@ def _verify_file(file: Path, options: dict[str, Any], as_json: bool) -> dict[str
 )
 @click.option("--in-place", is_flag=True, help="Replace FILE itself.")
 def repair(file: Path, output: Path | None, in_place: bool) -> None:
-    """Cut off the damaged end of FILE, so that it opens and replays up to there."""
+    """Cut off the damaged end of FILE, so that the rest can be opened and replayed."""
     from pdtui.sessions.session_repair import examine_session, repair_session
 
     if in_place and output is not None:
-        raise SessionError("--in-place and -o exclude each other")
+        raise SessionError("--in-place and -o are mutually exclusive")
     if examine_session(file).whole:
         click.echo(f"{make_printable(str(file))}: whole; nothing to repair")
         return
     target = file if in_place else output or file.with_suffix(".repaired.rrd")
     if target.exists() and not in_place:
-        raise SessionError(f"{target}: exists already; a repaired session is a new file")
+        raise SessionError(f"{target}: already exists; a repaired session is a new file")
     repaired = repair_session(file, target)
     length = f"{repaired.steps} steps ({repaired.seconds:g} s), {repaired.keys} keys"
     click.echo(make_printable(f"wrote {target}: {length}, outcome '{repaired.outcome}'"))
@@ -183,7 +183,7 @@ def export(file: Path, stream: str | None, output: Path | None, keys: Path | Non
     from pdtui.sessions.session_export import STREAMS, export_stream
 
     if (stream is None) != (output is None):
-        raise SessionError("--stream and -o go together")
+        raise SessionError("--stream and -o must be given together")
     if stream is not None and output is not None:
         rows = export_stream(file, stream, output, overwrite=overwrite)
         click.echo(make_printable(f"wrote {output}: {rows} rows"))
@@ -199,7 +199,7 @@ def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
     from pdtui.sessions.session_header import read_session_header
 
     if output.exists() and not overwrite:
-        raise SessionError(f"{output}: exists already; --overwrite replaces it")
+        raise SessionError(f"{output}: already exists; --overwrite replaces it")
     header = read_session_header(file)
     write_file(output, format_keystrokes(header.events), SessionError)
     without = len(header.events) - header.keys

@@ -45,7 +45,7 @@ def train(
 ) -> None:
     """Train a policy for ROBOT.
 
-    An interrupted training continues from its last checkpoint when the same command is run again.
+    An interrupted run continues from its last checkpoint when the same command is run again.
     """
     from pdtui.training.train_policy import train_policy
 

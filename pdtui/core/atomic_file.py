@@ -19,7 +19,7 @@ def replace_file(path: Path, error: type[PdtuiError]) -> Iterator[Path]:
 
     Args:
         path: the file; its folder is made.
-        error: what an `OSError` of the block or of the replacement becomes.
+        error: the class of error that an `OSError` in the block or the replacement is turned into.
 
     Raises:
         error: the file cannot be written; the message names it.

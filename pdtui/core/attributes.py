@@ -37,7 +37,7 @@ def column_of(name: str, attributes: Sequence[Attribute], owner: str) -> int:
     """Return the column of an attribute; one that is missing is a `RobotError` that names the `owner`."""
     names = [attribute.name for attribute in attributes]
     if name not in names:
-        raise RobotError(f"{owner}: no attribute '{name}'; there are {', '.join(names)}")
+        raise RobotError(f"{owner}: no attribute '{name}'; available: {', '.join(names)}")
     return names.index(name)
 
 

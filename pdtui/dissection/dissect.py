@@ -190,7 +190,7 @@ def gather_probe_starts(pool: RolloutPool, settings: DissectionSettings, first_s
         if settings.longest_rollout < _SHORTEST:
             raise RobotError(
                 f"{pool.robot.name}: expected {total} walks of {wanted} steps without a fall, but of "
-                f"{len(seeds)} walks only that many last {lasting} steps; dissection needs a policy that "
+                f"{len(seeds)} walks, the best {total} last {lasting} steps; dissection needs a policy that "
                 "stays up longer"
             )
         shortened = (

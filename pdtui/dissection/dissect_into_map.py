@@ -56,11 +56,11 @@ def dissect_into_map(
     The journal of `config` is not used. `draw` draws the pictures, and returns their files.
 
     Raises:
-        MapError: The map exists already or cannot be written. Found out before the work starts.
+        MapError: The map already exists or cannot be written. Found out before the work starts.
         PdtuiError: As `dissect` and `draw` do.
     """
     if output.exists() and not overwrite:
-        raise MapError(f"{output}: exists already; --overwrite replaces it, -o writes elsewhere")
+        raise MapError(f"{output}: already exists; --overwrite replaces it, -o writes elsewhere")
     check_writable(output, MapError)
     journal = journal_path(output)
     dissection = dissect(replace(config, journal=journal))

@@ -205,7 +205,7 @@ def _check_commands(robot: Robot, stimulation_map: StimulationMap) -> None:
     for behavior in stimulation_map.behaviors.values():
         for name in behavior.commands:
             if name not in robot.commands:
-                known = f"there are {', '.join(robot.commands)}" if robot.commands else "it has none"
+                known = f"available: {', '.join(robot.commands)}" if robot.commands else "it has none"
                 raise MapError(
                     f"{stimulation_map.source}: behavior '{behavior.name}': {robot.name} has no command "
                     f"'{name}'; {known}"

@@ -37,7 +37,7 @@ class Pacer:
             case "faster":
                 self.speed = min(FASTEST, self.speed * 2)
             case _:
-                raise ValueError(f"unknown pace '{pace}'; there are {', '.join(get_args(PaceRequest))}")
+                raise ValueError(f"unknown pace '{pace}'; available: {', '.join(get_args(PaceRequest))}")
         self._due = now
         self._marks = []
 

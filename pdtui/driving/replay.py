@@ -98,7 +98,7 @@ class ReplayResult:
         )
         if self.passed:
             return f"repeats within tolerance: bits differ from {where} on; the first {kept}"
-        return f"differs: {where}: {self.detail}; only the first {kept}, expected were {self.judged}"
+        return f"differs: {where}: {self.detail}; only the first {kept}, but {self.judged} have to be"
 
 
 def replay_config(session: Session, source: str, policy: str = "") -> DriveConfig:

@@ -81,7 +81,7 @@ class RewindHistory:
         if wanted not in self._kept:
             known = f"{next(iter(self._kept))}..{next(reversed(self._kept))}" if self._kept else "none yet"
             raise KeystrokeError(
-                f"cannot rewind to step {wanted}; kept is every {STEPS_PER_KEPT_STATE}th step of {known}"
+                f"cannot rewind to step {wanted}; kept steps: every {STEPS_PER_KEPT_STATE}th of {known}"
             )
         kept = self._kept[wanted]
         self.position = wanted, step - kept.age

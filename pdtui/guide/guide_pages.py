@@ -105,7 +105,7 @@ def read_guide() -> dict[str, GuidePage]:
 def find_page(pages: Mapping[str, GuidePage], topic: str) -> GuidePage:
     """Return the page with this topic; the error for an unknown one lists all topics."""
     if topic not in pages:
-        raise PdtuiError(f"no topic '{topic}' in the guide; there are {', '.join(pages)}")
+        raise PdtuiError(f"no topic '{topic}' in the guide; available: {', '.join(pages)}")
     return pages[topic]
 
 

@@ -147,7 +147,7 @@ def compare_heading_precision(
         before += len(seeds) * len(behaviors)
     if len(set(steps.values())) > 1:
         told = ", ".join(f"{source} has {dt:g} s" for source, dt in steps.items())
-        raise MapError(f"expected maps of robots with one control step, found: {told}")
+        raise MapError(f"expected robots whose control steps are equally long, found: {told}")
     return HeadingPrecisionComparison(tuple(seeds), tuple(targets), next(iter(steps.values())), tuple(rows))
 
 

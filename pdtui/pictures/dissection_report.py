@@ -191,14 +191,14 @@ class PictureOutputs:
     overwrite: bool
 
     def check(self) -> None:
-        """Raise a `PictureError`, before minutes of work, if a file exists already or cannot be written."""
+        """Raise a `PictureError`, before minutes of work, if a file already exists or cannot be written."""
         if self.report.suffix != ".rrd":
             raise PictureError(f"{self.report}: expected a name that ends in .rrd; the viewer opens no other")
         found = [self.report] if self.report.exists() else []
         if self.figures is not None:
             found += existing_figures(self.figures)
         if found and not self.overwrite:
-            raise PictureError(f"{found[0]}: exists already; --overwrite replaces it")
+            raise PictureError(f"{found[0]}: already exists; --overwrite replaces it")
         for path in (self.report, *([] if self.figures is None else [self.figures / "figure.png"])):
             check_writable(path, PictureError)
 

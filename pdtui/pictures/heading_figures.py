@@ -82,13 +82,13 @@ def check_heading_pictures(paths: Sequence[Path], overwrite: bool) -> None:
     """Find out before minutes of work whether the pictures can be written.
 
     Raises:
-        PictureError: The ending is unknown, or a file exists already.
+        PictureError: The ending is unknown, or a file already exists.
     """
     for path in paths:
         if path.suffix not in (".png", ".rrd"):
             raise PictureError(f"{path}: expected a name that ends in .png or .rrd")
         if path.exists() and not overwrite:
-            raise PictureError(f"{path}: exists already; --overwrite replaces it")
+            raise PictureError(f"{path}: already exists; --overwrite replaces it")
 
 
 def draw_heading_pictures(paths: Sequence[Path], shown: HeadingFigure) -> None:

@@ -68,10 +68,10 @@ def check_figure(path: Path, overwrite: bool) -> None:
     """Find out before the work whether one figure may be written.
 
     Raises:
-        PictureError: The file exists already.
+        PictureError: The file already exists.
     """
     if path.exists() and not overwrite:
-        raise PictureError(f"{path}: exists already; --overwrite replaces it, -o writes elsewhere")
+        raise PictureError(f"{path}: already exists; --overwrite replaces it, -o writes elsewhere")
 
 
 def policy_title(dissection: Dissection) -> str:

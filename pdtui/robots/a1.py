@@ -101,7 +101,7 @@ class A1(BulletRobot):
     ) -> None:
         super().__init__()
         if terrain not in self.starts:
-            raise RobotError(f"{self.name}: no terrain '{terrain}'; there are {', '.join(self.starts)}")
+            raise RobotError(f"{self.name}: no terrain '{terrain}'; available: {', '.join(self.starts)}")
         self._terrain, self._roughness, self._density = terrain, roughness, density
         self._top_speed = top_speed
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93,), np.float64)

@@ -150,7 +150,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
             RobotError: The robot has no such start.
         """
         if start and start not in self.starts:
-            known = f"there are {', '.join(self.starts)}" if self.starts else "it has only the usual one"
+            known = f"available: {', '.join(self.starts)}" if self.starts else "it has only the usual one"
             raise RobotError(f"{self.name}: no start '{start}'; {known}")
         return start
 

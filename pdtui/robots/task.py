@@ -115,5 +115,5 @@ def find_task(name: str, tasks: Sequence[Task], owner: str) -> Task:
     for task in tasks:
         if task.name == name:
             return task
-    known = f"there are {', '.join(task.name for task in tasks)}" if tasks else "it has none"
+    known = f"available: {', '.join(task.name for task in tasks)}" if tasks else "it has none"
     raise MapError(f"{owner}: no task '{name}'; {known}")

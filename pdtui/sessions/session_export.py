@@ -40,11 +40,11 @@ def export_stream(path: Path, stream: str, output: Path, *, overwrite: bool = Fa
         SessionError: the session cannot be read, there is no such stream, or the output cannot be written.
     """
     if stream not in STREAMS:
-        raise SessionError(f"no stream '{stream[:40]}'; there are {', '.join(STREAMS)}")
+        raise SessionError(f"no stream '{stream[:40]}'; available: {', '.join(STREAMS)}")
     if output.suffix not in _WRITERS:
         raise SessionError(f"{output}: expected a name that ends with {' or '.join(_WRITERS)}")
     if output.exists() and not overwrite:
-        raise SessionError(f"{output}: exists already; --overwrite replaces it")
+        raise SessionError(f"{output}: already exists; --overwrite replaces it")
     session = read_session(path)
     columns = STREAMS[stream][1](session)
     steps = np.asarray(columns.pop("step", np.arange(session.steps)), np.int64)

@@ -96,7 +96,7 @@ def _read_events(table: EntityTable) -> tuple[Event, ...]:
     for row in order:
         kind = kinds[row]
         if kind not in EVENT_WORDINGS:
-            raise SessionError(f"unknown event '{kind[:40]}'; there are {', '.join(EVENT_WORDINGS)}")
+            raise SessionError(f"unknown event '{kind[:40]}'; available: {', '.join(EVENT_WORDINGS)}")
         events.append(Event(int(table.steps[row]), kind, names[row], float(values[row]), keys[row]))
     return tuple(events)
 

@@ -129,7 +129,7 @@ def find_preset(name: str, settings: Sequence[str] = ()) -> MatchingPreset:
         PdtuiError: there is no such preset or choice, or the choice does not allow that value.
     """
     if name not in PRESETS:
-        raise PdtuiError(f"unknown preset '{name}'; there are {', '.join(PRESETS)}")
+        raise PdtuiError(f"unknown preset '{name}'; available: {', '.join(PRESETS)}")
     values: dict[str, Any] = dict(_parse(setting) for setting in settings)
     preset, usual = PRESETS[name], preset_values(PRESETS[name])
     changed = tuple(f"{key}={value}" for key, value in values.items() if value != usual[key])
@@ -152,7 +152,7 @@ def _parse(setting: str) -> tuple[str, str | int]:
     if not equals:
         raise PdtuiError(f"setting '{setting}': expected NAME=VALUE, one of {describe_preset_options()}")
     if name not in preset_options():
-        raise PdtuiError(f"unknown setting '{name}'; there are {describe_preset_options()}")
+        raise PdtuiError(f"unknown setting '{name}'; available: {describe_preset_options()}")
     if name in _RANGES:
         low, high = _RANGES[name]
         if value.isdecimal() and low <= int(value) <= high:

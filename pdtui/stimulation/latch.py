@@ -85,7 +85,7 @@ class Latch:
         """
         if name not in self._behaviors:
             known = ", ".join(self._behaviors)
-            raise KeystrokeError(f"{self._map.source}: no behavior '{name}'; there are {known}")
+            raise KeystrokeError(f"{self._map.source}: no behavior '{name}'; available: {known}")
         behavior = self._behaviors[name].behavior
         was_on = any(latched.behavior.name == name for latched in self._latched)
         self._latched = [

@@ -38,7 +38,7 @@ def find_map(name: str) -> Path:
         if (folder / f"{name}.toml").is_file():
             return folder / f"{name}.toml"
     known = ", ".join(sorted({path.stem for path in _all_paths()})) or "none"
-    raise MapError(f"no map '{name}'; there are {known}")
+    raise MapError(f"no map '{name}'; available: {known}")
 
 
 def bare_map(robot: str, policy: str) -> StimulationMap:

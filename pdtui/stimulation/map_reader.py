@@ -136,7 +136,7 @@ def _read_behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive])
         if key not in primitives and not ADDRESS.fullmatch(key):
             known = ", ".join(primitives) or "none"
             raise table.error(
-                "magnitudes", f"'{key}' is neither a layer:index nor a primitive; there are {known}"
+                "magnitudes", f"'{key}' is neither a layer:index nor a primitive; available: {known}"
             )
     commands = table.numbers("commands", {})
     if not magnitudes and not commands:

@@ -124,7 +124,7 @@ def _edit_behaviors(
         tables = {str(table["name"]): table for table in document.get("behaviors", [])}
         for name, value in values.items():
             if name not in tables:
-                raise MapError(f"{source}: no behavior '{name}'; there are {', '.join(tables) or 'none'}")
+                raise MapError(f"{source}: no behavior '{name}'; available: {', '.join(tables) or 'none'}")
             replace(tables[name], value)
 
     return _edit(text, source, edit)

@@ -40,7 +40,7 @@ def test_roll_outs_are_kept_until_map_and_pictures_are_written(policy_file: Path
         dissect_into_map(config, output, draw=fail_to_draw)
     with RolloutJournal(journal, "") as kept:
         assert len(kept) == rollouts
-    with pytest.raises(MapError, match=r"small\.toml: exists already; --overwrite replaces it"):
+    with pytest.raises(MapError, match=r"small\.toml: already exists; --overwrite replaces it"):
         dissect_into_map(config, output)
     drawn = tmp_path / "small.rrd"
     written = dissect_into_map(config, output, overwrite=True, draw=lambda _: [drawn])

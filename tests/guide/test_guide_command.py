@@ -24,5 +24,5 @@ def test_it_lists_its_topics() -> None:
 def test_an_unknown_topic_is_one_line() -> None:
     result = CliRunner().invoke(main, ["guide", "nothing"])
     assert result.exit_code == 1
-    assert result.output.startswith("pdtui: no topic 'nothing' in the guide; there are index, driving, ")
+    assert result.output.startswith("pdtui: no topic 'nothing' in the guide; available: index, driving, ")
     assert result.output.count("\n") == 1

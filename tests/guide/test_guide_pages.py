@@ -68,6 +68,6 @@ def test_search_looks_at_all_pages() -> None:
 
 def test_an_unknown_topic_lists_the_topics() -> None:
     with pytest.raises(
-        PdtuiError, match="no topic 'drvng' in the guide; there are index, driving, .*, changelog$"
+        PdtuiError, match="no topic 'drvng' in the guide; available: index, driving, .*, changelog$"
     ):
         find_page(read_guide(), "drvng")

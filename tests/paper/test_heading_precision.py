@@ -134,7 +134,7 @@ def test_the_command_compares_maps_and_draws(map_path: Path, tmp_path: Path, vie
     assert not is_blank(viewer.picture("tracking"))
     again = CliRunner().invoke(main, line)
     assert again.exit_code == 1
-    assert "f.png: exists already; --overwrite replaces it" in again.output
+    assert "f.png: already exists; --overwrite replaces it" in again.output
 
 
 @pytest.mark.parametrize(

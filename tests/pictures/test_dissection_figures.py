@@ -54,11 +54,11 @@ def test_what_exists_is_kept_unless_asked(
 ) -> None:
     report = tmp_path / "ant.rrd"
     folder = figures[0].parent
-    with pytest.raises(PictureError, match="discrepancies-1.png: exists already; --overwrite replaces it"):
+    with pytest.raises(PictureError, match="discrepancies-1.png: already exists; --overwrite replaces it"):
         PictureOutputs(report, folder, overwrite=False).check()
     PictureOutputs(report, folder, overwrite=True).check()
     report.write_bytes(b"kept")
-    with pytest.raises(PictureError, match="ant.rrd: exists already; --overwrite replaces it"):
+    with pytest.raises(PictureError, match="ant.rrd: already exists; --overwrite replaces it"):
         PictureOutputs(report, None, overwrite=False).check()
     assert report.read_bytes() == b"kept"
     assert PictureOutputs(report, None, overwrite=True).draw(dissection) == [report]

@@ -90,5 +90,5 @@ def test_the_command_draws_once_and_keeps_what_it_drew(policy_file: Path, tmp_pa
     drawn = (tmp_path / "pair.png").read_bytes()
     again = CliRunner().invoke(main, arguments)
     assert again.exit_code == 1
-    assert "pair.png: exists already; --overwrite replaces it" in again.output
+    assert "pair.png: already exists; --overwrite replaces it" in again.output
     assert (tmp_path / "pair.png").read_bytes() == drawn

@@ -16,9 +16,9 @@ def test_every_activation_can_be_chosen() -> None:
 
 
 def test_a_choice_is_one_of_the_known() -> None:
-    with pytest.raises(PolicyError, match="unknown activation 'sine'; there are tanh, relu"):
+    with pytest.raises(PolicyError, match="unknown activation 'sine'; available: tanh, relu"):
         ImportOptions("sine")
-    with pytest.raises(PolicyError, match="unknown squash 'hard'; there are none, tanh, clip"):
+    with pytest.raises(PolicyError, match="unknown squash 'hard'; available: none, tanh, clip"):
         ImportOptions(squash="hard")
     assert ImportOptions("elu").or_else(ImportOptions("tanh", "clip")) == ImportOptions("elu", "clip")
 

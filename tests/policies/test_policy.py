@@ -148,7 +148,7 @@ def test_addresses_go_both_ways() -> None:
         ),
         (lambda: parse_unit("knee", (4,)), "unit 'knee': expected layer:index"),
         (lambda: Policy(nn.Sequential(nn.Linear(2, 2)), 2), "no hidden layer"),
-        (lambda: Policy(_Branched(), 4, hidden=["legs"]), "no submodule 'legs'; there are first, second"),
+        (lambda: Policy(_Branched(), 4, hidden=["legs"]), "no submodule 'legs'; available: first, second"),
         (
             lambda: Policy(_Branched(), 4).act(np.zeros(5)),
             r"expected an observation of shape \(4,\), got \(5,\)",

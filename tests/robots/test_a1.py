@@ -217,9 +217,9 @@ def test_turning_left_is_positive(a1: A1) -> None:
 
 
 def test_what_it_does_not_have_is_refused(a1: A1) -> None:
-    with pytest.raises(RobotError, match="no start 'moon'; there are plane, rough, forest"):
+    with pytest.raises(RobotError, match="no start 'moon'; available: plane, rough, forest"):
         a1.reset(options={"start": "moon"})
-    with pytest.raises(RobotError, match="no terrain 'moon'; there are plane, rough, forest"):
+    with pytest.raises(RobotError, match="no terrain 'moon'; available: plane, rough, forest"):
         A1("moon")
     a1.reset(seed=0)
     ant = make_robot("ant")

@@ -143,7 +143,7 @@ def test_divergence_is_an_error_that_says_when(ant: Ant) -> None:
 
 
 def test_unknown_robot_lists_the_known_ones() -> None:
-    with pytest.raises(RobotError, match="unknown robot 'qqqqqqqq'; there are a1, a1-vision"):
+    with pytest.raises(RobotError, match="unknown robot 'qqqqqqqq'; available: a1, a1-vision"):
         make_robot("qqqqqqqq")
 
 

@@ -138,6 +138,6 @@ def test_behaviors_set_what_the_policy_is_asked_for() -> None:
 
 def test_a_command_that_the_robot_does_not_have_is_named() -> None:
     with pytest.raises(
-        MapError, match="behavior 'slowly': anymal has no command 'up'; there are forward, lat"
+        MapError, match="behavior 'slowly': anymal has no command 'up'; available: forward, lat"
     ):
         _loop(MAP.replace("{forward = 0.25}", "{up = 1.0}"))

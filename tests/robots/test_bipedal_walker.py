@@ -105,7 +105,7 @@ def test_a_split_has_both_legs_on_the_ground_and_the_hull_above_it(walker: Biped
 
 
 def test_an_unknown_start_is_refused(walker: BipedalWalker) -> None:
-    with pytest.raises(RobotError, match="no start 'handstand'; there are split"):
+    with pytest.raises(RobotError, match="no start 'handstand'; available: split"):
         walker.reset(seed=0, options={"start": "handstand"})
 
 

@@ -14,7 +14,7 @@ def test_presets_are_those_of_the_paper_and_of_its_code() -> None:
 
 
 def test_unknown_preset_lists_those_there_are() -> None:
-    with pytest.raises(PdtuiError, match=r"unknown preset 'welch'; there are paper, authors"):
+    with pytest.raises(PdtuiError, match=r"unknown preset 'welch'; available: paper, authors"):
         find_preset("welch")
 
 
@@ -46,7 +46,7 @@ def test_windows_are_the_periodic_ones(name: str) -> None:
     ("setting", "message"),
     [
         ("window", r"setting 'window': expected NAME=VALUE, one of window=blackman\|hann"),
-        ("colour=red", r"unknown setting 'colour'; there are window=.*; length=4…65536 samples"),
+        ("colour=red", r"unknown setting 'colour'; available: window=.*; length=4…65536 samples"),
         ("window=kaiser", r"setting 'window': expected blackman\|hann\|hamming\|rectangular, got 'kaiser'"),
         ("length=3", r"setting 'length': expected 4…65536 samples, got '3'"),
         ("hop=-1", r"setting 'hop': expected 1…65536 samples, got '-1'"),

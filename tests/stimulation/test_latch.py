@@ -83,7 +83,7 @@ def test_a_target_starts_at_the_present_value_and_moves(latch: Latch) -> None:
 
 
 def test_errors_name_what_there_is(latch: Latch) -> None:
-    with pytest.raises(KeystrokeError, match="no behavior 'fly'; there are push, twitch, hold heading"):
+    with pytest.raises(KeystrokeError, match="no behavior 'fly'; available: push, twitch, hold heading"):
         latch.latch_behavior("fly", AT_REST)
     latch.latch_behavior("push", AT_REST)
     with pytest.raises(KeystrokeError, match="'push' holds no target"):
@@ -91,7 +91,7 @@ def test_errors_name_what_there_is(latch: Latch) -> None:
 
 
 def test_an_attribute_that_the_robot_lacks_is_named_at_once(small_map: StimulationMap) -> None:
-    with pytest.raises(RobotError, match=r"behavior 'hold heading': no attribute 'yaw'; there are vy"):
+    with pytest.raises(RobotError, match=r"behavior 'hold heading': no attribute 'yaw'; available: vy"):
         Latch(small_map, (16, 16), ATTRIBUTES[:1], 0.05)
 
 

@@ -116,7 +116,7 @@ def test_a_converted_policy_needs_no_choices(folder: Path) -> None:
     policy = load_policy("agent.safetensors", "ant")
     assert abs(policy.act(np.full(27, 50.0)).action).max() == 1.0
     again = run("convert", "maps/agent.pt", "-o", "agent.safetensors", *flags)
-    assert "agent.safetensors: exists already" in again.output
+    assert "agent.safetensors: already exists" in again.output
 
 
 def test_a_map_that_needs_nothing_stays_as_it_is(folder: Path) -> None:

@@ -38,7 +38,7 @@ def test_a_map_is_read_whole(small_map: StimulationMap, map_text: str) -> None:
         (
             "sway = 4.0",
             "swat = 4.0",
-            r"m\.toml:23: behavior 1: field 'magnitudes': 'swat' is neither .*; there are sway",
+            r"m\.toml:23: behavior 1: field 'magnitudes': 'swat' is neither .*; available: sway",
         ),
         ("period = 0.5", "period = 0", r"m\.toml:31: behavior 2: field 'period': expected more than 0 s"),
         ("period = 0.5", "perod = 0.5", r"m\.toml:31: behavior 2: field 'perod': not a field"),
@@ -102,7 +102,7 @@ def test_own_maps_come_before_shipped_ones(
     listed = {entry.path.stem: entry for entry in list_maps()}
     assert listed["ant"].path == tmp_path / "maps" / "ant.toml"
     assert "not a TOML file" in listed["torn"].problem
-    with pytest.raises(MapError, match="no map 'walrus'; there are a1, ant, anymal, "):
+    with pytest.raises(MapError, match="no map 'walrus'; available: a1, ant, anymal, "):
         find_map("walrus")
 
 

@@ -88,7 +88,7 @@ def evaluate_forest(
     if taken := sorted(set(fit_seeds) & set(seeds)):
         raise PdtuiError(f"seed {taken[0]}: the operator's key models are fitted on that seed")
     if record is not None and (present := sorted(record.glob("*.rrd"))):
-        raise SessionError(f"{present[0]}: exists already; drives are recorded into a new folder")
+        raise SessionError(f"{present[0]}: already exists; drives are recorded into a new folder")
     total, done = len(fit_seeds) + len(configs) * len(seeds), 0
     key_models: dict[str, KeyMotionModel] = {}
     runs: dict[ForestCondition, list[ForestEpisode]] = {}

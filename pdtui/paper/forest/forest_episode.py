@@ -90,10 +90,10 @@ def record_forest_episode(
     """Run `drive_forest_episode` and record it like a person's drive, with a keystroke file beside it.
 
     Raises:
-        SessionError: the session exists already, or cannot be written.
+        SessionError: the session already exists, or cannot be written.
     """
     if path.exists():
-        raise SessionError(f"{path}: exists already; a drive is recorded into a new file")
+        raise SessionError(f"{path}: already exists; a drive is recorded into a new file")
     with SessionRecorder(path, replace(loop.info, activations=activations)) as recorder:
         run, events = drive_forest_episode(loop, steps, operator, recorder)
     write_file(path.with_suffix(".keys"), format_keystrokes(events), SessionError)
@@ -116,12 +116,12 @@ def read_forest_episode(path: Path, robot: str, steps: int) -> tuple[ForestEpiso
         )
     back = next((event.step for event in session.events if event.kind == "rewind"), None)
     if back is not None:
-        raise SessionError(f"{path}: it was rewound at step {back}; a drive that is scored must not be")
+        raise SessionError(f"{path}: it was rewound at step {back}; a scored drive must not be rewound")
     if not session.steps:
         raise SessionError(f"{path}: the session has no steps")
     names = [attribute.name for attribute in info.attributes]
     if "distance" not in names:
-        raise SessionError(f"{path}: expected the attribute 'distance'; there are {', '.join(names)}")
+        raise SessionError(f"{path}: expected the attribute 'distance'; available: {', '.join(names)}")
     distances = session.attributes[:, names.index("distance")]
     ends = [*np.flatnonzero(session.episodes != 0), *(np.flatnonzero(distances >= AHEAD) + 1), steps]
     count = int(min([session.steps, *ends]))

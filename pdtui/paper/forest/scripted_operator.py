@@ -53,7 +53,7 @@ def operator_keys(stimulation_map: StimulationMap) -> dict[str, str]:
         known = ", ".join(behaviors) or "none"
         raise MapError(
             f"{stimulation_map.source}: the operator needs the behaviors {', '.join(NEEDED_BEHAVIORS)}; "
-            f"missing are {', '.join(missing)}, there are {known}"
+            f"missing: {', '.join(missing)}; the map has {known}"
         )
     names = [*NEEDED_BEHAVIORS, *(["forward"] if "forward" in behaviors else [])]
     return {DEFAULT: stimulation_map.default_key} | {name: behaviors[name].key for name in names}

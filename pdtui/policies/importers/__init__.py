@@ -71,7 +71,7 @@ def _read_policy(content: bytes, source: str, import_options: ImportOptions) -> 
             return _from_tensors(flatten_tensors(from_safetensors(content, source)), source)
         case FileKind.PICKLE:
             raise PolicyError(
-                f"{source}: a pickle, which can run anything when it is read, so pdtui reads none; save the "
+                f"{source}: a pickle, which can run any code when it is read, so pdtui refuses it; save the "
                 "tensors alone: torch.save(model.state_dict(), FILE) of PyTorch 1.6 or later, or numpy.savez"
             )
         case other:
@@ -87,7 +87,7 @@ def _from_zip(content: bytes, source: str, import_options: ImportOptions) -> Par
         return _from_tensors(flatten_tensors(from_npz(archive)), source)
     if any(name.endswith("/constants.pkl") for name in names):
         raise PolicyError(
-            f"{source}: TorchScript, which states a computation and is no set of weights; load it as a policy"
+            f"{source}: TorchScript, which is a computation, not a set of weights; load it as a policy"
         )
     if any(name.endswith("/data.pkl") for name in names):
         return _from_tensors(flatten_tensors(from_torch(content, source)), source)

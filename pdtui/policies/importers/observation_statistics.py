@@ -63,7 +63,7 @@ def _read_tensors(path: Path) -> Tensors:
             return flatten_tensors(from_safetensors(content, str(path)))
         case FileKind.PICKLE:
             raise PolicyError(
-                f"{path}: a pickle, which can run anything when it is read, so pdtui reads none. "
+                f"{path}: a pickle, which can run any code when it is read, so pdtui refuses it. "
                 f"{HOW_TO_CONVERT}"
             )
         case _:

@@ -59,9 +59,9 @@ def import_sb3(archive: ZipArchive, import_options: ImportOptions) -> PartialPol
 def _is_normalised(data: dict[str, Any]) -> bool:
     """Whether the model was trained behind VecNormalize, as far as the readable part of the file shows.
 
-    PPO and A2C keep an observation of before the normalisation only there. The off-policy algorithms keep
-    one in any case; it is stored in double precision there and the normalised one is not, so that texts of
-    different length tell. In a world that observes in single precision nothing tells.
+    PPO and A2C keep an unnormalised observation only behind VecNormalize. The off-policy algorithms always
+    keep one; behind VecNormalize it is in double precision and the normalised one is not, so their texts
+    differ in length. If the world observes in single precision, this cannot be detected.
     """
     own, seen = data.get("_last_original_obs"), data.get("_last_obs")
     if not isinstance(own, dict) or "buffer_size" not in data:

@@ -42,7 +42,7 @@ class ZipArchive:
     def read(self, name: str) -> bytes:
         """Unpack one entry, but no more bytes than the archive's directory states."""
         if name not in self._entries:
-            raise PolicyError(f"{self.source}: no entry '{name}'; there are {self.listing()}")
+            raise PolicyError(f"{self.source}: no entry '{name}'; available: {self.listing()}")
         size = self._entries[name].file_size
         try:
             with self._zip.open(name) as stream:

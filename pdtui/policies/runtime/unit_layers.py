@@ -26,7 +26,7 @@ def hidden_modules(module: nn.Module, hidden: Sequence[str] | None, owner: str) 
     for name in hidden:
         if name not in modules:
             known = ", ".join(filter(None, modules))
-            raise PolicyError(f"{owner}: no submodule '{name}'; there are {known}")
+            raise PolicyError(f"{owner}: no submodule '{name}'; available: {known}")
     return {modules[name]: name for name in hidden}
 
 
@@ -43,7 +43,7 @@ def _output_tensor(output: Any) -> torch.Tensor:
     """Return the tensor that the next layer reads: of a recurrent layer, the output h without its state."""
     first = output[0] if isinstance(output, tuple) and output else output
     if not isinstance(first, torch.Tensor):
-        raise PolicyError(f"a hidden submodule puts out {type(first).__name__}, expected a tensor")
+        raise PolicyError(f"a hidden submodule outputs {type(first).__name__}, expected a tensor")
     return first
 
 

@@ -71,7 +71,7 @@ def call_operator(name: str, arguments: list[Any], keywords: dict[str, Any]) -> 
 
 def _call_on_numbers(name: str, arguments: list[Any]) -> Any:
     if name in ("add", "mul") and not all(isinstance(one, int | float) for one in arguments):
-        raise PolicyError(f"uses torch.{name} on other things than numbers and tensors")
+        raise PolicyError(f"uses torch.{name} on something other than numbers and tensors")
     try:
         result = _PLAIN[name](*arguments[: 1 if name in _UNARY else 2])
     except (ArithmeticError, TypeError) as error:

@@ -35,7 +35,7 @@ class ImportOptions:
             ("squash", self.squash, SQUASH_NAMES),
         ):
             if value and value not in names:
-                raise PolicyError(f"unknown {what} '{value}'; there are {', '.join(names)}")
+                raise PolicyError(f"unknown {what} '{value}'; available: {', '.join(names)}")
 
     def or_else(self, others: ImportOptions) -> ImportOptions:
         """Return these options, completed by the others where these are empty."""

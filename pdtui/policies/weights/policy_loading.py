@@ -114,10 +114,10 @@ def convert_policy(
     """Write a policy of another program as a safetensors file, and return the specification that it states.
 
     Raises:
-        PolicyError: As for `load_policy`; or the output exists already or cannot be written.
+        PolicyError: As for `load_policy`; or the output already exists or cannot be written.
     """
     if output.exists():
-        raise PolicyError(f"{output}: exists already; a policy is converted into a new file")
+        raise PolicyError(f"{output}: already exists; a policy is converted into a new file")
     network, _ = load_any_network(path, import_options, spaces)
     if spaces is not None:
         network.spec = replace(network.spec, robot=spaces.owner)
@@ -138,7 +138,7 @@ def load_torchscript_policy(
             which a file that states its whole computation does not need.
     """
     if spaces is None:
-        raise PolicyError(f"{path}: TorchScript says no shapes; expected the robot that it is for")
+        raise PolicyError(f"{path}: TorchScript does not state shapes; expected the policy's robot")
     if import_options != NO_OPTIONS:
         raise PolicyError(f"{path}: TorchScript states its whole computation; expected no import options")
     shape, outputs = spaces.shape or (spaces.observations,), spaces.discrete_actions or spaces.actions

@@ -78,7 +78,7 @@ class NetworkSpec:
             ("rule for the log standard deviation", self.log_std_rule, ("clip", "tanh")),
         ):
             if value not in known:
-                raise PolicyError(f"unknown {what} '{value}'; there are {', '.join(known)}")
+                raise PolicyError(f"unknown {what} '{value}'; available: {', '.join(known)}")
         squashed = self.head in ("squashed_gaussian", "tanh")
         allowed = {0} if self.head == "categorical" else {self.actions} if squashed else {0, self.actions}
         if len(self.action_low) not in allowed or len(self.action_high) != len(self.action_low):

@@ -37,7 +37,7 @@ def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
     if (shipped := WEIGHTS / f"{name}.safetensors").is_file():
         return shipped
     known = ", ".join(sorted(path.stem for path in WEIGHTS.glob("*.safetensors"))) or "none"
-    raise PolicyError(f"no policy '{name}': neither a file nor a shipped policy; shipped are: {known}")
+    raise PolicyError(f"no policy '{name}': neither a file nor a shipped policy; shipped policies: {known}")
 
 
 def is_own_format(path: Path) -> bool:

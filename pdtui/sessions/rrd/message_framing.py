@@ -77,7 +77,7 @@ def read_message_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
             raise _torn_error(place, f"a message of {length} bytes begins there, {left} are left")
         if kind == LAST and frame.end < size:
             extra = size - frame.end
-            raise _torn_error(place, f"the file's end is said to be here, but {extra} bytes follow it")
+            raise _torn_error(place, f"the file should end here, but {extra} bytes follow it")
         yield frame
         place = frame.end
 

@@ -122,7 +122,7 @@ def test_the_operators_drive_is_saved_like_a_persons(
     presses = read_keystrokes(recorded.with_suffix(".keys"), config.stimulation_map)
     drive_headless(loop, presses, 120, SessionRecorder(again, loop.info))
     np.testing.assert_array_equal(read_session(again).digests, session.digests)
-    with pytest.raises(SessionError, match=r"driven\.rrd: exists already"):
+    with pytest.raises(SessionError, match=r"driven\.rrd: already exists"):
         record_forest_episode(loop, 10, build_operator(loop, KEY_MODELS), recorded, "all")
 
 

@@ -184,7 +184,7 @@ def test_a_converted_policy_states_everything(tmp_path: Path, observations: Draw
             before.act(observation, rng=np.random.default_rng(1)).action,
             after.act(observation, rng=np.random.default_rng(1)).action,
         )
-    with pytest.raises(PolicyError, match="exists already"):
+    with pytest.raises(PolicyError, match="already exists"):
         convert_policy(tmp_path / "agent.pt", tmp_path / "agent.safetensors", import_options, BOUNDS)
     with pytest.raises(PolicyError, match="its activation is 'tanh' and cannot be chosen, found 'relu'"):
         load_policy(tmp_path / "agent.safetensors", import_options=ImportOptions("relu"))
