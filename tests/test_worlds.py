@@ -172,7 +172,7 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
     both = run("dissect", "ant", "--env", "Hopper-v5")
     assert "expected either ROBOT or --env ID" in both.output
     unknown = run("dissect", "--env", "Hoper-v5", "--policy", "x")
-    assert unknown.output.startswith("pdtui: unknown robot 'Hoper-v5'; close are Hopper-v5")
+    assert unknown.output.startswith("pdtui: unknown robot 'Hoper-v5'; did you mean Hopper-v5")
     path = write_world("Hopper-v5", tmp_path, name="Walker2d-v5")
     unfit = run("drive", path, "--headless", "--steps", 5)
     assert "shape (17,)" in unfit.output

@@ -169,7 +169,7 @@ def _find_environment(name: str) -> str:
     known = {one.lower(): one for one in [*robots, *gymnasium.registry]}
     close = [known[one] for one in get_close_matches(environment.lower(), known, 4, 0.5)]
     hint = f"did you mean {', '.join(close)}" if close else f"available: {', '.join(sorted(robots))}"
-    raise RobotError(f"unknown robot '{name}'; {hint}, and every environment registered with Gymnasium")
+    raise RobotError(f"unknown robot '{name}'; {hint}, or any environment registered with Gymnasium")
 
 
 def _import_trusted(module: str, name: str) -> None:

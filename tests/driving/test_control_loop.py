@@ -73,7 +73,7 @@ def test_a_rewind_restores_the_state_before_that_step(policy: Policy, small_map:
     first = _drive(loop, 60)
     again = _drive(loop, 20, [Event(60, "rewind", value=30.0)])
     assert [record.digest for record in again] == [record.digest for record in first[30:50]]
-    with pytest.raises(KeystrokeError, match="cannot rewind to step 33; kept is every 10th step of 0..80"):
+    with pytest.raises(KeystrokeError, match="cannot rewind to step 33; kept steps: every 10th of 0..80"):
         loop.advance([Event(80, "rewind", value=33.0)])
 
 

@@ -144,7 +144,7 @@ def test_the_command_compares_maps_and_draws(map_path: Path, tmp_path: Path, vie
         (["evaluate", "MAP", "-o", "f.png"], "-o needs --experiment"),
         (
             ["evaluate", "MAP", "--experiment", "tracking", "--policy-only"],
-            "--target, --policy-only, --update and --experiment exclude each other",
+            "--target, --policy-only, --update and --experiment are mutually exclusive",
         ),
         (["evaluate", "MAP", "--experiment", "commands", "-o", "f.png"], "commands draws no pictures"),
         (["evaluate", "MAP", "--experiment", "forest", "-o", "f.png"], "forest draws no pictures"),
@@ -153,7 +153,7 @@ def test_the_command_compares_maps_and_draws(map_path: Path, tmp_path: Path, vie
             ["evaluate", "MAP", "--experiment", "tracking", "--repeats", "2"],
             "has no option --repeats",
         ),
-        (["evaluate", "MAP", "--update", "--policy-only"], "exclude each other"),
+        (["evaluate", "MAP", "--update", "--policy-only"], "are mutually exclusive"),
         (["evaluate", "MAP", "--experiment", "tracking", "-o", "f.gif"], "f.gif: expected a name that ends"),
         (["tune", "MAP"], "expected either a BEHAVIOR or --all"),
         (["tune", "nowhere", "--all"], "no map 'nowhere'"),

@@ -90,7 +90,7 @@ def test_a_file_is_loaded_by_its_name_for_a_world(conv_file: Path, tmp_path: Pat
     network = _script(nn.Sequential(nn.Linear(1, 4), nn.Tanh(), nn.Linear(4, 3)), tmp_path / "three.pt")
     with pytest.raises(PolicyError, match="expected 1 outputs for 'pole', the network gives 3"):
         load_policy(network, "pole", spaces=WorldSpaces.of_world(Pole()))
-    with pytest.raises(PolicyError, match="TorchScript says no shapes"):
+    with pytest.raises(PolicyError, match="TorchScript does not state shapes"):
         load_policy(network)
 
 

@@ -46,7 +46,7 @@ def install(folder: Path, name: str, value: str, module: str = "") -> None:
 
 
 def test_an_unknown_name_lists_close_ones() -> None:
-    with pytest.raises(RobotError, match="unknown robot 'Hoper-v5'; close are Hopper-v5"):
+    with pytest.raises(RobotError, match="unknown robot 'Hoper-v5'; did you mean Hopper-v5"):
         make_robot("Hoper-v5")
     with pytest.raises(RobotError, match="unknown robot 'qqqqqqqq'; available: a1, a1-vision, ant, anymal, "):
         check_robot("qqqqqqqq")

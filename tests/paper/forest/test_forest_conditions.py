@@ -195,7 +195,7 @@ def test_what_cannot_be_measured_is_named(config: DriveConfig) -> None:
     poorer = DriveConfig(
         "a1", type(config.stimulation_map)(**{**vars(config.stimulation_map), "behaviors": lost}), 0
     )
-    with pytest.raises(MapError, match="missing are left, right, there are stop"):
+    with pytest.raises(MapError, match="missing: left, right; the map has stop"):
         evaluate_forest(poorer, range(5))
 
 

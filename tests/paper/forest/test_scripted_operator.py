@@ -93,7 +93,7 @@ def test_what_it_sees_moves_it_no_sooner_than_its_reaction_time() -> None:
 
 
 def test_it_says_which_behaviors_a_map_lacks(small_map: StimulationMap) -> None:
-    with pytest.raises(MapError, match="missing are left, right, stop, there are push, twitch, hold heading"):
+    with pytest.raises(MapError, match="missing: left, right, stop; the map has push, twitch, hold heading"):
         operator_keys(small_map)
     push = small_map.behaviors["push"]
     names = {"left": "a", "right": "d", "stop": "x", "forward": "u"}

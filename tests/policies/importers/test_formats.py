@@ -242,8 +242,8 @@ class Evil:
 
 FILES: dict[str, tuple[Callable[[], bytes], str]] = {
     "no model": (lambda: zipped(readme_dot_md=b"hello", a__b=b""), r"holds no policy: .* readme\.md, a/b"),
-    "pickle": (lambda: pickle.dumps({"w": Evil()}), r"a pickle, which can run anything.*torch\.save"),
-    "old pickle": (lambda: pickle.dumps({"w": 1}, protocol=0), r"a pickle, which can run anything"),
+    "pickle": (lambda: pickle.dumps({"w": Evil()}), r"a pickle, which can run any code.*torch\.save"),
+    "old pickle": (lambda: pickle.dumps({"w": 1}, protocol=0), r"a pickle, which can run any code"),
     "old torch": (
         lambda: b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19.\x80\x02M\xe9\x03.",
         r"a pickle.*PyTorch 1\.6 or later",
