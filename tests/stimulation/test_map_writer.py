@@ -80,7 +80,9 @@ def test_measuring_again_replaces_only_the_figure(map_text: str) -> None:
 
 
 def test_a_behavior_that_the_map_does_not_have_is_named(map_text: str) -> None:
-    with pytest.raises(MapError, match=r"m\.toml: no behavior 'dance'; available: push, twitch, hold heading"):
+    with pytest.raises(
+        MapError, match=r"m\.toml: no behavior 'dance'; available: push, twitch, hold heading"
+    ):
         replace_effects(map_text, {"dance": FIGURES["push"]}, "m.toml")
 
 
