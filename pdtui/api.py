@@ -15,11 +15,11 @@ from pdtui.core.errors import SessionError
 from pdtui.dissection.dissect import dissect as run_dissection
 from pdtui.dissection.dissection_config import QUICK_DISSECTION, DissectionConfig, DissectionSettings
 from pdtui.dissection.dissection_result import Dissection
+from pdtui.driving.drive_arrays import DriveArrays, collect_drive_arrays
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.keystrokes import read_keystrokes
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.replay import ReplayResult, replay_session
-from pdtui.driving.trajectory import Trajectory, collect_trajectory
 from pdtui.policies.runtime.action_decoders import Decoder
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
@@ -39,9 +39,9 @@ __all__ = [
     "QUICK_DISSECTION",
     "Dissection",
     "DissectionSettings",
+    "DriveArrays",
     "ImportOptions",
     "Policy",
-    "Trajectory",
     "dissect",
     "drive",
     "load_policy",
@@ -174,7 +174,7 @@ def drive(
     start: str = "",
     record: str | Path | None = None,
     force: bool = False,
-) -> Trajectory:
+) -> DriveArrays:
     """Drive without a screen, as fast as the machine allows.
 
     >>> import pdtui
@@ -209,12 +209,12 @@ def drive(
     stimulation_map = resolve_map_policy(stimulation_map, named, import_options)
     config = DriveConfig(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
     with open_robot(robot) as world:
-        loop = build_loop(config, world, None if isinstance(policy, str | Path) else policy)
+        loop = build_control_loop(config, world, None if isinstance(policy, str | Path) else policy)
         presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
         if record is not None and Path(record).exists():
             raise SessionError(f"{record}: already exists; a drive is recorded into a new file")
         recorder = SessionRecorder(Path(record), loop.info) if record is not None else None
-        return collect_trajectory(loop, presses, steps, recorder)
+        return collect_drive_arrays(loop, presses, steps, recorder)
 
 
 def replay(

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _SHOWN = 8  # attributes in the report of a difference
 
 
-class SessionCheck:
+class SessionFixture:
     """Type of the fixture `pdtui_session`.
 
     Args:
@@ -68,7 +68,7 @@ class SessionCheck:
 
 
 @pytest.fixture
-def pdtui_session(request: pytest.FixtureRequest) -> SessionCheck:
+def pdtui_session(request: pytest.FixtureRequest) -> SessionFixture:
     """Repeat a recorded drive, and fail the test at the first step that differs.
 
     The fixture is a function. Its arguments are
@@ -81,7 +81,7 @@ def pdtui_session(request: pytest.FixtureRequest) -> SessionCheck:
 
     It returns the `ReplayResult` of a drive that repeats.
     """
-    return SessionCheck(request.path.parent, request.config.rootpath)
+    return SessionFixture(request.path.parent, request.config.rootpath)
 
 
 def _find(name: str | Path, folders: tuple[Path, ...]) -> Path:

@@ -10,7 +10,7 @@ import pytest
 from pdtui.api import dissect
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.weights.file_search import FOLDERS
+from pdtui.policies.weights.policy_file_lookup import POLICY_FOLDERS_VARIABLE
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -31,7 +31,7 @@ def viewer() -> Iterator[RealViewer]:
 def _weights_anywhere(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Maps and sessions of tests may name weights in any folder of the tests."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(FOLDERS, str(tmp_path_factory.getbasetemp()))
+        patch.setenv(POLICY_FOLDERS_VARIABLE, str(tmp_path_factory.getbasetemp()))
         yield
 
 

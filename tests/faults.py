@@ -19,8 +19,8 @@ from pdtui.core.errors import PdtuiError
 from pdtui.driving.client import DriveClient
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveSnapshot
-from pdtui.driving.headless_drive import key_events
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.headless_drive import make_key_events
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.replay import replay_session
 from pdtui.driving.server import PACED_ROWS_PER_WRITE
 from pdtui.sessions.session_repair import examine_session, repair_session
@@ -93,12 +93,12 @@ def cut_files(folder: Path, map_path: Path, cuts: int, drawn: random.Random) -> 
 
 def _record(path: Path, map_path: Path, *, seed: int, steps: int, drawn: random.Random) -> list[int]:
     """Drive as the screen's process does; the file's size before the first step and after each."""
-    loop = build_loop(DriveConfig("ant", load_map(map_path), seed))
+    loop = build_control_loop(DriveConfig("ant", load_map(map_path), seed))
     recorder = SessionRecorder(path, loop.info, rows_per_write=PACED_ROWS_PER_WRITE)
     sizes = [recorder.bytes]
     for _ in range(steps):
         keys = [drawn.choice(KEYS[:4])] if drawn.random() < 0.1 else []
-        recorder.write(loop.advance(key_events(keys, loop)))
+        recorder.write(loop.advance(make_key_events(keys, loop)))
         sizes.append(recorder.bytes)
     recorder.close("finished")
     return sizes

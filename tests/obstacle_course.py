@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.robot_data import Link, RobotState
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.policies.runtime.action_decoders import decoder_for
+from pdtui.policies.runtime.action_decoders import make_action_decoder
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.robots.robot import Robot
@@ -70,7 +70,7 @@ def course_loop(seed: int = 3) -> ControlLoop:
     """A drive of it, with one behavior on the key w."""
     torch.manual_seed(1)
     network = PolicyNetwork(NetworkSpec("course", 1, (8,), "tanh", 1, "squashed_gaussian", (-1.0,), (1.0,)))
-    policy = Policy(network, 1, decode=decoder_for(network), name="small")
+    policy = Policy(network, 1, decode=make_action_decoder(network), name="small")
     push = Behavior("push", "w", "pushes", {"0:3": 1.0})
     return ControlLoop(
         Course(), policy, StimulationMap("course", "small", "", "space", {}, {"push": push}), seed

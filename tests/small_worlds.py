@@ -18,7 +18,7 @@ from torch import nn
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.robot_data import Link, RobotState
-from pdtui.policies.runtime.action_decoders import categorical
+from pdtui.policies.runtime.action_decoders import decode_categorical_action
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot
 
@@ -211,7 +211,7 @@ def trained_lstm() -> LstmNet:
 
 
 def dot_policy() -> Policy:
-    return Policy(trained_conv(), (2, SIDE, SIDE), decode=categorical, batched=True, name="dot")
+    return Policy(trained_conv(), (2, SIDE, SIDE), decode=decode_categorical_action, batched=True, name="dot")
 
 
 def pole_policy() -> Policy:

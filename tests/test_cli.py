@@ -51,11 +51,11 @@ def test_a_headless_drive_is_recorded_and_replays_in_a_fresh_process(
 def test_a_replay_names_the_first_step_that_differs(map_path: Path, tmp_path: Path) -> None:
     """The same drive with another disturbance: a session whose robot was pushed behind the loop's back."""
     from pdtui.driving.drive_config import DriveConfig
-    from pdtui.driving.loop_builder import build_loop
+    from pdtui.driving.loop_builder import build_control_loop
     from pdtui.sessions.writer.session_recorder import SessionRecorder
     from pdtui.stimulation.map_reader import load_map
 
-    loop = build_loop(DriveConfig("ant", load_map(map_path), 3))
+    loop = build_control_loop(DriveConfig("ant", load_map(map_path), 3))
     session = tmp_path / "pushed.rrd"
     with SessionRecorder(session, loop.info) as recorder:
         for step in range(40):

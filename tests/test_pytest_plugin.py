@@ -14,7 +14,7 @@ import torch
 from pdtui import pytest_plugin
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import drive_headless
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.weights_file import load_network, save_network
 from pdtui.sessions.writer.session_recorder import SessionRecorder
@@ -26,7 +26,7 @@ pytest_plugins = ["pytester"]
 @pytest.fixture
 def suite(pytester: pytest.Pytester, map_path: Path, weights: Path) -> pytest.Pytester:
     """The example of the documentation, pasted, with a session and a policy beside it."""
-    loop = build_loop(DriveConfig("ant", load_map(map_path), 3))
+    loop = build_control_loop(DriveConfig("ant", load_map(map_path), 3))
     session = pytester.path / "sessions" / "walk.rrd"
     drive_headless(loop, {10: ["w"]}, 40, SessionRecorder(session, loop.info))
     (pytester.path / "my_policy.safetensors").write_bytes(weights.read_bytes())

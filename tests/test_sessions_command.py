@@ -16,7 +16,7 @@ from click.testing import CliRunner, Result
 
 from pdtui.cli import main
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.sessions.session_reader import read_activations, read_session
 from pdtui.stimulation.map_library import shipped_folder
 from pdtui.stimulation.map_reader import load_map
@@ -170,7 +170,7 @@ def test_compare_names_the_first_step_and_how_far_it_goes(
 def test_text_from_files_is_harmless(map_path: Path, tmp_path: Path) -> None:
     from pdtui.sessions.writer.session_recorder import SessionRecorder
 
-    loop = build_loop(DriveConfig("ant", load_map(map_path), 3))
+    loop = build_control_loop(DriveConfig("ant", load_map(map_path), 3))
     with SessionRecorder(tmp_path / "evil.rrd", loop.info) as recorder:
         recorder.write(loop.advance())
         recorder.close("\x1b[2J\x1b]0;owned\x07[bold]finished[/bold]")
@@ -192,7 +192,7 @@ def test_the_viewer_is_bound_to_this_machine(folder: Path, tmp_path: Path) -> No
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "no display for the viewer's window" in done.stderr
-    told = viewer_address.viewer_command(folder / "a.rrd", web=True)
+    told = viewer_address.viewer_command_line(folder / "a.rrd", web=True)
     assert told[1:] == [str(folder / "a.rrd"), "--bind", "127.0.0.1", "--serve-web"]
     assert "garbage.rrd: expected a Rerun" in run("sessions", "open", folder / "garbage.rrd").output
 

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from pdtui.cli import main
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.replay import replay_session
 from pdtui.policies.weights.weights_file import find_weights_file, hash_file, load_network
 from pdtui.sessions.session_reader import read_session
@@ -72,7 +72,7 @@ def test_the_weights_say_how_they_were_trained_and_the_map_fits_them(
     shipped = load_map(find_map(robot))
     assert behaviors <= shipped.behaviors.keys()
     shipped.check(robot, spec.layers, hash_file(find_weights_file(robot)))
-    build_loop(DriveConfig(robot, shipped, 0))
+    build_control_loop(DriveConfig(robot, shipped, 0))
 
 
 @pytest.mark.slow

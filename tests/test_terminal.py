@@ -13,7 +13,7 @@ import pexpect
 import pytest
 
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.replay import replay_session
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
@@ -93,7 +93,7 @@ def test_a_drive_in_a_terminal_replays_bit_for_bit(screen: pexpect.spawn[str], s
 
 
 def test_a_session_without_steps_cannot_be_watched(small_map: StimulationMap, session: Path) -> None:
-    with SessionRecorder(session, build_loop(DriveConfig("ant", small_map, 5)).info):
+    with SessionRecorder(session, build_control_loop(DriveConfig("ant", small_map, 5)).info):
         pass
     arguments = ["-m", "pdtui", "replay", str(session), "--watch"]
     child = pexpect.spawn(

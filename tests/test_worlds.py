@@ -13,10 +13,10 @@ import torch
 from click.testing import CliRunner, Result
 
 from pdtui.cli import main
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.policies.weights.policy_network import Head, NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import hash_file, save_network
@@ -99,13 +99,13 @@ def test_a_drive_with_rewind_and_reset_replays_bit_for_bit(robot: str, tmp_path:
 @pytest.mark.parametrize("size", [(80, 24), (160, 48)])
 async def test_the_screen_shows_it(robot: str, size: tuple[int, int], tmp_path: Path) -> None:
     stimulation_map = load_map(write_world(robot, tmp_path))
-    loop = build_loop(DriveConfig(robot, stimulation_map, 3))
+    loop = build_control_loop(DriveConfig(robot, stimulation_map, 3))
     observer = SnapshotBuilder(loop)
     messages: list[Message] = [
         DriveFacts(robot, "small", 3, loop.robot.control_dt, loop.robot.attributes, loop.robot.links, (8, 8))
     ]
     for step in range(40):
-        observer.add_step(loop.advance([Event(39, "behavior", "push", key="w")] if step == 39 else []))
+        observer.add_step(loop.advance([DriveEvent(39, "behavior", "push", key="w")] if step == 39 else []))
         if step % 4 == 3:
             messages.append(
                 observer.build_snapshot(

@@ -5,14 +5,14 @@ from __future__ import annotations
 from rich.console import Group
 from rich.table import Table
 
+from pdtui.benchmarks.control_loop_benchmark import LoopBenchmark
 from pdtui.benchmarks.dissection_benchmark import DissectionBenchmark
-from pdtui.benchmarks.loop_benchmark import LoopBenchmark
 from pdtui.benchmarks.recording_benchmark import MemoryBenchmark, RecordingBenchmark
 from pdtui.benchmarks.screen_benchmark import ScreenBenchmark
 from pdtui.core.text_tables import new_table
 
 
-def loop_table(result: LoopBenchmark) -> Table:
+def loop_benchmark_table(result: LoopBenchmark) -> Table:
     """Return the steps per second of each part, and its share of the bare simulator."""
     table = new_table("Control loop", "part", "steps/s", "share of bare")
     for name in ("bare", "policy", "stimulated", "recorded"):
@@ -25,7 +25,7 @@ def loop_table(result: LoopBenchmark) -> Table:
     return table
 
 
-def dissect_table(result: DissectionBenchmark) -> Group:
+def dissection_benchmark_table(result: DissectionBenchmark) -> Group:
     """Return matching compared with the loop, its growth, and memory and probing."""
     speed = new_table(result.recorded, "preset", "matching", "loop", "speedup", "ranking", "ties")
     for one in result.compared:
@@ -58,7 +58,7 @@ def dissect_table(result: DissectionBenchmark) -> Group:
     return Group(speed, growth, rest)
 
 
-def record_table(result: RecordingBenchmark) -> Table:
+def recording_benchmark_table(result: RecordingBenchmark) -> Table:
     """Return the cost of each way to record at 50 Hz."""
     table = new_table(
         f"Recording at 50 Hz, {result.units} units", "activations", "drive", "share of one core", "MB/min"
@@ -68,7 +68,7 @@ def record_table(result: RecordingBenchmark) -> Table:
     return table
 
 
-def memory_table(result: MemoryBenchmark) -> Table:
+def memory_benchmark_table(result: MemoryBenchmark) -> Table:
     """Return the resident memory after each tenth of a long drive."""
     table = new_table(f"Resident memory, {result.steps} steps", "part", "done", "MB")
     for part, sizes in result.resident.items():
@@ -80,7 +80,7 @@ def memory_table(result: MemoryBenchmark) -> Table:
     return table
 
 
-def screen_table(result: ScreenBenchmark) -> Table:
+def screen_benchmark_table(result: ScreenBenchmark) -> Table:
     """Return how soon the screen appears and what it costs."""
     table = new_table("Screen of 160×48 cells", "measure", "value")
     table.add_row("first frame", f"{result.first_frame:.2f} s")

@@ -14,7 +14,7 @@ from pdtui.benchmarks.matching_benchmark import (
     compare_matching,
     load_librosa,
     measure_matching_memory,
-    measure_seconds,
+    time_call_in_seconds,
 )
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PdtuiError
@@ -22,9 +22,9 @@ from pdtui.core.units import Stimulation
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
 from pdtui.probing.stimulated_rollout import RolloutJob
+from pdtui.spectra.episode_monitor import MonitoredEpisode, monitor_episodes
 from pdtui.spectra.matching import Discrepancies, match_units
-from pdtui.spectra.matching_presets import MatchingPreset, find_preset
-from pdtui.spectra.monitor import MonitoredEpisode, monitor_episodes
+from pdtui.spectra.matching_presets import MatchingPreset, find_matching_preset
 
 Progress = Callable[[int, int, str], None]
 
@@ -122,11 +122,11 @@ def bench_dissection(
         episodes, attributes = record_episodes(one, settings)
         stage(1, "compare with the loop")
         compared = tuple(
-            compare_matching(episodes, attributes, find_preset(name), settings.rounds)
+            compare_matching(episodes, attributes, find_matching_preset(name), settings.rounds)
             for name in ("paper", "authors")
         )
         stage(2, "growth")
-        curves = measure_matching_growth(episodes, attributes, find_preset("paper"), settings)
+        curves = measure_matching_growth(episodes, attributes, find_matching_preset("paper"), settings)
         stage(3, "memory")
         peak, seconds = measure_matching_memory(settings.memory_units, settings.memory_steps, len(attributes))
         stage(4, "probing")
@@ -165,7 +165,7 @@ def measure_probing_rate(one: RolloutPool, two: RolloutPool, settings: Dissectio
 
     def rate(pool: RolloutPool) -> float:
         before = pool.control_steps
-        seconds = measure_seconds(lambda: pool.run(jobs, starts, settings.probe_steps, 0))
+        seconds = time_call_in_seconds(lambda: pool.run(jobs, starts, settings.probe_steps, 0))
         return (pool.control_steps - before) / seconds
 
     return np.array([[rate(one), rate(two)] for _ in range(settings.rounds)])
@@ -228,7 +228,7 @@ def measure_matching_growth(
     for grows, size in full.items():
         sizes = sorted({max(1, round(size * factor)) for factor in settings.factors})
         cases = [sized(*{**full, grows: one}.values()) for one in sizes]
-        rounds = [[measure_seconds(case) for case in cases] for _ in range(settings.rounds)]
+        rounds = [[time_call_in_seconds(case) for case in cases] for _ in range(settings.rounds)]
         times = np.median(rounds, axis=0) * 1e3
         each, fixed = np.polyfit(sizes, times, 1, w=1 / times).tolist()
         line = fixed + each * np.array(sizes)

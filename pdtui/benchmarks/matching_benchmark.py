@@ -14,9 +14,9 @@ from scipy.signal import get_window
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PdtuiError
 from pdtui.core.worker_pool import WorkerProcess
+from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching import Discrepancies, match_units
-from pdtui.spectra.matching_presets import MatchingPreset, find_preset
-from pdtui.spectra.monitor import MonitoredEpisode
+from pdtui.spectra.matching_presets import MatchingPreset, find_matching_preset
 from pdtui.spectra.phase_correlation import correlate_phases
 
 _ROUNDING = 1e-11
@@ -53,8 +53,8 @@ def compare_matching(
     reference = match_by_loop(episodes, attributes, preset)
     ours, loops = [], []
     for _ in range(rounds):
-        ours.append(measure_seconds(lambda: match_units(episodes, attributes, preset)))
-        loops.append(measure_seconds(lambda: match_by_loop(episodes, attributes, preset)))
+        ours.append(time_call_in_seconds(lambda: match_units(episodes, attributes, preset)))
+        loops.append(time_call_in_seconds(lambda: match_by_loop(episodes, attributes, preset)))
     same, ties = same_ranking(found, reference)
     return MatchingComparison(
         preset=preset.name,
@@ -82,7 +82,7 @@ def same_ranking(found: Discrepancies, reference: Floats) -> tuple[bool, int]:
     return same, ties
 
 
-def measure_seconds(work: Callable[[], object]) -> float:
+def time_call_in_seconds(work: Callable[[], object]) -> float:
     start = time.perf_counter()
     work()
     return time.perf_counter() - start
@@ -160,7 +160,7 @@ def _match_many(_: object, units: int, steps: int, attributes: int) -> tuple[flo
         np.tanh(level, out=row)
     episode = MonitoredEpisode(0, activations, rng.standard_normal((steps, attributes)).cumsum(axis=0))
     known = tuple(Attribute(str(column), "", scale=0.1) for column in range(attributes))
-    preset = find_preset("paper")
+    preset = find_matching_preset("paper")
     start = time.perf_counter()
     match_units([episode], known, preset)
     correlate_phases([episode], known, preset)

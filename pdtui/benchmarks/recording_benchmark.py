@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pdtui.core.errors import ScreenError
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.core.step_record import StepRecord
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.replay import replay_session
 from pdtui.driving.server import PACED_ROWS_PER_WRITE
 from pdtui.sessions.drive_info import DriveInfo
@@ -82,7 +82,7 @@ def bench_record(
     Raises:
         PdtuiError: the robot, policy or map cannot be loaded.
     """
-    loop = build_loop(config)
+    loop = build_control_loop(config)
     drives = {"nothing is pressed": _driven(loop, config.seed, steps, ())}
     if loop.map.behaviors:
         drives["behaviors in turn"] = _driven(loop, config.seed, steps, tuple(loop.map.behaviors))
@@ -101,12 +101,12 @@ def _driven(loop: ControlLoop, seed: int, steps: int, behaviors: Sequence[str]) 
     return [fresh.advance(_pressed(step, behaviors)) for step in range(steps)]
 
 
-def _pressed(step: int, behaviors: Sequence[str]) -> list[Event]:
+def _pressed(step: int, behaviors: Sequence[str]) -> list[DriveEvent]:
     turn, within = divmod(step, _PRESS_EVERY)
     if behaviors and within == 0:
-        return [Event(step, "behavior", behaviors[turn % len(behaviors)], key="x")]
+        return [DriveEvent(step, "behavior", behaviors[turn % len(behaviors)], key="x")]
     if behaviors and within == _HELD:
-        return [Event(step, "default", key="x")]
+        return [DriveEvent(step, "default", key="x")]
     return []
 
 
@@ -144,7 +144,7 @@ def bench_memory(config: DriveConfig, *, steps: int, progress: StepProgress | No
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "long.rrd"
         start = time.perf_counter()
-        loop = build_loop(config)
+        loop = build_control_loop(config)
         names = tuple(loop.map.behaviors)
         with SessionRecorder(path, replace(loop.info, activations=config.activations)) as recorder:
             for step in range(steps):

@@ -8,43 +8,43 @@ from typing import Any
 import click
 
 from pdtui.cli.shared_options import (
-    drive_config,
+    build_drive_config,
     integer_option,
     json_option,
     map_option,
     own_policy_option,
+    print_result,
     progress_bar,
     record_activations_option,
-    show_result,
 )
 from pdtui.sessions.session_schema import ActivationsKept
 
 
 @click.group()
-def bench() -> None:
+def bench_command() -> None:
     """Measure speed and memory.
 
     The variants are measured in turn within one run: compare ratios, not figures from different runs.
     """
 
 
-@bench.command("loop")
+@bench_command.command("loop")
 @click.argument("robot")
 @map_option
 @integer_option("--steps", least=100, default=5000, help="Number of control steps per round.")
 @json_option
 def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bool) -> None:
     """Measure control steps per second: bare, with policy, stimulated, recorded."""
-    from pdtui.benchmarks.benchmark_tables import loop_table
-    from pdtui.benchmarks.loop_benchmark import bench_loop
+    from pdtui.benchmarks.benchmark_tables import loop_benchmark_table
+    from pdtui.benchmarks.control_loop_benchmark import bench_loop
 
-    config = drive_config(robot, map_name, "")
+    config = build_drive_config(robot, map_name, "")
     with progress_bar("measuring", quiet=as_json) as advance:
         result = bench_loop(config, steps=steps, progress=advance)
-    show_result(asdict(result), as_json, lambda: loop_table(result))
+    print_result(asdict(result), as_json, lambda: loop_benchmark_table(result))
 
 
-@bench.command("dissect")
+@bench_command.command("dissect")
 @click.argument("robot", default="ant")
 @own_policy_option
 @integer_option("--episodes", most=100, default=5, help="Number of episodes to record.")
@@ -59,31 +59,31 @@ def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bo
 @json_option
 def bench_dissect_command(robot: str, policy: str, as_json: bool, **sizes: Any) -> None:
     """Measure matching against a loop over librosa, and probing on two workers."""
-    from pdtui.benchmarks.benchmark_tables import dissect_table
+    from pdtui.benchmarks.benchmark_tables import dissection_benchmark_table
     from pdtui.benchmarks.dissection_benchmark import DissectionBenchmarkSettings, bench_dissection
 
     with progress_bar("measuring", quiet=as_json) as advance:
         result = bench_dissection(robot, policy or robot, DissectionBenchmarkSettings(**sizes), advance)
-    show_result(asdict(result), as_json, lambda: dissect_table(result))
+    print_result(asdict(result), as_json, lambda: dissection_benchmark_table(result))
 
 
-@bench.command("record")
+@bench_command.command("record")
 @click.argument("robot")
 @map_option
 @integer_option("--steps", least=100, default=6000, help="Number of control steps per drive.")
 @json_option
 def bench_record_command(robot: str, map_name: str | None, steps: int, as_json: bool) -> None:
     """Measure the CPU time and disk space of recording at 50 Hz."""
-    from pdtui.benchmarks.benchmark_tables import record_table
+    from pdtui.benchmarks.benchmark_tables import recording_benchmark_table
     from pdtui.benchmarks.recording_benchmark import bench_record
 
-    config = drive_config(robot, map_name, "")
+    config = build_drive_config(robot, map_name, "")
     with progress_bar("measuring", quiet=as_json) as advance:
         result = bench_record(config, steps=steps, progress=advance)
-    show_result(asdict(result), as_json, lambda: record_table(result))
+    print_result(asdict(result), as_json, lambda: recording_benchmark_table(result))
 
 
-@bench.command("memory")
+@bench_command.command("memory")
 @click.argument("robot")
 @map_option
 @integer_option(
@@ -98,16 +98,16 @@ def bench_memory_command(
     robot: str, map_name: str | None, steps: int, activations: ActivationsKept, as_json: bool
 ) -> None:
     """Measure memory while a long drive is recorded and replayed."""
-    from pdtui.benchmarks.benchmark_tables import memory_table
+    from pdtui.benchmarks.benchmark_tables import memory_benchmark_table
     from pdtui.benchmarks.recording_benchmark import bench_memory
 
-    config = drive_config(robot, map_name, "", activations=activations)
+    config = build_drive_config(robot, map_name, "", activations=activations)
     with progress_bar("driving", quiet=as_json) as advance:
         result = bench_memory(config, steps=steps, progress=advance)
-    show_result(asdict(result), as_json, lambda: memory_table(result))
+    print_result(asdict(result), as_json, lambda: memory_benchmark_table(result))
 
 
-@bench.command("screen")
+@bench_command.command("screen")
 @click.argument("robot")
 @map_option
 @click.option(
@@ -121,10 +121,10 @@ def bench_memory_command(
 @json_option
 def bench_screen_command(robot: str, map_name: str | None, seconds: float, as_json: bool) -> None:
     """Measure the time to the first frame and the screen's CPU time."""
-    from pdtui.benchmarks.benchmark_tables import screen_table
+    from pdtui.benchmarks.benchmark_tables import screen_benchmark_table
     from pdtui.benchmarks.screen_benchmark import bench_screen
 
-    drive_config(robot, map_name, "")  # an error shows before the screen starts
+    build_drive_config(robot, map_name, "")  # an error shows before the screen starts
     arguments = [robot, "--no-record", *(["--map", map_name] if map_name else [])]
     result = bench_screen(arguments, seconds)
-    show_result(asdict(result), as_json, lambda: screen_table(result))
+    print_result(asdict(result), as_json, lambda: screen_benchmark_table(result))

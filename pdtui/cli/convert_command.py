@@ -21,7 +21,7 @@ from pdtui.policies.weights.import_options import ImportOptions, WorldSpaces
     help="Robot that the policy drives; it gives the bounds of actions if FILE lacks them.",
 )
 @import_option_flags
-def convert(file: Path, output: Path, robot: str | None, import_options: ImportOptions) -> None:
+def convert_command(file: Path, output: Path, robot: str | None, import_options: ImportOptions) -> None:
     """Convert a policy FILE of another program into a safetensors file that needs no further options."""
     from pdtui.policies.weights.policy_loading import convert_policy
     from pdtui.robots import open_robot, trust_module

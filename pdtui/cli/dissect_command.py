@@ -16,9 +16,9 @@ from pdtui.cli.shared_options import (
     overwrite_option,
     own_policy_option,
     preset_option,
+    print_result,
     progress_bar,
     search_seed_option,
-    show_result,
     workers_option,
 )
 
@@ -72,7 +72,7 @@ from pdtui.cli.shared_options import (
 @minutes_option("--budget", note=" Every unit is screened even if that takes longer.")
 @workers_option
 @json_option
-def dissect(
+def dissect_command(
     robot: str | None,
     env: str | None,
     policy: str,
@@ -92,14 +92,14 @@ def dissect(
     from pdtui.dissection.dissect_into_map import dissect_into_map
     from pdtui.dissection.dissection_config import QUICK_DISSECTION, DissectionConfig, DissectionSettings
     from pdtui.pictures.dissection_report import PictureOutputs
-    from pdtui.robots import check_robot, file_stem, trust_module
+    from pdtui.robots import resolve_robot_name, robot_file_stem, trust_module
 
     if (robot is None) == (env is None):
         raise click.UsageError("expected either ROBOT or --env ID")
     name = str(robot or env)
     trust_module(name)
-    check_robot(name)
-    output = output or Path("maps") / f"{file_stem(name)}-dissected.toml"
+    resolve_robot_name(name)
+    output = output or Path("maps") / f"{robot_file_stem(name)}-dissected.toml"
     outputs = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite)
     outputs.check()
     with progress_bar("dissecting", quiet=as_json) as advance:
@@ -117,6 +117,6 @@ def dissect(
             **settings,
         )
         result = dissect_into_map(config, output, overwrite=overwrite, draw=outputs.draw)
-    show_result(result.as_dict(), as_json, result.table)
+    print_result(result.as_dict(), as_json, result.table)
     if not as_json:
         click.echo(f"wrote {', '.join(map(str, result.pictures))}")

@@ -12,7 +12,7 @@ import click
 
 from pdtui.cli.shared_options import (
     FILE_PATH,
-    drive_config,
+    build_drive_config,
     force_option,
     import_option_flags,
     integer_option,
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     help="Keystroke file to drive from with --headless; each line is 'STEP KEY'.",
 )
 @integer_option("--steps", default=1000, help="Number of control steps to drive with --headless.")
-def drive(
+def drive_command(
     robot: str,
     map_name: str | None,
     policy: str,
@@ -77,7 +77,7 @@ def drive(
     **options: Any,
 ) -> None:
     """Drive ROBOT with the keys of its map. ROBOT may also be a map file."""
-    config = drive_config(robot, map_name, policy, import_options, without_map=True, **options)
+    config = build_drive_config(robot, map_name, policy, import_options, without_map=True, **options)
     if record is not None and record.exists():
         raise SessionError(f"{record}: already exists; a drive is recorded into a new file")
     if keys is not None and not headless:
@@ -94,20 +94,20 @@ def drive(
 
 
 def _new_session(config: DriveConfig) -> Path:
-    from pdtui.robots import file_stem
+    from pdtui.robots import robot_file_stem
 
-    name = f"{file_stem(config.robot)}-{datetime.now():%Y%m%d-%H%M%S}-seed{config.seed}.rrd"
+    name = f"{robot_file_stem(config.robot)}-{datetime.now():%Y%m%d-%H%M%S}-seed{config.seed}.rrd"
     return Path("sessions") / name
 
 
 def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, record: Path | None) -> None:
     from pdtui.driving.headless_drive import catch_ending_signals, drive_headless
     from pdtui.driving.keystrokes import read_keystrokes
-    from pdtui.driving.loop_builder import build_loop
+    from pdtui.driving.loop_builder import build_control_loop
     from pdtui.sessions.writer.session_recorder import SessionRecorder
 
     presses = read_keystrokes(keys, config.stimulation_map) if keys is not None else {}
-    loop = build_loop(config)
+    loop = build_control_loop(config)
     info, viewer = replace(loop.info, activations=config.activations), config.viewer
     if viewer is not None and not viewer.is_listening:
         click.echo(viewer.absence_message, err=True)
@@ -152,7 +152,7 @@ def pick_and_drive() -> None:
 
     chosen = MapPickerApp(map_picker_rows(list_maps())).run()
     if chosen is not None:
-        config = drive_config(str(chosen), None, "")
+        config = build_drive_config(str(chosen), None, "")
         show_drive(replace(config, recording=str(_new_session(config))))
 
 

@@ -12,15 +12,15 @@ import click
 from pdtui.cli.shared_options import (
     FILE_PATH,
     SeedList,
-    drive_config,
+    build_drive_config,
     force_option,
     import_option_flags,
     json_option,
     map_option,
     map_policy_option,
     overwrite_option,
+    print_result,
     progress_bar,
-    show_result,
     start_option,
     workers_option,
 )
@@ -93,7 +93,7 @@ def experiment_options(command: click.Command) -> click.Command:
 @overwrite_option
 @workers_option
 @json_option
-def evaluate(
+def evaluate_command(
     robot: str,
     others: tuple[str, ...],
     map_name: str | None,
@@ -131,9 +131,9 @@ def evaluate(
         raise click.UsageError(f"{_flag(own_options)} needs --experiment")
     if experiment is not None:
         _check_experiment(EXPERIMENTS.get(experiment), others, pictures, own_options)
-    config = drive_config(robot, map_name, policy, import_options, force=force, start=start)
+    config = build_drive_config(robot, map_name, policy, import_options, force=force, start=start)
     if experiment is not None:
-        rest = [drive_config(other, None, "", import_options, force=force) for other in others]
+        rest = [build_drive_config(other, None, "", import_options, force=force) for other in others]
         _run_experiment(
             experiment,
             as_json,
@@ -146,33 +146,33 @@ def evaluate(
         )
     elif target is not None:
         from pdtui.evaluation.evaluation_tables import tracking_table
-        from pdtui.evaluation.target_tracking import evaluate_tracking
+        from pdtui.evaluation.target_tracking import evaluate_target_tracking
 
         with progress_bar("holding targets", quiet=as_json) as advance:
-            tracking = evaluate_tracking(config, target, seeds, workers=workers, progress=advance)
-        show_result(asdict(tracking), as_json, lambda: tracking_table(tracking))
+            tracking = evaluate_target_tracking(config, target, seeds, workers=workers, progress=advance)
+        print_result(asdict(tracking), as_json, lambda: tracking_table(tracking))
     elif policy_only:
-        from pdtui.evaluation.evaluation_tables import policy_table
+        from pdtui.evaluation.evaluation_tables import policy_evaluation_table
         from pdtui.evaluation.policy_evaluation import evaluate_policy
 
         with progress_bar("evaluating", quiet=as_json) as advance:
             alone = evaluate_policy(config, seeds, progress=advance)
-        show_result(asdict(alone), as_json, lambda: policy_table(alone))
+        print_result(asdict(alone), as_json, lambda: policy_evaluation_table(alone))
     else:
         _evaluate_behaviors(config, seeds, workers, update, as_json)
 
 
 def _evaluate_behaviors(config: DriveConfig, seeds: range, workers: int, update: bool, as_json: bool) -> None:
-    from pdtui.evaluation.behavior_evaluation import evaluate_map
+    from pdtui.evaluation.behavior_evaluation import evaluate_behaviors
     from pdtui.evaluation.evaluation_tables import behavior_tables
     from pdtui.stimulation.map_writer import replace_effects, rewrite_map
 
     with progress_bar("evaluating", quiet=as_json) as advance:
-        result = evaluate_map(config, seeds, workers=workers, progress=advance)
+        result = evaluate_behaviors(config, seeds, workers=workers, progress=advance)
     if update:
         path = Path(config.stimulation_map.source)
         rewrite_map(path, lambda text: replace_effects(text, result.measured_effects(), str(path)))
-    show_result(asdict(result), as_json, lambda: behavior_tables(result))
+    print_result(asdict(result), as_json, lambda: behavior_tables(result))
 
 
 def _check_experiment(
@@ -203,6 +203,6 @@ def _run_experiment(name: str, as_json: bool, **request: Any) -> None:
     experiment = EXPERIMENTS[name]
     with progress_bar(experiment.progress_label, quiet=as_json) as advance:
         report = experiment.run(ExperimentRequest(**request, progress=advance))
-    show_result(report.data, as_json, lambda: report.table)
+    print_result(report.data, as_json, lambda: report.table)
     if report.pictures and not as_json:
         click.echo(f"wrote {', '.join(map(str, report.pictures))}")

@@ -20,11 +20,11 @@ from pdtui.core.printable_text import make_printable
 
 
 @click.group()
-def figure() -> None:
+def figure_command() -> None:
     """Draw figures as PNG files."""
 
 
-@figure.command("episode")
+@figure_command.command("episode")
 @click.argument("robot")
 @own_policy_option
 @import_option_flags
@@ -59,19 +59,19 @@ def figure() -> None:
 )
 @click.option("-o", "--output", type=FILE_PATH, required=True, metavar="FILE.png", help="File to write.")
 @overwrite_option
-def episode(
+def episode_command(
     robot: str, policy: str, start: float, seconds: float, output: Path, overwrite: bool, **selection: Any
 ) -> None:
     """Draw attributes and their matching units over one episode.
 
     As in figure 2 of the paper. ROBOT is a robot's name or the ID of a Gymnasium environment.
     """
-    from pdtui.pictures.matplotlib_page import check_figure
-    from pdtui.robots import check_robot, trust_module
+    from pdtui.pictures.matplotlib_page import check_figure_path
+    from pdtui.robots import resolve_robot_name, trust_module
 
     trust_module(robot)
-    check_robot(robot)
-    check_figure(output, overwrite)
+    resolve_robot_name(robot)
+    check_figure_path(output, overwrite)
     from pdtui.pictures.unit_attribute_pairs import draw_unit_attribute_pairs, pair_units_with_attributes
 
     with progress_bar("rolling out") as advance:

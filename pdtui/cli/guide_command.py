@@ -10,12 +10,12 @@ import click
 @click.command()
 @click.argument("topic", default="index")
 @click.option("--list", "list_topics", is_flag=True, help="List the topics and exit.")
-def guide(topic: str, list_topics: bool) -> None:
+def guide_command(topic: str, list_topics: bool) -> None:
     """Read the guide, starting with TOPIC.
 
     In a terminal, links can be followed and all pages searched. Piped, the page is printed as Markdown.
     """
-    from pdtui.guide.guide_pages import find_page, read_guide
+    from pdtui.guide.guide_pages import find_guide_page, read_guide
 
     pages = read_guide()
     if list_topics:
@@ -23,7 +23,7 @@ def guide(topic: str, list_topics: bool) -> None:
         for name, page in pages.items():
             click.echo(f"{name:<{width}}  {page.title}")
         return
-    page = find_page(pages, topic)
+    page = find_guide_page(pages, topic)
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         click.echo(page.text, nl=False)
         return

@@ -13,9 +13,9 @@ from pdtui.cli.shared_options import (
     json_option,
     minutes_option,
     own_policy_option,
+    print_result,
     progress_bar,
     search_seed_option,
-    show_result,
     workers_option,
 )
 
@@ -37,7 +37,7 @@ from pdtui.cli.shared_options import (
 )
 @workers_option
 @json_option
-def pursue(
+def pursue_command(
     robot: str, task: str, policy: str, quick: bool, output: Path | None, as_json: bool, **search: Any
 ) -> None:
     """Search for a stimulation that makes ROBOT accomplish TASK, and write it into a map.
@@ -45,7 +45,7 @@ def pursue(
     For example, `pdtui pursue walker hop`.
     """
     from pdtui.dissection.search_task_into_map import search_task_into_map
-    from pdtui.robots import file_stem
+    from pdtui.robots import robot_file_stem
     from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearchSettings
 
     with progress_bar("pursuing", quiet=as_json) as advance:
@@ -53,9 +53,9 @@ def pursue(
             robot,
             task,
             policy or robot,
-            output or Path("maps") / f"{file_stem(robot)}-dissected.toml",
+            output or Path("maps") / f"{robot_file_stem(robot)}-dissected.toml",
             settings=QUICK_TASK_SEARCH if quick else TaskSearchSettings(),
             progress=advance,
             **search,
         )
-    show_result(found.as_dict(), as_json, found.text)
+    print_result(found.as_dict(), as_json, found.text)

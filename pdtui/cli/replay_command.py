@@ -42,12 +42,12 @@ def replay_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.argument("session", type=FILE_PATH)
 @click.option("--watch", is_flag=True, help="Show the replay on the screen, at the pace of the drive.")
 @replay_options
-def replay(session: Path, watch: bool, options: dict[str, Any]) -> None:
+def replay_command(session: Path, watch: bool, options: dict[str, Any]) -> None:
     """Run SESSION again and compare every step.
 
     Exit codes: 0 if the drive repeats; 1 if it does not, or cannot be replayed.
     """
-    from pdtui.driving.replay import replay_config, replay_session
+    from pdtui.driving.replay import config_from_session, replay_session
 
     if watch:
         from pdtui.sessions.session_reader import read_session
@@ -55,7 +55,7 @@ def replay(session: Path, watch: bool, options: dict[str, Any]) -> None:
         recorded = read_session(session)
         if recorded.steps == 0:
             raise SessionError(f"{session}: no control step is recorded, so there is nothing to watch")
-        show_drive(replay_config(recorded, str(session), options["policy"]), watching=True)
+        show_drive(config_from_session(recorded, str(session), options["policy"]), watching=True)
         return
     with progress_bar("replaying") as advance:
         result = replay_session(session, progress=advance, **options)

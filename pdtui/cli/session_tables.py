@@ -13,7 +13,7 @@ from rich.text import Text
 
 from pdtui.core.events import describe_event
 from pdtui.core.printable_text import make_printable
-from pdtui.core.text_tables import list_facts, new_table
+from pdtui.core.text_tables import new_facts_table, new_table
 from pdtui.sessions.session_comparison import AttributeDeviation, SessionComparison
 from pdtui.sessions.session_reader import Session
 from pdtui.sessions.session_summary import SessionSummary
@@ -29,7 +29,7 @@ def _cell(text: object, style: str = "") -> Text:
     return Text(make_printable(str(text)), style)
 
 
-def list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
+def session_list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
     """Return one row per file; that of a broken file says what is wrong."""
     table = new_table(
         "", "session", "robot", "length", "keys", "size", "outcome", left=("session", "robot", "outcome")
@@ -50,7 +50,7 @@ def list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
     return table
 
 
-def show_table(session: Session, summary: SessionSummary) -> Any:
+def session_table(session: Session, summary: SessionSummary) -> Any:
     """Return everything about a session: facts, figures, attributes, episodes and events."""
     info = session.info
     facts = [
@@ -78,8 +78,8 @@ def show_table(session: Session, summary: SessionSummary) -> Any:
     for row in summary.attributes:
         attributes.add_row(_cell(row.attribute), f"{row.mean:.3f}", f"{row.std:.3f}", _cell(row.unit))
     parts: list[Any] = [
-        list_facts((make_printable(name), _cell(value)) for name, value in facts),
-        list_facts(figures),
+        new_facts_table((make_printable(name), _cell(value)) for name, value in facts),
+        new_facts_table(figures),
         attributes,
         *_episodes(summary),
         _happened(session),
@@ -117,7 +117,7 @@ def _happened(session: Session) -> Table:
     return table
 
 
-def deviation_table(deviations: Sequence[AttributeDeviation]) -> Table:
+def attribute_deviation_table(deviations: Sequence[AttributeDeviation]) -> Table:
     """Return one row per attribute that differs."""
     table = new_table("", "attribute", "first", "mean", "largest", "step", "unit", left=("attribute", "unit"))
     for row in deviations:
@@ -132,13 +132,13 @@ def deviation_table(deviations: Sequence[AttributeDeviation]) -> Table:
     return table
 
 
-def compare_table(result: SessionComparison) -> Any:
+def session_comparison_table(result: SessionComparison) -> Any:
     """Return the first step that differs, and how far the attributes are apart from there on."""
     parts: list[Any] = [_cell(_compare_line(result))]
     if result.first_event:
         parts.append(_cell(result.first_event))
     if result.deviations:
-        parts += ["", deviation_table(result.deviations)]
+        parts += ["", attribute_deviation_table(result.deviations)]
     if result.circumstances:
         parts += ["", *(_cell(line, "dim") for line in result.circumstances)]
     return Group(*parts)

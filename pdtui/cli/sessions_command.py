@@ -15,8 +15,8 @@ from pdtui.cli.shared_options import (
     FILE_PATH,
     json_option,
     overwrite_option,
+    print_result,
     progress_bar,
-    show_result,
 )
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PdtuiError, SessionError
@@ -28,11 +28,11 @@ _file_argument = click.argument("file", type=FILE_PATH)
 
 
 @click.group()
-def sessions() -> None:
+def sessions_command() -> None:
     """List, inspect, verify, repair, export, compare and open sessions."""
 
 
-@sessions.command("list")
+@sessions_command.command("list")
 @click.argument("folder", type=FILE_PATH, default="sessions")
 @json_option
 def list_command(folder: Path, as_json: bool) -> None:
@@ -45,7 +45,7 @@ def list_command(folder: Path, as_json: bool) -> None:
     if not rows and not as_json:
         click.echo(f"no sessions under {make_printable(str(folder))}")
         return
-    show_result({"sessions": rows}, as_json, lambda: session_tables.list_table(rows, folder))
+    print_result({"sessions": rows}, as_json, lambda: session_tables.session_list_table(rows, folder))
 
 
 def _list_row(path: Path) -> dict[str, Any]:
@@ -66,10 +66,10 @@ def _list_row(path: Path) -> dict[str, Any]:
     }
 
 
-@sessions.command()
+@sessions_command.command()
 @_file_argument
 @json_option
-def show(file: Path, as_json: bool) -> None:
+def show_command(file: Path, as_json: bool) -> None:
     """Show robot, policy, keys, attributes and outcome of FILE."""
     from pdtui.cli import session_tables
     from pdtui.sessions.session_reader import read_session
@@ -95,14 +95,14 @@ def show(file: Path, as_json: bool) -> None:
         "events": [asdict(event) for event in session.events],
         "endings": session.endings,
     }
-    show_result(data, as_json, lambda: session_tables.show_table(session, summary))
+    print_result(data, as_json, lambda: session_tables.session_table(session, summary))
 
 
-@sessions.command()
+@sessions_command.command()
 @click.argument("files", type=FILE_PATH, nargs=-1, required=True)
 @replay_options
 @json_option
-def verify(files: tuple[Path, ...], options: dict[str, Any], as_json: bool) -> None:
+def verify_command(files: tuple[Path, ...], options: dict[str, Any], as_json: bool) -> None:
     """Check that FILES are whole and that their drives repeat.
 
     Exit codes: 0 if all pass; 1 if a file is broken, incomplete or cannot be replayed; 3 if a drive does not
@@ -140,13 +140,13 @@ def _verify_file(file: Path, options: dict[str, Any], as_json: bool) -> dict[str
     return row
 
 
-@sessions.command()
+@sessions_command.command()
 @_file_argument
 @click.option(
     "-o", "--output", type=FILE_PATH, metavar="FILE.rrd", help="New file; default: FILE.repaired.rrd."
 )
 @click.option("--in-place", is_flag=True, help="Replace FILE itself.")
-def repair(file: Path, output: Path | None, in_place: bool) -> None:
+def repair_command(file: Path, output: Path | None, in_place: bool) -> None:
     """Cut off the damaged end of FILE, so that the rest can be opened and replayed."""
     from pdtui.sessions.session_repair import examine_session, repair_session
 
@@ -163,7 +163,7 @@ def repair(file: Path, output: Path | None, in_place: bool) -> None:
     click.echo(make_printable(f"wrote {target}: {length}, outcome '{repaired.outcome}'"))
 
 
-@sessions.command()
+@sessions_command.command()
 @_file_argument
 @click.option(
     "--stream",
@@ -175,7 +175,9 @@ def repair(file: Path, output: Path | None, in_place: bool) -> None:
 )
 @click.option("--keys", type=FILE_PATH, metavar="FILE", help="Text file to write the keystrokes into.")
 @overwrite_option
-def export(file: Path, stream: str | None, output: Path | None, keys: Path | None, overwrite: bool) -> None:
+def export_command(
+    file: Path, stream: str | None, output: Path | None, keys: Path | None, overwrite: bool
+) -> None:
     """Export a stream of FILE as a table, or its keystrokes as text.
 
     `pdtui drive --headless --keys` reads the keystrokes.
@@ -207,11 +209,11 @@ def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
     click.echo(make_printable(f"wrote {output}: {header.keys} keys of {header.steps} steps{note}"))
 
 
-@sessions.command()
+@sessions_command.command()
 @click.argument("a", type=FILE_PATH)
 @click.argument("b", type=FILE_PATH)
 @json_option
-def compare(a: Path, b: Path, as_json: bool) -> None:
+def compare_command(a: Path, b: Path, as_json: bool) -> None:
     """Compare sessions A and B step by step.
 
     Exit codes: 0 if they are identical; 3 if they differ.
@@ -221,22 +223,22 @@ def compare(a: Path, b: Path, as_json: bool) -> None:
     from pdtui.sessions.session_reader import read_session
 
     result = compare_sessions(read_session(a), read_session(b))
-    show_result(asdict(result), as_json, lambda: session_tables.compare_table(result))
+    print_result(asdict(result), as_json, lambda: session_tables.session_comparison_table(result))
     if result.first_difference is not None or result.lengths[0] != result.lengths[1]:
         sys.exit(DIFFERS)
 
 
-@sessions.command("open")
+@sessions_command.command("open")
 @_file_argument
 @click.option("--web", is_flag=True, help="Open it in the browser instead of the viewer's own window.")
 def open_command(file: Path, web: bool) -> None:
     """Open FILE in the Rerun viewer, which listens on 127.0.0.1 only."""
     from pdtui.sessions.session_header import read_session_header
-    from pdtui.sessions.viewer.viewer_address import viewer_command
+    from pdtui.sessions.viewer.viewer_address import viewer_command_line
 
     read_session_header(file)  # for a file that is no session, the viewer would show an empty window
     try:
-        code = subprocess.run(viewer_command(file, web=web), check=False).returncode
+        code = subprocess.run(viewer_command_line(file, web=web), check=False).returncode
     except OSError as error:
         raise SessionError(f"the viewer cannot be started: {error}") from error
     if code:

@@ -142,7 +142,7 @@ def import_option_flags(command: Callable[..., Any]) -> Callable[..., Any]:
     return with_import_options
 
 
-def drive_config(
+def build_drive_config(
     robot: str,
     map_name: str | None,
     policy: str,
@@ -164,32 +164,34 @@ def drive_config(
         options: further fields of `DriveConfig`.
     """
     from pdtui.driving.drive_config import DriveConfig
-    from pdtui.robots import check_robot, file_stem, trust_module
-    from pdtui.stimulation.map_library import bare_map, find_map
+    from pdtui.robots import resolve_robot_name, robot_file_stem, trust_module
+    from pdtui.stimulation.map_library import find_map, map_without_behaviors
     from pdtui.stimulation.map_policy_lookup import resolve_map_policy
     from pdtui.stimulation.map_reader import load_map
 
     if map_name is None and robot.endswith(".toml"):
         stimulation_map = load_map(find_map(robot))
-        robot = check_robot(stimulation_map.robot)
+        robot = resolve_robot_name(stimulation_map.robot)
     else:
         # Typed by the user, unlike the name inside a map.
         trust_module(robot)
-        check_robot(robot)
+        resolve_robot_name(robot)
         try:
-            path = find_map(map_name or file_stem(robot))
+            path = find_map(map_name or robot_file_stem(robot))
         except MapError as error:
             if map_name is not None or not (without_map and policy):
                 raise
             click.echo(make_printable(f"{error}; driving without behaviors"), err=True)
-            stimulation_map = bare_map(robot, policy)
+            stimulation_map = map_without_behaviors(robot, policy)
         else:
             stimulation_map = load_map(path)
     stimulation_map = resolve_map_policy(stimulation_map, policy, import_options)
     return DriveConfig(robot, stimulation_map, seed, **options)
 
 
-def show_result(data: dict[str, Any] | list[dict[str, Any]], as_json: bool, table: Callable[[], Any]) -> None:
+def print_result(
+    data: dict[str, Any] | list[dict[str, Any]], as_json: bool, table: Callable[[], Any]
+) -> None:
     """Print the data as JSON, or the table."""
     if as_json:
         click.echo(to_json(data))

@@ -40,7 +40,7 @@ from pdtui.cli.shared_options import FILE_PATH, integer_option, progress_bar
     metavar="FOLDER",
     help="Folder of the checkpoints; default: runs/ROBOT-ALGORITHM-SEED.",
 )
-def train(
+def train_command(
     robot: str, algorithm: str, seed: int, forward: str | None, folder: Path | None, **options: Any
 ) -> None:
     """Train a policy for ROBOT.

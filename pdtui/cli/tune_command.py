@@ -8,15 +8,15 @@ import click
 
 from pdtui.cli.shared_options import (
     SeedList,
-    drive_config,
+    build_drive_config,
     force_option,
     import_option_flags,
     integer_option,
     json_option,
     map_policy_option,
     minutes_option,
+    print_result,
     progress_bar,
-    show_result,
     workers_option,
 )
 from pdtui.core.errors import MapError
@@ -43,7 +43,7 @@ from pdtui.policies.weights.import_options import ImportOptions
 @click.option("--dry-run", is_flag=True, help="Tune, but do not change the map.")
 @workers_option
 @json_option
-def tune(
+def tune_command(
     map_name: str,
     behaviors: tuple[str, ...],
     every: bool,
@@ -65,13 +65,13 @@ def tune(
         raise click.UsageError("expected either a BEHAVIOR or --all")
     if force and not dry_run:
         raise MapError("--force needs --dry-run: the map would get gains tuned for another policy")
-    from pdtui.evaluation.evaluation_tables import tuned_table
+    from pdtui.evaluation.evaluation_tables import tuning_table
     from pdtui.search.gain_tuning import TuningSettings, tune_gains
     from pdtui.stimulation.map_library import find_map
     from pdtui.stimulation.map_writer import replace_gains, rewrite_map
 
     path = find_map(map_name)
-    config = drive_config(str(path), None, policy, import_options, force=force)
+    config = build_drive_config(str(path), None, policy, import_options, force=force)
     with progress_bar("tuning", quiet=as_json) as advance:
         results = tune_gains(
             config,
@@ -86,6 +86,6 @@ def tune(
         rewrite_map(path, lambda text: replace_gains(text, better, str(path)))
     written = sorted(better) if not dry_run else []
     data = {"map": str(path), "behaviors": [one.as_dict() for one in results], "written": written}
-    show_result(data, as_json, lambda: tuned_table(results))
+    print_result(data, as_json, lambda: tuning_table(results))
     if not as_json:
         click.echo(f"{path}: wrote the gains of {', '.join(written)}" if written else f"{path}: not changed")

@@ -33,7 +33,7 @@ class Attribute:
     wraps: bool = False
 
 
-def column_of(name: str, attributes: Sequence[Attribute], owner: str) -> int:
+def attribute_column(name: str, attributes: Sequence[Attribute], owner: str) -> int:
     """Return the column of an attribute; one that is missing is a `RobotError` that names the `owner`."""
     names = [attribute.name for attribute in attributes]
     if name not in names:

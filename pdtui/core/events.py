@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pdtui.core.key_table import EVENT_WORDINGS, JUMPS, EventKind
+from pdtui.core.fixed_keys import EVENT_WORDINGS, JUMPS, EventKind
 
 
 @dataclass(frozen=True)
-class Event:
+class DriveEvent:
     """One change of the run.
 
     Attributes:
@@ -34,14 +34,14 @@ class Event:
         return self.kind in JUMPS
 
 
-def describe_event(event: Event) -> str:
+def describe_event(event: DriveEvent) -> str:
     """Say what an event does: the wording of the screen, the session's log and ``pdtui sessions``."""
     return EVENT_WORDINGS[event.kind].format(name=event.name, value=event.value)
 
 
-def group_events_by_step(events: Iterable[Event]) -> dict[int, list[Event]]:
+def group_events_by_step(events: Iterable[DriveEvent]) -> dict[int, list[DriveEvent]]:
     """Return events by the control step before which they apply, each list in order."""
-    grouped: dict[int, list[Event]] = {}
+    grouped: dict[int, list[DriveEvent]] = {}
     for event in events:
         grouped.setdefault(event.step, []).append(event)
     return grouped

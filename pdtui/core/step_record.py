@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.core.units import Stimulation
 
@@ -60,7 +60,7 @@ class StepRecord(NamedTuple):
 
     step: int
     episode: int
-    events: tuple[Event, ...]
+    events: tuple[DriveEvent, ...]
     behaviors: tuple[ActiveBehavior, ...]
     stimulation: Stimulation
     natural: tuple[float, ...]

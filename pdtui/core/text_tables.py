@@ -26,7 +26,7 @@ def new_table(title: str, *columns: str, left: Sequence[str] | None = None) -> T
     return table
 
 
-def list_facts(facts: Iterable[tuple[str, str | Text]]) -> Table:
+def new_facts_table(facts: Iterable[tuple[str, str | Text]]) -> Table:
     """Return a table of names and values, without headings."""
     table = Table(box=None, pad_edge=False, show_header=False)
     for name, value in facts:
@@ -34,7 +34,7 @@ def list_facts(facts: Iterable[tuple[str, str | Text]]) -> Table:
     return table
 
 
-def seed_range(seeds: Sequence[int]) -> str:
+def format_seed_range(seeds: Sequence[int]) -> str:
     return f"{len(seeds)} seeds, {seeds[0]}–{seeds[-1]}" if len(seeds) > 1 else f"seed {seeds[0]}"
 
 

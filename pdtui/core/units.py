@@ -70,11 +70,11 @@ def parse_unit(address: str, layers: Sequence[int]) -> int:
 
 def format_unit(flat: int, layers: Sequence[int]) -> str:
     """Return ``layer:index`` of a flat index, by the layer's name where it has one."""
-    layer, index = locate_unit(flat, layers)
+    layer, index = split_flat_index(flat, layers)
     return f"{next(iter(_layer_names(layers, layer)), layer)}:{index}"
 
 
-def locate_unit(flat: int, layers: Sequence[int]) -> tuple[int, int]:
+def split_flat_index(flat: int, layers: Sequence[int]) -> tuple[int, int]:
     """Return the layer of a flat index and the index in that layer; `PolicyError` if it is too large."""
     for layer, width in enumerate(layers):
         if flat < width:

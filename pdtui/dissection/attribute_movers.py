@@ -15,7 +15,7 @@ from pdtui.dissection.dissection_config import DissectionSettings
 from pdtui.probing.effect_probe import EffectProbe, PlanEffects, UnitEffects
 from pdtui.probing.primitive_confirmation import exceeds_random_units
 from pdtui.probing.start_states import StartState
-from pdtui.spectra.monitor import MonitoredEpisode
+from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
 _KEPT = 0.7

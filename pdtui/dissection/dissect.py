@@ -23,7 +23,7 @@ from pdtui.dissection.dissection_searches import DissectionSearches
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.effect_probe import EffectProbe
-from pdtui.probing.primitive_confirmation import draw_control_units, select_units_to_refine
+from pdtui.probing.primitive_confirmation import sample_control_units, select_units_to_refine
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import StartState, collect_start_states, measure_walk_lengths
@@ -31,9 +31,9 @@ from pdtui.robots import open_robot
 from pdtui.search.behavior_search import SearchStartStates
 from pdtui.search.plan_search import TimeBudget
 from pdtui.sessions.environment_versions import collect_versions
+from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.spectra.matching import match_units
-from pdtui.spectra.matching_presets import find_preset
-from pdtui.spectra.monitor import monitor_episodes
+from pdtui.spectra.matching_presets import find_matching_preset
 from pdtui.spectra.phase_correlation import correlate_phases
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map
@@ -74,7 +74,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             policy = policy_from_network(config.policy, robot.observation_space, robot.action_space)
             return dissect(replace(config, robot=robot, policy=policy))
     began, seed, settings = time.monotonic(), config.seed, config.settings
-    preset = find_preset(config.preset, config.preset_changes)
+    preset = find_matching_preset(config.preset, config.preset_changes)
     first_map = config.start_from
     if isinstance(first_map, str | Path):
         first_map = load_map(find_map(str(first_map)))
@@ -107,7 +107,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             progress=stage("screen every unit"),
         )
         chosen = select_units_to_refine(screen, matching, range(len(robot.attributes)), settings.refine_keep)
-        controls = draw_control_units(screen, settings.controls, seed)
+        controls = sample_control_units(screen, settings.controls, seed)
         refined = prober.measure_units(
             sorted({*chosen, *controls}),
             settings.refine_values,

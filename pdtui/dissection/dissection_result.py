@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.core.attributes import Attribute, Floats, column_of
+from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
@@ -16,11 +16,11 @@ from pdtui.probing.effect_probe import UnitEffects
 from pdtui.robots.robot_goals import RobotGoals
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
+from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching import Discrepancies
 from pdtui.spectra.matching_presets import MatchingPreset
-from pdtui.spectra.monitor import MonitoredEpisode
 from pdtui.spectra.phase_correlation import PhaseCorrelations
-from pdtui.spectra.spectrogram import attribute_series, unit_series, usable_episodes
+from pdtui.spectra.spectrogram import scaled_activation_series, scaled_attribute_series, usable_episodes
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import StimulationMap
 
@@ -123,7 +123,7 @@ class Dissection:
 
     def column(self, attribute: str) -> int:
         """Return the column of an attribute; a `RobotError` says that there is none of that name."""
-        return column_of(attribute, self.attributes, self.robot)
+        return attribute_column(attribute, self.attributes, self.robot)
 
 
 _MATCHES = 3
@@ -164,12 +164,12 @@ def pick_sample_episode(
     nearest = (matching.ranked_units(column)[:_MATCHES] for column in range(len(matching.discrepancy)))
     units = sorted({int(unit) for few in nearest for unit in few})
     few = [replace(one, activations=one.activations[:, units]) for one in usable_episodes(episodes, preset)]
-    compared = unit_series(few, slice(None), preset)[0] if units else few[0].activations
+    compared = scaled_activation_series(few, slice(None), preset)[0] if units else few[0].activations
     return SampleEpisode(
         few[0].seed,
         tuple(units),
         few[0].activations,
         few[0].attributes,
         np.asarray(compared, np.float64),
-        attribute_series(few, attributes, preset)[0],
+        scaled_attribute_series(few, attributes, preset)[0],
     )

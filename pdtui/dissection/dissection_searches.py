@@ -18,8 +18,8 @@ from pdtui.search.behavior_search import BehaviorSearch, BehaviorSearchResult, S
 from pdtui.search.controller_search import ControllerGoal, ControllerSearch, ControllerSearchResult
 from pdtui.search.imprint_candidates import build_imprint_candidates
 from pdtui.search.plan_search import TimeBudget
-from pdtui.search.shared_candidates import SharedCandidates, draw_random_candidates
-from pdtui.spectra.monitor import monitor_episodes
+from pdtui.search.shared_candidates import SharedCandidates, sample_random_candidates
+from pdtui.spectra.episode_monitor import monitor_episodes
 
 _IMPRINT_SEEDS = 1000
 """Offset of the imprints' seeds from the first seed of a dissection; no other stage uses them."""
@@ -65,7 +65,7 @@ class DissectionSearches:
         walks = monitor_episodes(self.robot, policy, range(first, first + imprints.episodes), imprints.steps)
         plans = [
             *self.known,
-            *draw_random_candidates(policy.units, settings.random_sets, settings.bounds, self.seed),
+            *sample_random_candidates(policy.units, settings.random_sets, settings.bounds, self.seed),
             *build_imprint_candidates(
                 walks, self.robot.attributes, policy.layers, imprints, settings.bounds.largest
             ),

@@ -7,7 +7,7 @@ import string
 import numpy as np
 
 from pdtui.core.attributes import BehaviorAim
-from pdtui.core.key_table import RESERVED_KEYS
+from pdtui.core.fixed_keys import RESERVED_KEYS
 from pdtui.core.units import Stimulation, describe_units, format_unit
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.probing.primitive_confirmation import rank_probed_units

@@ -15,7 +15,7 @@ from pdtui.core.errors import MapError
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
-from pdtui.robots.task import mean_figures
+from pdtui.robots.task import average_figures
 from pdtui.search.plan_search import TimeBudget
 from pdtui.search.task_rollout import TimedStimulation
 from pdtui.search.task_search import TaskSearch, TaskSearchResult, TaskSearchSettings
@@ -49,7 +49,7 @@ class WrittenBehavior:
                 "walks": len(verdicts),
                 "done": sum(verdict.success for verdict in verdicts),
                 "by_itself": sum(verdict.success for verdict in self.result.untouched),
-                "figures": mean_figures(verdicts),
+                "figures": average_figures(verdicts),
             },
             "rollouts": self.result.rollouts,
             "map": str(self.output),

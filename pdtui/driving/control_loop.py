@@ -10,7 +10,7 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import KeystrokeError, MapError, SimulationDiverged
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.rewind_history import STEPS_PER_KEPT_STATE, DriveState, RewindHistory
 from pdtui.policies.runtime.policy import Policy
@@ -80,7 +80,7 @@ class ControlLoop:
     def _options(self) -> dict[str, str] | None:
         return {"start": self.start} if self.start else None
 
-    def advance(self, events: Sequence[Event] = ()) -> StepRecord:
+    def advance(self, events: Sequence[DriveEvent] = ()) -> StepRecord:
         """Apply the events, then run one control step.
 
         If the previous step ended the episode, the next episode starts first. After a record that says that
@@ -136,7 +136,7 @@ class ControlLoop:
         self._ended = bool(ended)
         return record
 
-    def _apply(self, event: Event, *, rehearsing: bool = False) -> None:
+    def _apply(self, event: DriveEvent, *, rehearsing: bool = False) -> None:
         """Apply an event; while rehearsing, only to the latch and to the position in the rewind history."""
         match event.kind:
             case "behavior":
@@ -159,7 +159,7 @@ class ControlLoop:
                 raise KeystrokeError(f"step {event.step}: unknown event '{event.kind}'")
 
     @contextmanager
-    def rehearsal(self) -> Iterator[Callable[[Event], None]]:
+    def rehearsal(self) -> Iterator[Callable[[DriveEvent], None]]:
         """Yield a function that applies an event of this step to the latch; at the end, all is undone.
 
         It shows what a key means after other keys that were pressed before the same step.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -39,5 +39,5 @@ class DriveConfig:
     recording: str = ""
     activations: ActivationsKept = "all"
     viewer: ViewerAddress | None = None
-    scripted_events: tuple[Event, ...] | None = None
+    scripted_events: tuple[DriveEvent, ...] | None = None
     expected_digests: tuple[int, ...] = ()

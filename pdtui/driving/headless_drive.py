@@ -17,7 +17,7 @@ from pdtui.core.errors import (
     SimulationDiverged,
     format_error_in_one_line,
 )
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.keystrokes import interpret_keys
@@ -45,7 +45,7 @@ class DriveSummary:
     mean: dict[str, float]
 
 
-def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:
+def make_key_events(keys: Sequence[str], loop: ControlLoop) -> list[DriveEvent]:
     """Return the events of keys that are pressed before the loop's next step.
 
     A key that means nothing in the present state raises a `KeystrokeError`.
@@ -58,7 +58,9 @@ def key_events(keys: Sequence[str], loop: ControlLoop) -> list[Event]:
     return events
 
 
-def drive_keys(loop: ControlLoop, presses: Mapping[int, Sequence[str]], steps: int) -> Iterator[StepRecord]:
+def drive_from_keystrokes(
+    loop: ControlLoop, presses: Mapping[int, Sequence[str]], steps: int
+) -> Iterator[StepRecord]:
     """Yield the records of a drive from keystrokes, as fast as possible.
 
     Raises:
@@ -66,14 +68,14 @@ def drive_keys(loop: ControlLoop, presses: Mapping[int, Sequence[str]], steps: i
         SimulationDiverged: the simulation cannot go on; the record of the step that says so comes first.
     """
     for _ in range(steps):
-        record = loop.advance(key_events(presses.get(loop.step, ()), loop))
+        record = loop.advance(make_key_events(presses.get(loop.step, ()), loop))
         yield record
         if record.diverged:
             raise SimulationDiverged(f"step {record.step}: {record.ended}")
 
 
 def run_episode(
-    loop: ControlLoop, steps: int, events_before: Callable[[int], Sequence[Event]] = lambda _: ()
+    loop: ControlLoop, steps: int, events_before: Callable[[int], Sequence[DriveEvent]] = lambda _: ()
 ) -> Iterator[StepRecord]:
     """Drive until the episode ends, for at most `steps` control steps, and yield the records.
 
@@ -107,7 +109,7 @@ def catch_ending_signals() -> Iterator[Callable[[], str]]:
 
 
 @contextmanager
-def step_recording(recorder: SessionRecorder | None) -> Iterator[Callable[[StepRecord], None]]:
+def open_step_recorder(recorder: SessionRecorder | None) -> Iterator[Callable[[StepRecord], None]]:
     """Yield a function that records a step, and close the recorder with how the ``with`` block ends."""
     outcome = "stopped"
     try:
@@ -139,12 +141,12 @@ def drive_headless(
 
     Raises:
         DriveEnded: `ended` returned a reason.
-        PdtuiError: as for `drive_keys`; the recording is complete all the same.
+        PdtuiError: as for `drive_from_keystrokes`; the recording is complete all the same.
     """
     falls = involvement = done = 0
     total = np.zeros(len(loop.robot.attributes))
-    with step_recording(recorder) as record_step:
-        for record in drive_keys(loop, presses, steps):
+    with open_step_recorder(recorder) as record_step:
+        for record in drive_from_keystrokes(loop, presses, steps):
             record_step(record)
             done += 1
             falls += record.fell

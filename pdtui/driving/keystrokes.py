@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from pdtui.core.errors import KeystrokeError
-from pdtui.core.events import Event
-from pdtui.core.key_table import RUN_KEYS, FixedKey
+from pdtui.core.events import DriveEvent
+from pdtui.core.fixed_keys import RUN_KEYS, FixedKey
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -20,19 +20,19 @@ REWIND_SECONDS = 3.0
 _LINE = re.compile(r"(\d{1,9})\s+(\S+)")
 
 
-def run_keys(stimulation_map: StimulationMap) -> tuple[str, ...]:
+def list_drive_keys(stimulation_map: StimulationMap) -> tuple[str, ...]:
     """Return every key that can change a run driven with this map."""
     behaviors = (behavior.key for behavior in stimulation_map.behaviors.values())
     return stimulation_map.default_key, *behaviors, *RUN_KEYS
 
 
-def interpret_key(key: str, loop: ControlLoop) -> Event | str:
+def interpret_key(key: str, loop: ControlLoop) -> DriveEvent | str:
     """Return the event of a key in the loop's present state, or a sentence on why it has none."""
     if key == loop.map.default_key:
-        return Event(loop.step, "default", key=key)
+        return DriveEvent(loop.step, "default", key=key)
     behavior = loop.map.behavior_of_key(key)
     if behavior is not None:
-        return Event(loop.step, "behavior", behavior.name, key=key)
+        return DriveEvent(loop.step, "behavior", behavior.name, key=key)
     if key not in RUN_KEYS:
         return f"no behavior has key '{key}'"
     row = RUN_KEYS[key]
@@ -45,35 +45,35 @@ def interpret_key(key: str, loop: ControlLoop) -> Event | str:
             return _rewind_event(row, loop)
         case kind:
             assert kind is not None
-            return Event(loop.step, kind, key=key)
+            return DriveEvent(loop.step, kind, key=key)
 
 
-def interpret_keys(keys: Iterable[str], loop: ControlLoop) -> list[Event | str]:
+def interpret_keys(keys: Iterable[str], loop: ControlLoop) -> list[DriveEvent | str]:
     """Interpret keys pressed before the same step, each in the state that those before it lead to."""
-    meanings: list[Event | str] = []
+    meanings: list[DriveEvent | str] = []
     with loop.rehearsal() as rehearse:
         for key in keys:
             meanings.append(meaning := interpret_key(key, loop))
-            if isinstance(meaning, Event):
+            if isinstance(meaning, DriveEvent):
                 rehearse(meaning)
     return meanings
 
 
-def _factor_event(row: FixedKey, loop: ControlLoop) -> Event | str:
+def _factor_event(row: FixedKey, loop: ControlLoop) -> DriveEvent | str:
     if not loop.latch.active:
         return "no behavior is latched, so there is no strength to change"
     latest = loop.latch.active[-1]
-    return Event(loop.step, "factor", latest.name, latest.factor * FACTOR_STEP**row.direction, row.key)
+    return DriveEvent(loop.step, "factor", latest.name, latest.factor * FACTOR_STEP**row.direction, row.key)
 
 
-def _rewind_event(row: FixedKey, loop: ControlLoop) -> Event | str:
+def _rewind_event(row: FixedKey, loop: ControlLoop) -> DriveEvent | str:
     target = loop.history.step_before(loop.step, round(REWIND_SECONDS / loop.robot.control_dt))
     if target is None:
         return "nothing to rewind to yet"
-    return Event(loop.step, "rewind", value=float(target), key=row.key)
+    return DriveEvent(loop.step, "rewind", value=float(target), key=row.key)
 
 
-def _target_event(row: FixedKey, loop: ControlLoop) -> Event | str:
+def _target_event(row: FixedKey, loop: ControlLoop) -> DriveEvent | str:
     """Return the event of an arrow: left and right move the target of a heading, up and down any other."""
     held = [view for view in loop.latch.active if view.target is not None]
     if not held:
@@ -89,7 +89,7 @@ def _target_event(row: FixedKey, loop: ControlLoop) -> Event | str:
     pid = loop.map.behaviors[chosen.name].pid
     assert pid is not None
     assert chosen.target is not None
-    return Event(loop.step, "target", chosen.name, chosen.target + row.direction * pid.step, row.key)
+    return DriveEvent(loop.step, "target", chosen.name, chosen.target + row.direction * pid.step, row.key)
 
 
 def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, list[str]]:
@@ -105,7 +105,7 @@ def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, li
         lines = read.decode("utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise KeystrokeError(f"{path}: cannot be read as keystrokes: {error}") from error
-    known = run_keys(stimulation_map)
+    known = list_drive_keys(stimulation_map)
     presses: dict[int, list[str]] = {}
     last = 0
     for number, line in enumerate(lines, start=1):
@@ -129,7 +129,7 @@ def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, li
     return presses
 
 
-def format_keystrokes(events: Iterable[Event]) -> str:
+def format_keystrokes(events: Iterable[DriveEvent]) -> str:
     """Return the key presses among events as the text of a keystroke file."""
     pressed = [event for event in events if event.key]
     for event in pressed:

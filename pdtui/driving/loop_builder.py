@@ -9,14 +9,14 @@ from torch import nn
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.policies.runtime.live_network import policy_from_network
-from pdtui.policies.runtime.policy import Policy, check_fit
+from pdtui.policies.runtime.policy import Policy, check_policy_fit
 from pdtui.policies.weights.import_options import WorldSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot
 
 
-def build_loop(
+def build_control_loop(
     config: DriveConfig, robot: Robot | None = None, policy: Policy | nn.Module | None = None
 ) -> ControlLoop:
     """Return a loop before its first step; the robot and the policy are loaded unless they are given.
@@ -34,7 +34,7 @@ def build_loop(
         folders=(Path(stimulation_map.source).parent,),
     )
     stimulation_map.check(config.robot, policy.layers, policy.sha256, force=config.force)
-    check_fit(policy, robot, config.robot)
+    check_policy_fit(policy, robot, config.robot)
     return ControlLoop(
         robot, policy, stimulation_map, config.seed, stochastic=config.stochastic, start=config.start
     )

@@ -14,7 +14,7 @@ from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.events import group_events_by_step
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
@@ -101,7 +101,7 @@ class ReplayResult:
         return f"differs: {where}: {self.detail}; only the first {kept}, but {self.judged} have to be"
 
 
-def replay_config(session: Session, source: str, policy: str = "") -> DriveConfig:
+def config_from_session(session: Session, source: str, policy: str = "") -> DriveConfig:
     """Return the configuration of the drive that repeats a session.
 
     A `MapError` means that the map inside the session is broken; a `PolicyError`, that the map names a file
@@ -157,9 +157,9 @@ def replay_session(
     """
     session = read_session(path)
     given = None if isinstance(policy, str) else policy
-    config = replay_config(session, str(path), policy if isinstance(policy, str) else "given")
+    config = config_from_session(session, str(path), policy if isinstance(policy, str) else "given")
     with open_robot(robot or config.robot) as world:
-        loop = build_loop(replace(config, force=force), world, given)
+        loop = build_control_loop(replace(config, force=force), world, given)
         if world.attributes != session.info.attributes:
             raise SessionError(f"{path}: the robot has other attributes than the session")
         first, changes, stopped = _compare_steps(session, loop, progress)

@@ -14,13 +14,13 @@ from types import FrameType
 from typing import Any
 
 from pdtui.core.errors import PdtuiError, SessionError, format_error_in_one_line
-from pdtui.core.events import Event, group_events_by_step
+from pdtui.core.events import DriveEvent, group_events_by_step
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts
 from pdtui.driving.keystrokes import interpret_keys
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.pacer import Pacer
 from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.writer.session_recorder import SessionRecorder
@@ -46,7 +46,7 @@ class DriveServer:
         self, connection: Connection, send: Callable[[object], Future[None]], config: DriveConfig
     ) -> None:
         self._connection, self._send, self._config = connection, send, config
-        self._loop: ControlLoop = build_loop(config)
+        self._loop: ControlLoop = build_control_loop(config)
         self._builder = SnapshotBuilder(self._loop)
         self._recorder: SessionRecorder | None = None
         if config.recording:
@@ -150,12 +150,12 @@ class DriveServer:
             with suppress(SessionError):
                 recorder.close(str(error))
 
-    def _events(self) -> list[Event]:
+    def _events(self) -> list[DriveEvent]:
         if self._config.scripted_events is not None:
             return self._scripted_events.get(self._loop.step, [])
         events = []
         for meaning in interpret_keys(self._pressed_keys, self._loop):
-            if isinstance(meaning, Event):
+            if isinstance(meaning, DriveEvent):
                 events.append(meaning)
             else:
                 self._builder.notice = meaning

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 
 from pdtui.core.attributes import Floats
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.core.intervals import confidence_interval
 from pdtui.core.worker_pool import StepProgress, WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import run_episode
-from pdtui.driving.loop_builder import build_loop
-from pdtui.evaluation.task_evaluation import TaskEvaluation, TaskRun, run_task, summarise_task
+from pdtui.driving.loop_builder import build_control_loop
+from pdtui.evaluation.task_evaluation import TaskEvaluation, TaskRun, run_task_episode, summarise_task
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
 
 STEPS = 400
@@ -87,7 +87,7 @@ class BehaviorRun:
     fell: bool
 
 
-def evaluate_map(
+def evaluate_behaviors(
     config: DriveConfig, seeds: Sequence[int], *, workers: int = 2, progress: StepProgress | None = None
 ) -> MapEvaluation:
     """Measure every behavior of the map that has an aim or a task.
@@ -100,11 +100,11 @@ def evaluate_map(
     known = config.stimulation_map.behaviors.values()
     tasked = [b for b in known if b.task]
     behaviors = [b for b in known if b.aim is not None and b.pid is None]
-    loop = build_loop(config)
+    loop = build_control_loop(config)
     names = ["", *(b.name for b in behaviors)] if behaviors else []
     jobs: list[_Job] = [(name, seed, "aim") for name in names for seed in seeds]
     jobs += [(b.name, seed, kind) for b in tasked for kind in ("task", "untouched") for seed in seeds]
-    with WorkerPool(f"evaluation of {config.robot}", workers, loop, build_loop, config) as pool:
+    with WorkerPool(f"evaluation of {config.robot}", workers, loop, build_control_loop, config) as pool:
         runs: dict[_Job, Any] = dict(zip(jobs, pool.map(_run_job, jobs, progress), strict=True))
     return MapEvaluation(
         config.robot,
@@ -130,19 +130,19 @@ _Job = tuple[str, int, str]
 def _run_job(loop: ControlLoop, job: _Job) -> BehaviorRun | TaskRun:
     name, seed, kind = job
     if kind == "aim":
-        return run_behavior(loop, name, seed)
-    return run_task(loop, loop.map.behaviors[name], seed, untouched=kind == "untouched")
+        return run_behavior_episode(loop, name, seed)
+    return run_task_episode(loop, loop.map.behaviors[name], seed, untouched=kind == "untouched")
 
 
-def run_behavior(built: ControlLoop, name: str, seed: int) -> BehaviorRun:
+def run_behavior_episode(built: ControlLoop, name: str, seed: int) -> BehaviorRun:
     """Run one episode with a behavior, or with the policy alone where the name is empty.
 
     If the episode ends early, the mean is over the steps from `STIMULATED_FROM` to its end.
     """
     loop = ControlLoop(built.robot, built.policy, built.map, seed)
 
-    def press(step: int) -> list[Event]:
-        return [Event(step, "behavior", name)] if name and step == STIMULATED_FROM else []
+    def press(step: int) -> list[DriveEvent]:
+        return [DriveEvent(step, "behavior", name)] if name and step == STIMULATED_FROM else []
 
     records = list(run_episode(loop, STEPS, press))
     rows = [record.attributes for record in records]

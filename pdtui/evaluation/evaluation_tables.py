@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rich.console import Group
 from rich.table import Table
 
-from pdtui.core.text_tables import mean_with_interval, new_table, seed_range
+from pdtui.core.text_tables import format_seed_range, mean_with_interval, new_table
 from pdtui.evaluation.behavior_evaluation import MapEvaluation
 from pdtui.evaluation.policy_evaluation import PolicyEvaluation
 from pdtui.search.gain_tuning import TunedGains
@@ -23,7 +23,7 @@ def behavior_tables(result: MapEvaluation) -> Group:
 
 def _task_table(result: MapEvaluation) -> Table:
     table = new_table(
-        f"{result.robot}, policy {result.policy}, {seed_range(result.seeds)}",
+        f"{result.robot}, policy {result.policy}, {format_seed_range(result.seeds)}",
         *("behavior", "success means", "success", "without it", "falls", "measured (without it)"),
     )
     count = len(result.seeds)
@@ -45,7 +45,7 @@ def _task_table(result: MapEvaluation) -> Table:
 
 def _aim_table(result: MapEvaluation) -> Table:
     table = new_table(
-        f"{result.robot}, policy {result.policy}, {seed_range(result.seeds)}",
+        f"{result.robot}, policy {result.policy}, {format_seed_range(result.seeds)}",
         *("behavior", "attribute", "with it", "default", "effect [95 %]", "aim reached", "falls"),
     )
     count = len(result.seeds)
@@ -62,10 +62,10 @@ def _aim_table(result: MapEvaluation) -> Table:
     return table
 
 
-def policy_table(result: PolicyEvaluation) -> Table:
+def policy_evaluation_table(result: PolicyEvaluation) -> Table:
     """Return the performance of the policy alone."""
     table = new_table(
-        f"Policy alone, {seed_range(result.seeds)}, {result.steps} steps each", "measure", "value"
+        f"Policy alone, {format_seed_range(result.seeds)}, {result.steps} steps each", "measure", "value"
     )
     for name, speed in (("mean speed (m/s)", result.mean_speed), ("net speed (m/s)", result.net_speed)):
         if speed is not None:
@@ -79,7 +79,8 @@ def tracking_table(result: TrackingSummary) -> Table:
     """Return one row per target, and the mean."""
     unit = result.unit
     table = new_table(
-        f"{result.behavior}: {result.attribute} ({unit}), {seed_range(result.seeds)}, falls {result.falls}",
+        f"{result.behavior}: {result.attribute} ({unit}), {format_seed_range(result.seeds)}, "
+        f"falls {result.falls}",
         *(f"target ({unit})", "mean |error|", "last 25 steps"),
     )
     for row in result.targets:
@@ -96,14 +97,14 @@ def tracking_table(result: TrackingSummary) -> Table:
     return table
 
 
-def tuned_table(results: list[TunedGains]) -> Group:
+def tuning_table(results: list[TunedGains]) -> Group:
     """Return the gains and figures of each behavior, before and after tuning."""
     return Group(*(part for result in results for part in (_gains_table(result), result.verdict)))
 
 
 def _gains_table(result: TunedGains) -> Table:
     before = result.before
-    title = f"{result.behavior}: {before.attribute}, {seed_range(before.seeds)}"
+    title = f"{result.behavior}: {before.attribute}, {format_seed_range(before.seeds)}"
     table = new_table(title, "", "in the map", "best found")
     for name in ("kp", "ki", "kd", "limit"):
         table.add_row(name, *(f"{getattr(pid, name):.3g}" for pid in (result.old, result.new)))

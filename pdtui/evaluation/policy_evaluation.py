@@ -11,7 +11,7 @@ from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import run_episode
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def evaluate_policy(
     Raises:
         PdtuiError: the robot, policy or map cannot be loaded.
     """
-    built = build_loop(config)
+    built = build_control_loop(config)
     steps = steps or built.robot.episode_steps
     names = [attribute.name for attribute in built.robot.attributes]
     column = names.index("speed") if "speed" in names else None

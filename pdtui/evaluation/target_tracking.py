@@ -11,14 +11,14 @@ from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveRunner
 from pdtui.search.tracking_summary import (
     TrackingSummary,
     choose_tracking_targets,
-    finite_mean,
-    seed_errors,
+    mean_errors_by_seed,
+    mean_of_finite,
     summarise_tracking,
 )
 from pdtui.stimulation.stimulation_map import Behavior
 
 
-def evaluate_tracking(
+def evaluate_target_tracking(
     config: DriveConfig,
     attribute: str,
     seeds: Sequence[int],
@@ -44,7 +44,7 @@ def evaluate_tracking(
         ]
         results = runner.run(drives, progress)
         unit = runner.attribute(attribute).unit
-    untouched = finite_mean(seed_errors(results[len(seeds) :]))
+    untouched = mean_of_finite(mean_errors_by_seed(results[len(seeds) :]))
     return summarise_tracking(results[: len(seeds)], unit, untouched)
 
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.core.attributes import unwrap_angles
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import run_episode
-from pdtui.robots.task import RunTrace, Task, TaskVerdict, mean_figures
-from pdtui.search.task_rollout import walk_steps
+from pdtui.robots.task import RunTrace, Task, TaskVerdict, average_figures
+from pdtui.search.task_rollout import count_walk_steps
 from pdtui.stimulation.stimulation_map import Behavior
 
 
@@ -47,7 +47,7 @@ class TaskRun:
     fell: bool
 
 
-def run_task(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bool) -> TaskRun:
+def run_task_episode(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bool) -> TaskRun:
     """Run a behavior's task once through the control loop, as in a drive.
 
     Raises:
@@ -55,10 +55,10 @@ def run_task(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bo
     """
     task = built.robot.find_task(behavior.task)
     loop = ControlLoop(built.robot, built.policy, built.map, seed, start=task.start)
-    walk = walk_steps(task, seed)
+    walk = count_walk_steps(task, seed)
 
-    def press(step: int) -> list[Event]:
-        return [Event(step, "behavior", behavior.name)] if step == walk and not untouched else []
+    def press(step: int) -> list[DriveEvent]:
+        return [DriveEvent(step, "behavior", behavior.name)] if step == walk and not untouched else []
 
     before = loop.attributes
     records = list(run_episode(loop, walk + task.steps, press))
@@ -82,6 +82,6 @@ def summarise_task(
         sum(run.verdict.success for run in runs),
         sum(run.verdict.success for run in untouched),
         sum(run.fell for run in runs),
-        mean_figures(run.verdict for run in runs),
-        mean_figures(run.verdict for run in untouched),
+        average_figures(run.verdict for run in runs),
+        average_figures(run.verdict for run in untouched),
     )

@@ -102,7 +102,7 @@ def read_guide() -> dict[str, GuidePage]:
     return {topic: GuidePage(topic, text) for topic, text in texts.items()}
 
 
-def find_page(pages: Mapping[str, GuidePage], topic: str) -> GuidePage:
+def find_guide_page(pages: Mapping[str, GuidePage], topic: str) -> GuidePage:
     """Return the page with this topic; the error for an unknown one lists all topics."""
     if topic not in pages:
         raise PdtuiError(f"no topic '{topic}' in the guide; available: {', '.join(pages)}")

@@ -9,14 +9,14 @@ import numpy as np
 from rich.table import Table
 
 from pdtui.core.errors import RobotError
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.core.intervals import confidence_interval
-from pdtui.core.text_tables import mean_with_interval, new_table, seed_range
+from pdtui.core.text_tables import format_seed_range, mean_with_interval, new_table
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import run_episode
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.stimulation.stimulation_map import Behavior
 
 SETTLED = 100
@@ -69,14 +69,14 @@ def evaluate_command_following(
         RobotError: the robot takes no commands.
         PdtuiError: the robot, policy or map cannot be loaded.
     """
-    built = build_loop(config)
+    built = build_control_loop(config)
     robot, policy, steps = built.robot, built.policy, built.robot.episode_steps
     ranges = {name: one for name, one in robot.command_ranges.items() if name in robot.commands}
     if not ranges:
         raise RobotError(f"{robot.name}: it takes no commands")
     columns = [robot.attribute_index(one.attribute) for one in ranges.values()]
     asked, errors, biases, finished = [], [], [], 0
-    press = {0: [Event(0, "behavior", _ASKED)]}
+    press = {0: [DriveEvent(0, "behavior", _ASKED)]}
     for done, seed in enumerate(seeds, start=1):
         rng = np.random.default_rng(seed)
         wanted = np.array([rng.uniform(one.low, one.high) for one in ranges.values()])
@@ -108,10 +108,11 @@ def evaluate_command_following(
     return CommandFollowingResult(robot.name, policy.name, tuple(seeds), steps, tuple(rows), finished)
 
 
-def commands_table(result: CommandFollowingResult) -> Table:
+def command_following_table(result: CommandFollowingResult) -> Table:
     """Return a table with one row per command."""
     table = new_table(
-        f"{result.robot}, policy {result.policy}, {seed_range(result.seeds)}, {result.steps} steps each",
+        f"{result.robot}, policy {result.policy}, {format_seed_range(result.seeds)}, "
+        f"{result.steps} steps each",
         *("command", "asked", "mean |error| [95 %]", "without the gait", "falls"),
     )
     count = len(result.seeds)

@@ -19,7 +19,7 @@ from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.target_tracking import find_pid_behaviors
 from pdtui.search.tracking_drives import STEPS_EACH, TrackingDrive, TrackingDriveResult, TrackingDriveRunner
-from pdtui.search.tracking_summary import HEADINGS, TrackingSummary, seed_errors, summarise_tracking
+from pdtui.search.tracking_summary import HEADINGS, TrackingSummary, mean_errors_by_seed, summarise_tracking
 from pdtui.stimulation.stimulation_map import Behavior
 
 ATTRIBUTE = "yaw"
@@ -27,7 +27,7 @@ ControlInput = Literal["command", "units", "both"]
 
 
 @dataclass(frozen=True)
-class ErrorRatio:
+class TrackingErrorRatio:
     """Mean |error| with units over mean |error| with the command.
 
     Attributes:
@@ -59,7 +59,7 @@ class HeadingControllerResult:
     inputs: tuple[str, ...]
     other_commands: dict[str, float]
     tracking: TrackingSummary
-    ratio: ErrorRatio | None
+    ratio: TrackingErrorRatio | None
     headings: Floats
 
 
@@ -103,7 +103,7 @@ class HeadingPrecisionComparison:
         }
 
 
-def control_input(behavior: Behavior) -> ControlInput:
+def describe_pid_output(behavior: Behavior) -> ControlInput:
     """Return what the PID of a behavior sets."""
     if behavior.commands and behavior.magnitudes:
         return "both"
@@ -156,31 +156,35 @@ def _rows(
 ) -> list[HeadingControllerResult]:
     loop, count = runner.loop, len(followed) // len(behaviors)
     parts = [list(followed[number * count :][:count]) for number in range(len(behaviors))]
-    command = next((p for b, p in zip(behaviors, parts, strict=True) if control_input(b) == "command"), None)
+    command = next(
+        (p for b, p in zip(behaviors, parts, strict=True) if describe_pid_output(b) == "command"), None
+    )
     return [
         HeadingControllerResult(
             loop.map.source,
             loop.robot.name,
             loop.policy.name,
-            control_input(behavior),
+            describe_pid_output(behavior),
             (*behavior.commands, *loop.map.units_of(behavior)),
             {name: value for name, value in loop.robot.commands.items() if name not in behavior.commands},
             summarise_tracking(part, runner.attribute(ATTRIBUTE).unit),
-            None if command is None or part is command else paired_ratio(part, command),
+            None if command is None or part is command else paired_error_ratio(part, command),
             np.array([one.values.ravel() for one in part]),
         )
         for behavior, part in zip(behaviors, parts, strict=True)
     ]
 
 
-def paired_ratio(units: Sequence[TrackingDriveResult], command: Sequence[TrackingDriveResult]) -> ErrorRatio:
+def paired_error_ratio(
+    units: Sequence[TrackingDriveResult], command: Sequence[TrackingDriveResult]
+) -> TrackingErrorRatio:
     """Return the ratio of mean |error| over the seeds on which both drives reached the first target."""
-    above, below = seed_errors(units), seed_errors(command)
+    above, below = mean_errors_by_seed(units), mean_errors_by_seed(command)
     both = np.isfinite(above) & np.isfinite(below)
     above, below = above[both], below[both]
     value = float(above.mean() / below.mean()) if len(above) else float("nan")
     if len(above) < 2:
-        return ErrorRatio(value, 0.0, float("inf"))
+        return TrackingErrorRatio(value, 0.0, float("inf"))
     drawn = stats.bootstrap(
         (above, below),
         lambda a, b, axis: a.mean(axis=axis) / b.mean(axis=axis),
@@ -189,4 +193,4 @@ def paired_ratio(units: Sequence[TrackingDriveResult], command: Sequence[Trackin
         method="percentile",
         rng=np.random.default_rng(0),
     ).confidence_interval
-    return ErrorRatio(value, float(drawn.low), float(drawn.high))
+    return TrackingErrorRatio(value, float(drawn.low), float(drawn.high))

@@ -27,12 +27,12 @@ def run_tracking_experiment(request: ExperimentRequest) -> ExperimentReport:
     result = compare_heading_precision(
         request.configs, request.seeds, workers=request.workers, progress=request.progress
     )
-    draw_heading_pictures(request.pictures, heading_figure(result))
+    draw_heading_pictures(request.pictures, build_heading_figure(result))
     data = {**result.as_dict(), "pictures": [str(path) for path in request.pictures]}
     return ExperimentReport(data, heading_precision_table(result), request.pictures)
 
 
-def heading_figure(result: HeadingPrecisionComparison) -> HeadingFigure:
+def build_heading_figure(result: HeadingPrecisionComparison) -> HeadingFigure:
     """Return what the pictures show of a comparison."""
     import numpy as np
 
@@ -59,12 +59,14 @@ def heading_figure(result: HeadingPrecisionComparison) -> HeadingFigure:
 
 def heading_precision_table(result: HeadingPrecisionComparison) -> Table:
     """Return a table with one column per behavior, map by map."""
-    from pdtui.core.text_tables import mean_with_interval, new_table, seed_range
+    from pdtui.core.text_tables import format_seed_range, mean_with_interval, new_table
     from pdtui.evaluation.evaluation_tables import add_tracking_figures
     from pdtui.search.tracking_drives import STEPS_EACH
 
     table = new_table(
-        f"Holding headings: {seed_range(result.seeds)}", "", *(row.tracking.behavior for row in result.rows)
+        f"Holding headings: {format_seed_range(result.seeds)}",
+        "",
+        *(row.tracking.behavior for row in result.rows),
     )
     table.add_row("map", *(Path(row.map).name for row in result.rows))
     table.add_row("policy", *(row.policy for row in result.rows))

@@ -12,21 +12,21 @@ import numpy as np
 
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.pictures.dissection_chart_data import effect_curves, matched_spectrograms, unit_ranking
-from pdtui.pictures.matplotlib_page import figure_page, policy_title
-from pdtui.pictures.plot_colors import BLUE, GREEN, GREY, VERMILLION, to_hex
+from pdtui.pictures.matplotlib_page import open_figure_page, policy_title
+from pdtui.pictures.plot_colors import BLUE, GREEN, GREY, VERMILLION, color_to_hex
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MATCHED, _PROBED, _OTHER, _FAINT = (to_hex(color) for color in (VERMILLION, GREEN, BLUE, GREY))
+_MATCHED, _PROBED, _OTHER, _FAINT = (color_to_hex(color) for color in (VERMILLION, GREEN, BLUE, GREY))
 
 
 def draw_attribute_page(dissection: Dissection, column: int) -> bytes:
     """Draw everything about one attribute on a page, and return the PNG file."""
     attribute, target = dissection.attributes[column], io.BytesIO()
     label = f"{attribute.name} ({attribute.unit})" if attribute.unit else attribute.name
-    with figure_page(target, 4.4, f"{policy_title(dissection)}: {label}") as figure:
+    with open_figure_page(target, 4.4, f"{policy_title(dissection)}: {label}") as figure:
         (upper_left, upper_right), (lower_left, lower_right) = figure.subplots(2, 2)
         draw_spectrograms(figure, upper_left, upper_right, dissection, column)
         draw_ranking(lower_left, dissection, column)

@@ -103,7 +103,9 @@ class SideEffectMatrix:
         return min(STRONG, max([*map(float, sizes), 1e-9]))
 
 
-def spectrogram_of(series: NDArray[np.floating], preset: MatchingPreset, dt: float) -> SpectrogramChart:
+def compute_spectrogram_chart(
+    series: NDArray[np.floating], preset: MatchingPreset, dt: float
+) -> SpectrogramChart:
     """Return the spectrogram of one series, shape (T,), of samples `dt` seconds apart.
 
     Frequencies that the preset does not compare are set to zero.
@@ -123,7 +125,7 @@ def matched_spectrograms(dissection: Dissection, column: int) -> MatchedSpectrog
         return None
     unit, shown = int(ranked[0]), dissection.sample_episode
     series = shown.compared_attributes[:, column], shown.compared_activations[:, shown.column(unit)]
-    one, other = (spectrogram_of(values, dissection.preset, dissection.dt) for values in series)
+    one, other = (compute_spectrogram_chart(values, dissection.preset, dissection.dt) for values in series)
     both = np.concatenate([one.decibels.ravel(), other.decibels.ravel()])
     heard = both[np.isfinite(both)]
     high = float(heard.max()) if heard.size else 0.0

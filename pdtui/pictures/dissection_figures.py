@@ -15,15 +15,15 @@ from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.pictures.attribute_plots import draw_effect_key, draw_effects, draw_ranking, draw_spectrograms
 from pdtui.pictures.dissection_chart_data import side_effect_matrix
-from pdtui.pictures.matplotlib_page import figure_page, policy_title
-from pdtui.pictures.plot_colors import GREEN, GREY, VERMILLION, diverging, to_hex
+from pdtui.pictures.matplotlib_page import open_figure_page, policy_title
+from pdtui.pictures.plot_colors import GREEN, GREY, VERMILLION, color_to_hex, diverging_colors
 from pdtui.probing.primitive_confirmation import TOP_MATCHES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MATCHED, _PROBED, _FAINT = to_hex(VERMILLION), to_hex(GREEN), to_hex(GREY)
+_MATCHED, _PROBED, _FAINT = color_to_hex(VERMILLION), color_to_hex(GREEN), color_to_hex(GREY)
 _A_PAGE = 8
 """Attributes per page."""
 NAMES = ("spectrograms", "discrepancies", "effects", "side-effects", "hit-rates")
@@ -60,7 +60,7 @@ def _panel_page(
 ) -> Iterator[tuple[Figure, list[Axes]]]:
     """Yield a page and its panels, four in a row."""
     rows = -(-count // 4)
-    with figure_page(path, margin + row_height * rows, title) as figure:
+    with open_figure_page(path, margin + row_height * rows, title) as figure:
         panels = list(figure.subplots(rows, 4, squeeze=False).flat)
         for panel in panels[count:]:
             panel.set_axis_off()
@@ -95,10 +95,10 @@ def draw_side_effects(target: Path | BytesIO, dissection: Dissection) -> None:
     effects = side_effect_matrix(dissection)
     title = f"{policy_title(dissection)}: side effects of single units"
     rows = max(1, len(effects.by_value))
-    with figure_page(target, 0.6 + rows * (0.6 + 0.155 * len(effects.attributes)), title) as figure:
+    with open_figure_page(target, 0.6 + rows * (0.6 + 0.155 * len(effects.attributes)), title) as figure:
         panels = list(figure.subplots(rows, 1, squeeze=False).flat)
         for panel, (value, matrix) in zip(panels, effects.by_value.items(), strict=False):
-            panel.imshow(diverging(matrix.T, effects.limit), aspect="auto", interpolation="nearest")
+            panel.imshow(diverging_colors(matrix.T, effects.limit), aspect="auto", interpolation="nearest")
             panel.set_title(f"output held at v = {value:g}")
             panel.set_yticks(range(len(effects.attributes)), effects.attributes)
             panel.set_xticks(range(len(effects.units)), effects.units, rotation=90)
@@ -111,7 +111,7 @@ def _colorbar(figure: Figure, panels: Sequence[Axes], limit: float) -> None:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
 
-    shades = diverging(np.linspace(-limit, limit, 201), limit) / 255
+    shades = diverging_colors(np.linspace(-limit, limit, 201), limit) / 255
     mappable = ScalarMappable(Normalize(-limit, limit), ListedColormap(shades))
     bar = figure.colorbar(mappable, ax=list(panels), aspect=40, pad=0.015, extend="both")
     bar.set_label("change, in standard deviations of the attribute")
@@ -128,7 +128,7 @@ def draw_matching_hits(target: Path | BytesIO, dissection: Dissection) -> None:
 
     places = np.arange(len(names))
     title = f"{policy_title(dissection)}: how well matching finds units that act"
-    with figure_page(target, 1.1 + 0.19 * len(names), title) as figure:
+    with open_figure_page(target, 1.1 + 0.19 * len(names), title) as figure:
         left, right = figure.subplots(1, 2, sharey=True)
         width = 0.8 / (1 + len(TOP_MATCHES))
         shades = ("#c85200", "#ff9a4d", "#ffc79b")

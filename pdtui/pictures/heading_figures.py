@@ -17,8 +17,8 @@ from rich.table import Table
 from pdtui.core.attributes import Floats, wrap_angles
 from pdtui.core.errors import PictureError
 from pdtui.core.printable_text import to_json
-from pdtui.pictures.matplotlib_page import figure_page
-from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, to_hex
+from pdtui.pictures.matplotlib_page import open_figure_page
+from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, color_to_hex
 from pdtui.pictures.report_file import TIME, open_report_file, table_to_markdown
 
 APP = "pdtui-tracking"
@@ -107,10 +107,10 @@ def draw_heading_pictures(paths: Sequence[Path], shown: HeadingFigure) -> None:
 def _draw_heading_figure(path: Path, shown: HeadingFigure) -> None:
     """Draw headings over their target, with the middle 90 % of seeds, and below them the mean |error|."""
     times: Floats = np.arange(len(shown.target), dtype=np.float64) * shown.dt
-    with figure_page(path, 4.2, shown.title) as figure:
+    with open_figure_page(path, 4.2, shown.title) as figure:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         above.plot(times, shown.target, color="black", linewidth=0.9, linestyle="--", label="target")
-        for behavior, color in zip(shown.behaviors, cycle(map(to_hex, CYCLE)), strict=False):
+        for behavior, color in zip(shown.behaviors, cycle(map(color_to_hex, CYCLE)), strict=False):
             mean, low, high, error = behavior.statistics(shown.target)
             above.fill_between(times, low, high, color=color, alpha=0.2, linewidth=0.0)
             above.plot(times, mean, color=color, label=f"{behavior.name}: {behavior.note}")

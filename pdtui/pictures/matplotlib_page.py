@@ -40,7 +40,7 @@ _STYLE: dict[str, Any] = {
 
 
 @contextmanager
-def figure_page(target: Path | BytesIO, height: float, title: str) -> Iterator[Figure]:
+def open_figure_page(target: Path | BytesIO, height: float, title: str) -> Iterator[Figure]:
     """Yield a figure that is written as a PNG when the block ends without an error.
 
     A file's folder is made, and the file is replaced once the picture is whole. The height is in inches.
@@ -64,7 +64,7 @@ def figure_page(target: Path | BytesIO, height: float, title: str) -> Iterator[F
             figure.savefig(file, format="png", metadata={"Title": title, "Software": "pdtui"})
 
 
-def check_figure(path: Path, overwrite: bool) -> None:
+def check_figure_path(path: Path, overwrite: bool) -> None:
     """Find out before the work whether one figure may be written.
 
     Raises:

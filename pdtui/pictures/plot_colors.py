@@ -20,12 +20,12 @@ GREY: RgbColor = (150, 150, 150)
 CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 
 
-def to_hex(color: RgbColor) -> str:
+def color_to_hex(color: RgbColor) -> str:
     """Return the colour as ``#rrggbb``."""
     return "#" + bytes(color).hex()
 
 
-def diverging(values: Floats, limit: float) -> NDArray[np.uint8]:
+def diverging_colors(values: Floats, limit: float) -> NDArray[np.uint8]:
     """Colour values: vermillion below zero, white at zero, blue above, grey where there is no number.
 
     From a magnitude of `limit` on the colours no longer change. Values have any shape (...); the red, green

@@ -16,13 +16,13 @@ from pdtui.core.errors import PictureError
 from pdtui.core.units import format_unit, parse_unit
 from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.attribute_movers import movable_columns
-from pdtui.pictures.matplotlib_page import figure_page
-from pdtui.pictures.plot_colors import CYCLE, to_hex
+from pdtui.pictures.matplotlib_page import open_figure_page
+from pdtui.pictures.plot_colors import CYCLE, color_to_hex
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.spectra.matching import match_units
-from pdtui.spectra.matching_presets import find_preset
-from pdtui.spectra.monitor import monitor_episodes
+from pdtui.spectra.matching_presets import find_matching_preset
 from pdtui.spectra.phase_correlation import correlate_phases
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def pair_units_with_attributes(
         raise PictureError(
             f"expected an attribute for each unit, got {len(units)} units and {len(attributes)} attributes"
         )
-    spectrum = find_preset(preset)
+    spectrum = find_matching_preset(preset)
     with RolloutPool(robot, policy, workers=1, import_options=import_options) as pool:
         world, network = pool.robot, pool.policy
         flats = [parse_unit(unit, network.layers) for unit in units]
@@ -149,10 +149,10 @@ def draw_unit_attribute_pairs(
             f"the episode lasts {curves.times[-1]:g} s; nothing is left to show from {start:g} s on"
         )
     title = f"{curves.robot}, driven by {curves.policy}: units and attributes, episode of seed {curves.seed}"
-    with figure_page(path, 0.75 + _PANEL_HEIGHT * len(curves.pairs), title) as figure:
+    with open_figure_page(path, 0.75 + _PANEL_HEIGHT * len(curves.pairs), title) as figure:
         panels = figure.subplots(len(curves.pairs), 1, sharex=True, squeeze=False)[:, 0]
         for panel, pair, color in zip(panels, curves.pairs, cycle(CYCLE), strict=False):
-            _draw_pair(panel, pair, curves.times, part, to_hex(color))
+            _draw_pair(panel, pair, curves.times, part, color_to_hex(color))
         panels[-1].set_xlabel("time since the reset (s)")
         panels[-1].set_xlim(curves.times[part][0], curves.times[part][-1])
         _draw_key(figure)

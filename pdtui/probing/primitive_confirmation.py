@@ -87,7 +87,7 @@ def select_units_to_refine(
     return tuple(sorted(chosen))
 
 
-def draw_control_units(screen: UnitEffects, count: int, seed: int) -> tuple[int, ...]:
+def sample_control_units(screen: UnitEffects, count: int, seed: int) -> tuple[int, ...]:
     """Draw units at random, whatever they do: a ranking has to beat them."""
     rng = np.random.default_rng(seed)
     chosen = rng.choice(screen.units, size=min(count, len(screen.units)), replace=False)

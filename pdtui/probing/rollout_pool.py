@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from pdtui.core.closable import Closable
 from pdtui.core.worker_pool import StepProgress, WorkerPool
-from pdtui.policies.runtime.policy import Policy, check_fit
+from pdtui.policies.runtime.policy import Policy, check_policy_fit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, WorldSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.probing.start_states import StartState
@@ -71,7 +71,7 @@ class RolloutPool(Closable):
         with ExitStack() as stack:
             self.robot = stack.enter_context(open_robot(robot))
             self.policy = policy if isinstance(policy, Policy) else _load(policy, self.robot, import_options)
-            check_fit(self.policy, self.robot, self.robot.name)
+            check_policy_fit(self.policy, self.robot, self.robot.name)
             self._resources = stack.pop_all()
         named = isinstance(robot, str) and not isinstance(policy, Policy)
         self._pool = WorkerPool(

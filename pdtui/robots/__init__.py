@@ -2,6 +2,20 @@
 
 from __future__ import annotations
 
-from pdtui.robots.registry import check_robot, file_stem, make_robot, open_robot, robot_names, trust_module
+from pdtui.robots.registry import (
+    list_robot_names,
+    make_robot,
+    open_robot,
+    resolve_robot_name,
+    robot_file_stem,
+    trust_module,
+)
 
-__all__ = ["check_robot", "file_stem", "make_robot", "open_robot", "robot_names", "trust_module"]
+__all__ = [
+    "list_robot_names",
+    "make_robot",
+    "open_robot",
+    "resolve_robot_name",
+    "robot_file_stem",
+    "trust_module",
+]

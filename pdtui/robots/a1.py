@@ -15,7 +15,13 @@ from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.legged.terrain import RoughGround, draw_rough_ground, scatter_trees
 from pdtui.robots.robot import TRUNK_ATTRIBUTES, ResetResult, StepResult, TrainingRecipe, torque_attributes
-from pdtui.robots.simulators.bullet_robot import BulletRobot, add_ground, add_plane, add_trees, data_folder
+from pdtui.robots.simulators.bullet_robot import (
+    BulletRobot,
+    add_ground_plane,
+    add_rough_ground,
+    add_trees,
+    bullet_data_folder,
+)
 from pdtui.robots.simulators.urdf_links import read_urdf_links
 from pdtui.robots.task import Task
 
@@ -106,7 +112,7 @@ class A1(BulletRobot):
         self._top_speed = top_speed
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93,), np.float64)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (6,), np.float32)
-        self._urdf = data_folder() / "a1" / "a1.urdf"
+        self._urdf = bullet_data_folder() / "a1" / "a1.urdf"
         self.links = read_urdf_links(self._urdf, ("trunk", *_JOINTS))
         self.rebuild_world(0, terrain)
         limits = [self.bullet.getJointInfo(self.robot_id, joint)[10] for joint in self._joints]
@@ -126,10 +132,10 @@ class A1(BulletRobot):
         self.ground: RoughGround | None = None
         self.obstacles = np.empty((0, 3))
         if start == "plane":
-            add_plane(bullet, _FRICTION)
+            add_ground_plane(bullet, _FRICTION)
         else:
             self.ground = draw_rough_ground(rng, self._roughness)
-            add_ground(bullet, self.ground, _FRICTION)
+            add_rough_ground(bullet, self.ground, _FRICTION)
         if start == "forest":
             self.obstacles = scatter_trees(rng, self._density)
         self._trees = add_trees(bullet, self.obstacles)

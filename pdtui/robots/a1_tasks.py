@@ -24,7 +24,7 @@ _STAND_SPEED = 0.3
 _FASTER = 1.1
 
 
-def turns(trace: RunTrace, sign: float) -> TaskVerdict:
+def judge_turn(trace: RunTrace, sign: float) -> TaskVerdict:
     """Judge whether it turns by 0.15 rad/s on average (left for sign 1, right for −1) while it walks."""
     yaw, walks = trace["yaw"][_WINDOW], trace.mean("speed", _WINDOW)
     rate = float(yaw[-1] - yaw[0]) / (_STEP * (len(yaw) - 1)) if len(yaw) > 1 else 0.0
@@ -36,7 +36,7 @@ def turns(trace: RunTrace, sign: float) -> TaskVerdict:
     return TaskVerdict(done, score, {"yaw rate (rad/s)": rate, "speed (m/s)": walks})
 
 
-def stops(trace: RunTrace) -> TaskVerdict:
+def judge_stop(trace: RunTrace) -> TaskVerdict:
     """Judge whether it is slower than 0.3 m/s from 1.2 s on, on average, and on its feet for 2.4 s."""
     usual = trace.mean_before("speed", _USUAL_STEPS)
     left, up = trace.mean("speed", _LATE, usual), trace.stays_up(_STEPS)
@@ -47,7 +47,7 @@ def stops(trace: RunTrace) -> TaskVerdict:
     return TaskVerdict(up and left < _STAND_SPEED, score, figures)
 
 
-def speeds_up(trace: RunTrace) -> TaskVerdict:
+def judge_speed_up(trace: RunTrace) -> TaskVerdict:
     """Judge whether it moves along x a tenth faster than by itself."""
     speed, up = trace.mean("vx", _WINDOW), trace.stays_up(_STEPS)
     gained = speed / max(trace.mean_before("vx", _USUAL_STEPS), 1e-6)
@@ -65,15 +65,15 @@ A1_TASKS: tuple[Task, ...] = (
         "a",
         "turns left while it walks",
         "0.15 rad/s to the left, on its feet",
-        partial(turns, sign=1.0),
+        partial(judge_turn, sign=1.0),
     ),
     _task(
         "right",
         "d",
         "turns right while it walks",
         "0.15 rad/s to the right, on its feet",
-        partial(turns, sign=-1.0),
+        partial(judge_turn, sign=-1.0),
     ),
-    _task("stop", "s", "stops and stands", "under 0.3 m/s after 1.2 s, on its feet", stops),
-    _task("forward", "w", "walks on faster", "a tenth faster than by itself", speeds_up),
+    _task("stop", "s", "stops and stands", "under 0.3 m/s after 1.2 s, on its feet", judge_stop),
+    _task("forward", "w", "walks on faster", "a tenth faster than by itself", judge_speed_up),
 )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.robot_data import CommandRange
-from pdtui.robots.geometry import roll_pitch_yaw, rotate
+from pdtui.robots.geometry import roll_pitch_yaw, rotate_vectors
 from pdtui.robots.legged.observations_and_rewards import (
     COMMAND_SCALES,
     LeggedMotion,
@@ -172,7 +172,7 @@ class Anymal(MujocoRobot):
         vx, vy = self.data.qvel[:2].tolist()
         roll, pitch, yaw = roll_pitch_yaw(*self.data.qpos[3:7].tolist())
         forward, sideways = math.cos(yaw) * vx + math.sin(yaw) * vy, math.cos(yaw) * vy - math.sin(yaw) * vx
-        yaw_rate = float(rotate(self.data.qpos[3:7], self.data.qvel[3:6])[2])
+        yaw_rate = float(rotate_vectors(self.data.qpos[3:7], self.data.qvel[3:6])[2])
         commands = self._command[[list(COMMANDS).index(name) for name in self.commands]]
         height, torques = float(self.data.qpos[2]), self.data.actuator_force.tolist()
         moves = (vx, vy, math.hypot(vx, vy), forward, sideways, yaw, yaw_rate, roll, pitch, height)

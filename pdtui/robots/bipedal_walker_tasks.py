@@ -24,7 +24,7 @@ def _walks(trace: RunTrace, usual: float, steps: int) -> tuple[bool, float]:
     return trace.stays_up(steps) and speed >= _WALK_SHARE * usual, speed
 
 
-def jumps(trace: RunTrace) -> TaskVerdict:
+def judge_jump(trace: RunTrace) -> TaskVerdict:
     """Judge whether the hull rises by half a metre, and the robot lands and walks on."""
     rise = float(trace["height"].max()) - trace.mean_before("height", _USUAL_STEPS)
     walks, speed = _walks(trace, trace.mean_before("vx", _USUAL_STEPS), _JUMP_STEPS)
@@ -33,7 +33,7 @@ def jumps(trace: RunTrace) -> TaskVerdict:
     return TaskVerdict(rise >= _JUMP_HEIGHT and walks, score, figures)
 
 
-def flips(trace: RunTrace) -> TaskVerdict:
+def judge_flip(trace: RunTrace) -> TaskVerdict:
     """Judge whether it turns forward by 300° or more; whether it lands is a figure of its own."""
     pitch = trace["pitch"]
     turned = math.degrees(float(np.max(pitch) - pitch[0]))
@@ -44,7 +44,7 @@ def flips(trace: RunTrace) -> TaskVerdict:
     return TaskVerdict(turned >= _FLIP_ANGLE, score, figures)
 
 
-def stands_up(trace: RunTrace) -> TaskVerdict:
+def judge_stand_up(trace: RunTrace) -> TaskVerdict:
     """Judge whether it walks again by the end."""
     walks, speed = _walks(trace, _WALK_SPEED, _STAND_STEPS)
     share = max(0.0, min(1.0, speed / (_WALK_SHARE * _WALK_SPEED)))
@@ -60,7 +60,7 @@ BIPEDAL_WALKER_TASKS = (
         wanted="hull 0.5 m over its usual height, then walks on",
         walk=(60, 120),
         steps=_JUMP_STEPS,
-        judge=jumps,
+        judge=judge_jump,
         period=50,
     ),
     Task(
@@ -70,7 +70,7 @@ BIPEDAL_WALKER_TASKS = (
         wanted="turns forward by 300° or more",
         walk=(60, 120),
         steps=_FLIP_STEPS,
-        judge=flips,
+        judge=judge_flip,
         period=80,
     ),
     Task(
@@ -80,7 +80,7 @@ BIPEDAL_WALKER_TASKS = (
         wanted="walks at half its speed at the end of 300 steps",
         walk=(0, 0),
         steps=_STAND_STEPS,
-        judge=stands_up,
+        judge=judge_stand_up,
         start="split",
         period=100,
     ),

@@ -24,7 +24,7 @@ def multiply_quaternions(a: Floats, b: Floats) -> Floats:
     return np.stack([w, x, y, z], axis=-1)
 
 
-def rotate(quaternion: Floats, vector: Floats) -> Floats:
+def rotate_vectors(quaternion: Floats, vector: Floats) -> Floats:
     """Rotate vectors (..., 3) by quaternions (..., 4): v + w t + u × t with t = 2 u × v, u = (x, y, z)."""
     w, ux, uy, uz = (quaternion[..., part] for part in range(4))
     vx, vy, vz = (vector[..., part] for part in range(3))
@@ -45,17 +45,17 @@ def roll_pitch_yaw(w: float, x: float, y: float, z: float) -> tuple[float, float
     return roll, pitch, yaw
 
 
-def root_body(links: Sequence[Link]) -> int:
+def root_body_row(links: Sequence[Link]) -> int:
     """Return the row of the poses that stands for the robot's position: the body of its first shape."""
     return links[0].body if links else 0
 
 
-def place_links(links: Sequence[Link], poses: Floats) -> Floats:
+def compute_link_poses(links: Sequence[Link], poses: Floats) -> Floats:
     """Return the world poses of links, shape (..., L, 7), from body poses, shape (..., B, 7)."""
     bodies = poses[..., [link.body for link in links], :]
     offsets = np.array([link.position for link in links], dtype=np.float64)
     turns = np.array([link.quaternion for link in links], dtype=np.float64)
-    position = bodies[..., :3] + rotate(bodies[..., 3:], offsets)
+    position = bodies[..., :3] + rotate_vectors(bodies[..., 3:], offsets)
     return np.concatenate([position, multiply_quaternions(bodies[..., 3:], turns)], axis=-1)
 
 
@@ -64,7 +64,7 @@ def capsule_ends(links: Sequence[Link], placed: Floats) -> Floats:
 
     Args:
         links: The shapes; a box counts as a segment along its longest side.
-        placed: Their world poses from `place_links`, shape (..., L, 7).
+        placed: Their world poses from `compute_link_poses`, shape (..., L, 7).
     """
     axes = np.zeros((len(links), 3))
     for row, link in enumerate(links):
@@ -72,5 +72,5 @@ def capsule_ends(links: Sequence[Link], placed: Floats) -> Floats:
             axes[row, 2] = link.size[1]
         elif link.shape == "box":
             axes[row, int(np.argmax(link.size))] = max(link.size)
-    half = rotate(placed[..., 3:], axes)
+    half = rotate_vectors(placed[..., 3:], axes)
     return np.stack([placed[..., :3] - half, placed[..., :3] + half], axis=-2)

@@ -28,7 +28,7 @@ GROUP = "pdtui.robots"
 TRUSTED = "PDTUI_ENVIRONMENT_MODULES"
 
 
-def own_robots() -> dict[str, str]:
+def find_own_robots() -> dict[str, str]:
     """Return the modules of pdtui's own robots by name, without importing them.
 
     A robot is any class, in a module of this package, that assigns its name to ``name``.
@@ -43,9 +43,9 @@ def own_robots() -> dict[str, str]:
     return dict(sorted(names.items()))
 
 
-def robot_names() -> list[str]:
+def list_robot_names() -> list[str]:
     """Return the names of pdtui's own robots, then of those of other packages."""
-    return [*own_robots(), *(entry.name for entry in entry_points(group=GROUP))]
+    return [*find_own_robots(), *(entry.name for entry in entry_points(group=GROUP))]
 
 
 def trust_module(robot: str) -> None:
@@ -58,13 +58,13 @@ def trust_module(robot: str) -> None:
         os.environ[TRUSTED] = ",".join([*_trusted_modules(), module])
 
 
-def check_robot(name: str) -> str:
+def resolve_robot_name(name: str) -> str:
     """Return the name of a robot that can be built here.
 
     Raises:
         RobotError: There is no robot of that name; the message lists close matches.
     """
-    if name not in own_robots() and _find_entry_point(name) is None:
+    if name not in find_own_robots() and _find_entry_point(name) is None:
         _find_environment(name)
     return name
 
@@ -80,7 +80,7 @@ def make_robot(name: str, **options: Any) -> Robot:
     Raises:
         RobotError: No robot has that name, or what it needs is not installed.
     """
-    module = own_robots().get(name)
+    module = find_own_robots().get(name)
     if module is not None:
         return _build_own(name, module, options)
     entry = _find_entry_point(name)
@@ -101,7 +101,7 @@ def open_robot(robot: str | Robot) -> Iterator[Robot]:
         yield built
 
 
-def file_stem(name: str) -> str:
+def robot_file_stem(name: str) -> str:
     """Return a robot's name as part of a file name: an environment's id may contain ``/`` and ``:``."""
     return re.sub(r"[^\w.-]", "-", name)
 
@@ -165,7 +165,7 @@ def _find_environment(name: str) -> str:
         _import_trusted(module, name)
     if environment in gymnasium.registry:
         return environment
-    robots = robot_names()
+    robots = list_robot_names()
     known = {one.lower(): one for one in [*robots, *gymnasium.registry]}
     close = [known[one] for one in get_close_matches(environment.lower(), known, 4, 0.5)]
     hint = f"did you mean {', '.join(close)}" if close else f"available: {', '.join(sorted(robots))}"

@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.core.attributes import Attribute, Floats, column_of
+from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import RobotError
 from pdtui.core.robot_data import NO_OBSTACLES, CommandRange, Link, RobotState
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
@@ -168,7 +168,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         Raises:
             RobotError: The robot has no such attribute.
         """
-        return column_of(name, self.attributes, self.name)
+        return attribute_column(name, self.attributes, self.name)
 
     def _check_snapshot(self, snapshot: RobotState) -> None:
         if snapshot.robot != self.name:

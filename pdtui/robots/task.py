@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pdtui.core.attributes import Attribute, Floats, column_of
+from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import MapError
 
 
@@ -29,12 +29,12 @@ class RunTrace:
 
     def before(self, name: str) -> Floats:
         """Return an attribute before the behavior, shape (W,)."""
-        column: Floats = self.walked[:, column_of(name, self.attributes, "task")]
+        column: Floats = self.walked[:, attribute_column(name, self.attributes, "task")]
         return column
 
     def __getitem__(self, name: str) -> Floats:
         """Return an attribute from the behavior on, shape (T,)."""
-        column: Floats = self.values[:, column_of(name, self.attributes, "task")]
+        column: Floats = self.values[:, attribute_column(name, self.attributes, "task")]
         return column
 
     def __len__(self) -> int:
@@ -69,7 +69,7 @@ class TaskVerdict:
     figures: dict[str, float]
 
 
-def mean_figures(verdicts: Iterable[TaskVerdict]) -> dict[str, float]:
+def average_figures(verdicts: Iterable[TaskVerdict]) -> dict[str, float]:
     """Return the mean of each figure over the verdicts that have it."""
     found: dict[str, list[float]] = {}
     for verdict in verdicts:

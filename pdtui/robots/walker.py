@@ -24,7 +24,7 @@ _SLOW_SHARE, _SLOWING_STEPS, _SLOW_STEPS = 0.25, 100, 200
 _HOP_FROM, _HOP_STEPS, _HOP_SHARE, _HOP_SPEED = 50, 150, 0.8, 0.3
 
 
-def slows_down(trace: RunTrace) -> TaskVerdict:
+def judge_slow_down(trace: RunTrace) -> TaskVerdict:
     """Judge whether it has less than a quarter of its speed from step 100 on and stays up for 200 steps."""
     usual = trace.mean_before("vx", 100)
     steps = _SLOWING_STEPS + _SLOW_STEPS
@@ -38,7 +38,7 @@ def slows_down(trace: RunTrace) -> TaskVerdict:
     return TaskVerdict(up and left < _SLOW_SHARE, score, figures)
 
 
-def hops(trace: RunTrace) -> TaskVerdict:
+def judge_hop(trace: RunTrace) -> TaskVerdict:
     """Judge whether one foot stays off the ground for 80 % of 150 steps in a row while it moves forward.
 
     In a row, because each foot of a fast runner is off the ground for 80 % of the time, too.
@@ -76,7 +76,7 @@ WALKER_TASKS = (
         wanted="under 25 % of its speed after 100 steps, up for 200 more",
         walk=(200, 300),
         steps=_SLOWING_STEPS + _SLOW_STEPS,
-        judge=slows_down,
+        judge=judge_slow_down,
     ),
     Task(
         name="hop",
@@ -85,7 +85,7 @@ WALKER_TASKS = (
         wanted="one foot off the ground for 80 % of 150 steps in one stretch, moving forward",
         walk=(200, 300),
         steps=_HOP_FROM + _HOP_STEPS,
-        judge=hops,
+        judge=judge_hop,
     ),
 )
 

@@ -35,7 +35,7 @@ def reachable_goals(robot: Robot, unperturbed: Floats) -> tuple[BehaviorGoal, ..
     )
 
 
-def goal_gains(goal: BehaviorGoal, column: int, result: PlanEffects) -> Floats:
+def measure_goal_gains(goal: BehaviorGoal, column: int, result: PlanEffects) -> Floats:
     """Return how far each plan moves the attribute towards the goal from each start, shape (S, K).
 
     The gain is in the attribute's unit; for a stop it is the share by which the mean shrinks. A roll-out that
@@ -52,7 +52,7 @@ def goal_gains(goal: BehaviorGoal, column: int, result: PlanEffects) -> Floats:
     return gains
 
 
-def goal_scores(goal: BehaviorGoal, column: int, result: PlanEffects, units: Sequence[int]) -> Floats:
+def score_plans_by_goal(goal: BehaviorGoal, column: int, result: PlanEffects, units: Sequence[int]) -> Floats:
     """Return the score of each plan in multiples of the gain that is enough, shape (S,).
 
     The score is the average of the gains' mean and lower quintile over the starts: a behavior has to work
@@ -65,7 +65,7 @@ def goal_scores(goal: BehaviorGoal, column: int, result: PlanEffects, units: Seq
         result: measured effects of the plans.
         units: number of units that each plan overwrites.
     """
-    gain = goal_gains(goal, column, result)
+    gain = measure_goal_gains(goal, column, result)
     sure = 0.5 * (gain.mean(axis=1) + np.quantile(gain, _QUANTILE, axis=1)) / goal.enough
     doublings = np.log2(np.maximum(np.array(units, np.float64), 1.0))
     penalties = _FALL_PENALTY * result.falls.mean(axis=1) + _DOUBLING_PENALTY * doublings

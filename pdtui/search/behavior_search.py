@@ -16,7 +16,7 @@ from pdtui.core.worker_pool import StepProgress
 from pdtui.probing.effect_probe import EffectProbe, PlanEffects, UnitEffects
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot_goals import BehaviorGoal
-from pdtui.search.behavior_goals import goal_gains, goal_scores
+from pdtui.search.behavior_goals import measure_goal_gains, score_plans_by_goal
 from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionSettings, SearchProblem
 from pdtui.search.shared_candidates import SharedCandidates
 from pdtui.search.stimulation_sampler import StimulationSampler
@@ -55,10 +55,10 @@ class BehaviorSearchResult:
     Attributes:
         goal: the goal.
         stimulation: units and outputs v.
-        score: score from the held-out starts, see `goal_scores`.
+        score: score from the held-out starts, see `score_plans_by_goal`.
         search_score: score from the starts that the search saw, which is partly luck.
         change: change of the attribute from the held-out starts, with its interval and the falls.
-        gain: mean gain over the held-out starts with its interval, see `goal_gains`.
+        gain: mean gain over the held-out starts with its interval, see `measure_goal_gains`.
         success: share of the held-out starts from which the gain was enough, without a fall.
         falls: share of the held-out starts from which the robot fell.
         value: mean of the attribute with the stimulation, from the held-out starts.
@@ -149,7 +149,7 @@ class BehaviorSearch:
 
     def _score(self, plans: Sequence[Stimulation], starts: Sequence[StartState], steps: int) -> Floats:
         units = [len(plan.units) for plan in plans]
-        return goal_scores(self.goal, self.column, self._probe(plans, starts, steps), units)
+        return score_plans_by_goal(self.goal, self.column, self._probe(plans, starts, steps), units)
 
     def _probe(self, plans: Sequence[Stimulation], starts: Sequence[StartState], steps: int) -> PlanEffects:
         # The first third is the transient, which evaluation leaves out as well.
@@ -180,7 +180,7 @@ class BehaviorSearch:
     def _measure(self, best: Stimulation, search_score: float, began: int) -> BehaviorSearchResult:
         column = self.column
         held = self._probe([best], self.starts.held_out, self.settings.final_steps)
-        gain = goal_gains(self.goal, column, held)[0]
+        gain = measure_goal_gains(self.goal, column, held)[0]
         low, high = bootstrap_interval(gain, 0)
         effects, falls = held.effects[0, :, column], held.falls[0]
         change = MeasuredEffect(
@@ -192,7 +192,7 @@ class BehaviorSearch:
         return BehaviorSearchResult(
             goal=self.goal,
             stimulation=best,
-            score=float(goal_scores(self.goal, column, held, [len(best.units)])[0]),
+            score=float(score_plans_by_goal(self.goal, column, held, [len(best.units)])[0]),
             search_score=search_score,
             change=change,
             gain=MeasuredEffect(float(gain.mean()), low, high),

@@ -21,7 +21,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.search.gain_search_space import gains_from_point, point_from_gains, sample_gain_points
+from pdtui.search.pid_gain_space import gains_from_point, point_from_gains, sample_gain_points
 from pdtui.search.plan_search import Deadline, ScoringStage, TimeBudget, select_plans
 from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveResult, TrackingDriveRunner
 from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarise_tracking

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.core.units import Stimulation
 from pdtui.search.stimulation_sampler import round_outputs
-from pdtui.spectra.monitor import MonitoredEpisode
+from pdtui.spectra.episode_monitor import MonitoredEpisode
 
 _FLOOR = 0.05
 """Added to the spread within parts, so that a nearly silent unit does not count as telling."""
@@ -67,7 +67,7 @@ def build_imprint_candidates(
     for column, attribute in enumerate(attributes):
         if attribute.unit == "N m" or not np.isfinite(values[:, column]).all():
             continue
-        part = range_parts(values[:, column], attribute, settings.bins)
+        part = assign_range_bins(values[:, column], attribute, settings.bins)
         shown, telling = _contrast(activations, part)
         for row in shown:
             for group in groups:
@@ -80,7 +80,7 @@ def build_imprint_candidates(
     return tuple(plans)
 
 
-def range_parts(values: Floats, attribute: Attribute, count: int) -> NDArray[np.intp]:
+def assign_range_bins(values: Floats, attribute: Attribute, count: int) -> NDArray[np.intp]:
     """Return the part of its range that each value is in, 0 to `count` − 1, shape (T,).
 
     The range of an angle that wraps is cut into equal arcs, any other into parts with equally many values.

@@ -11,7 +11,7 @@ from pdtui.core.worker_pool import StepProgress
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot_goals import BehaviorGoal
-from pdtui.search.behavior_goals import goal_scores
+from pdtui.search.behavior_goals import score_plans_by_goal
 from pdtui.search.stimulation_sampler import OutputBounds, StimulationSampler
 
 
@@ -43,7 +43,7 @@ class SharedCandidates:
         """Return the `count` plans of at most `max_units` units with the highest scores for a goal."""
         if not self.plans:
             return []
-        scored = goal_scores(goal, column, self.effects, [len(plan.units) for plan in self.plans])
+        scored = score_plans_by_goal(goal, column, self.effects, [len(plan.units) for plan in self.plans])
         order = [int(index) for index in np.argsort(-scored, kind="stable")]
         return [self.plans[index] for index in order if len(self.plans[index].units) <= max_units][:count]
 
@@ -67,7 +67,7 @@ class SharedCandidates:
         return [(high, low) for _, high, low in pairs[:count]]
 
 
-def draw_random_candidates(units: int, count: int, bounds: OutputBounds, seed: int) -> list[Stimulation]:
+def sample_random_candidates(units: int, count: int, bounds: OutputBounds, seed: int) -> list[Stimulation]:
     """Draw `count` pairs and triples of a policy's units, with random outputs."""
     sampler = StimulationSampler(np.ones(units), bounds, seed)
     most = min(3, units)

@@ -28,7 +28,7 @@ class TimedStimulation:
     steps: int | None = None
 
 
-def walk_steps(task: Task, seed: int) -> int:
+def count_walk_steps(task: Task, seed: int) -> int:
     """Return how many control steps a roll-out of this seed walks before the behavior begins."""
     low, high = task.walk
     return int(np.random.default_rng(seed).integers(low, high + 1))
@@ -42,7 +42,7 @@ def judge_stimulations(
     observation, _ = robot.reset(seed=seed, options=options)
     policy.reset()
     walked = [robot.read_attributes()]
-    for _ in range(walk_steps(task, seed)):
+    for _ in range(count_walk_steps(task, seed)):
         observation, _, terminated, truncated, _ = robot.step(policy.act(observation).action)
         walked.append(robot.read_attributes())
         if terminated or truncated:

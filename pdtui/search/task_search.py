@@ -190,7 +190,7 @@ class TaskSearch:
         size = max(1, min(32, len(plans) // 2 + 1))
         parts = [tuple(plans[low : low + size]) for low in range(0, len(plans), size)]
         jobs = [(self._task.name, part, seed) for part in parts for seed in seeds]
-        results = iter(self._pool.map(judge_task_job, jobs, progress))
+        results = iter(self._pool.map(judge_task_plans, jobs, progress))
         rows: list[list[TaskVerdict]] = []
         for part in parts:
             columns = [next(results) for _ in seeds]
@@ -198,7 +198,7 @@ class TaskSearch:
         return rows
 
 
-def judge_task_job(
+def judge_task_plans(
     robot: Robot, policy: Policy, job: tuple[str, tuple[TimedStimulation, ...], int]
 ) -> list[TaskVerdict]:
     """Judge plans in a worker process; tasks hold functions, so they travel by name."""

@@ -9,11 +9,11 @@ import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle, wrap_angles
 from pdtui.core.closable import Closable
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.core.worker_pool import WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.search.step_response import StepResponse, measure_step_response
 from pdtui.stimulation.stimulation_map import PidGains
 
@@ -82,10 +82,10 @@ class TrackingDriveRunner(Closable):
     """
 
     def __init__(self, config: DriveConfig | ControlLoop, workers: int = 1) -> None:
-        self.loop = build_loop(config) if isinstance(config, DriveConfig) else config
+        self.loop = build_control_loop(config) if isinstance(config, DriveConfig) else config
         workers = workers if isinstance(config, DriveConfig) else 1
         name = f"drives of {self.loop.robot.name}"
-        self._pool = WorkerPool(name, workers, self.loop, build_loop, config)
+        self._pool = WorkerPool(name, workers, self.loop, build_control_loop, config)
 
     def close(self) -> None:
         """End the processes; a later `run` starts new ones."""
@@ -111,10 +111,10 @@ class TrackingDriveRunner(Closable):
         Raises:
             WorkerError: a worker process died.
         """
-        return self._pool.map(drive_targets, drives, progress)
+        return self._pool.map(drive_through_targets, drives, progress)
 
 
-def drive_targets(template: ControlLoop, drive: TrackingDrive) -> TrackingDriveResult:
+def drive_through_targets(template: ControlLoop, drive: TrackingDrive) -> TrackingDriveResult:
     """Run one drive; of the loop given, only the state of its robot and policy changes."""
     stimulation_map = template.map
     if drive.pid is not None:
@@ -141,12 +141,12 @@ def drive_targets(template: ControlLoop, drive: TrackingDrive) -> TrackingDriveR
     return _summarise(drive, path, fell, template.robot.attributes[column].wraps, template.robot.control_dt)
 
 
-def _events(step: int, drive: TrackingDrive, number: int) -> list[Event]:
+def _events(step: int, drive: TrackingDrive, number: int) -> list[DriveEvent]:
     """Return the events before a control step, which counts from the first target."""
     if not drive.behavior or number % STEPS_EACH:
         return []
-    target = Event(step, "target", drive.behavior, drive.targets[number // STEPS_EACH])
-    return [Event(step, "behavior", drive.behavior), target] if number == 0 else [target]
+    target = DriveEvent(step, "target", drive.behavior, drive.targets[number // STEPS_EACH])
+    return [DriveEvent(step, "behavior", drive.behavior), target] if number == 0 else [target]
 
 
 def _summarise(drive: TrackingDrive, path: Floats, fell: bool, wraps: bool, dt: float) -> TrackingDriveResult:

@@ -68,7 +68,7 @@ def summarise_tracking(
     """Summarise drives of one behavior, one per seed, all to the same targets."""
     drive = results[0].drive
     table = np.abs(np.array([one.errors for one in results]))
-    means = seed_errors(results)
+    means = mean_errors_by_seed(results)
     low, high = confidence_interval(means[np.isfinite(means)])
     return TrackingSummary(
         drive.behavior,
@@ -76,25 +76,27 @@ def summarise_tracking(
         unit,
         tuple(one.drive.seed for one in results),
         tuple(
-            TargetErrorSummary(target, finite_mean(table[:, row]), finite_mean(table[:, row, -SETTLED:]))
+            TargetErrorSummary(
+                target, mean_of_finite(table[:, row]), mean_of_finite(table[:, row, -SETTLED:])
+            )
             for row, target in enumerate(drive.targets)
         ),
-        finite_mean(means),
+        mean_of_finite(means),
         low,
         high,
-        finite_mean(table[:, :, -SETTLED:]),
+        mean_of_finite(table[:, :, -SETTLED:]),
         StepResponseSummary.of([response for one in results for response in one.responses]),
         sum(one.fell for one in results),
         default_error,
     )
 
 
-def seed_errors(results: Sequence[TrackingDriveResult]) -> Floats:
+def mean_errors_by_seed(results: Sequence[TrackingDriveResult]) -> Floats:
     """Return the mean |error| of each drive, shape (seeds,); NaN for a fall before the first target."""
     return np.array([one.error for one in results])
 
 
-def finite_mean(values: Floats) -> float:
+def mean_of_finite(values: Floats) -> float:
     """Return the mean of the finite values, NaN if there are none."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else float("nan")
@@ -118,7 +120,7 @@ def choose_tracking_targets(
     if runner.attribute(name).wraps:
         return HEADINGS
     untouched = runner.run([TrackingDrive(name, "", seed, (0.0, 0.0)) for seed in seeds])
-    natural = finite_mean(np.array([one.values for one in untouched]))
+    natural = mean_of_finite(np.array([one.values for one in untouched]))
     if not np.isfinite(natural):
         raise MapError(
             f"behavior '{behavior.name}': expected targets near the value without stimulation, but the robot "

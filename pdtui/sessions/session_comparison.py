@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angles
 from pdtui.core.errors import SessionError
-from pdtui.core.events import Event, describe_event
+from pdtui.core.events import DriveEvent, describe_event
 from pdtui.sessions.environment_versions import version_differences
 from pdtui.sessions.session_reader import Session
 
@@ -130,7 +130,7 @@ def compare_sessions(a: Session, b: Session) -> SessionComparison:
     )
 
 
-def _describe_first_event(a: Sequence[Event], b: Sequence[Event], steps: int) -> str:
+def _describe_first_event(a: Sequence[DriveEvent], b: Sequence[DriveEvent], steps: int) -> str:
     of_a, of_b = ([event for event in events if event.step < steps] for events in (a, b))
     for number, pair in enumerate(zip_longest(of_a, of_b)):
         if pair[0] != pair[1]:

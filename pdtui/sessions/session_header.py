@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.core.errors import SessionError
-from pdtui.core.events import Event
-from pdtui.core.key_table import EVENT_WORDINGS
+from pdtui.core.events import DriveEvent
+from pdtui.core.fixed_keys import EVENT_WORDINGS
 from pdtui.sessions.drive_info import DriveInfo, decode_drive_info
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
@@ -35,7 +35,7 @@ class SessionHeader:
     info: DriveInfo
     versions: dict[str, str] = field(repr=False)
     created: str
-    events: tuple[Event, ...] = field(repr=False)
+    events: tuple[DriveEvent, ...] = field(repr=False)
     steps: int
     endings: dict[int, str] = field(repr=False)
     outcome: str = ""
@@ -71,10 +71,10 @@ def decode_header(file: RrdContents, path: Path, steps: int) -> SessionHeader:
     info, created = decode_drive_info(file.properties(INFO))
     versions = {name: str(values[0]) for name, values in file.properties(VERSIONS).items() if values}
     events, endings = _read_events(file.table(EVENTS)), _read_endings(file.table(ENDINGS))
-    return SessionHeader(path, info, versions, created, events, steps, endings, read_outcome(file))
+    return SessionHeader(path, info, versions, created, events, steps, endings, read_drive_outcome(file))
 
 
-def count_steps(drive: EntityTable) -> int:
+def count_control_steps(drive: EntityTable) -> int:
     """Count control steps; one that is missing is a `SessionError`."""
     steps = drive.steps
     wrong = np.flatnonzero(steps != np.arange(len(steps)))
@@ -83,7 +83,7 @@ def count_steps(drive: EntityTable) -> int:
     return len(steps)
 
 
-def _read_events(table: EntityTable) -> tuple[Event, ...]:
+def _read_events(table: EntityTable) -> tuple[DriveEvent, ...]:
     if not len(table.steps):
         return ()
     numbers = table.read_numbers("number", np.int64)
@@ -97,7 +97,7 @@ def _read_events(table: EntityTable) -> tuple[Event, ...]:
         kind = kinds[row]
         if kind not in EVENT_WORDINGS:
             raise SessionError(f"unknown event '{kind[:40]}'; available: {', '.join(EVENT_WORDINGS)}")
-        events.append(Event(int(table.steps[row]), kind, names[row], float(values[row]), keys[row]))
+        events.append(DriveEvent(int(table.steps[row]), kind, names[row], float(values[row]), keys[row]))
     return tuple(events)
 
 
@@ -107,7 +107,7 @@ def _read_endings(table: EntityTable) -> dict[int, str]:
     return dict(zip(table.steps.tolist(), table.read_texts("TextLog:text"), strict=True))
 
 
-def read_outcome(file: RrdContents) -> str:
+def read_drive_outcome(file: RrdContents) -> str:
     """Return how the drive ended; empty if the recording was cut off."""
     values = file.properties(OUTCOME).get("outcome", [])
     return values[0] if len(values) == 1 and isinstance(values[0], str) else ""

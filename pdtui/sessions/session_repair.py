@@ -16,9 +16,14 @@ from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import DriveInfo, decode_drive_info
 from pdtui.sessions.rrd.chunk_stream import ChunkStream
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_header import SessionHeader, count_steps, decode_header, read_outcome
+from pdtui.sessions.session_header import (
+    SessionHeader,
+    count_control_steps,
+    decode_header,
+    read_drive_outcome,
+)
 from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, INFO, OUTCOME, STEP
-from pdtui.sessions.writer.rerun_recording import name_file_in_errors, open_recording, send_property
+from pdtui.sessions.writer.rerun_recording import name_file_in_errors, open_recording, send_property_group
 
 _CHUNKS_PER_FLUSH = 64
 
@@ -55,7 +60,7 @@ def examine_session(path: Path) -> SessionCondition:
         raise SessionError(f"{path}: nothing can be rescued: {error}") from error
     gaps = np.flatnonzero(steps != np.arange(len(steps)))
     kept = int(gaps[0]) if gaps.size else len(steps)
-    outcome = read_outcome(file)
+    outcome = read_drive_outcome(file)
     whole = file.finished and not gaps.size and bool(outcome)
     return SessionCondition(info, kept, outcome, file.recording_id, whole)
 
@@ -79,7 +84,7 @@ def repair_session(path: Path, output: Path) -> SessionHeader:
     with name_file_in_errors(output), replace_file(output, SessionError) as partial:
         _rewrite(path, partial, condition)
         contents = RrdContents(partial, only=(DIGEST_EPISODE,))
-        repaired = decode_header(contents, output, count_steps(contents.table(DRIVE)))
+        repaired = decode_header(contents, output, count_control_steps(contents.table(DRIVE)))
         if repaired.steps != condition.steps:
             found = f"found {repaired.steps} in the repaired session"
             raise SessionError(f"{path}: expected {condition.steps} steps, {found}")
@@ -95,7 +100,7 @@ def _rewrite(path: Path, output: Path, condition: SessionCondition) -> None:
             if number % _CHUNKS_PER_FLUSH == 0:
                 recording.flush()
         if not condition.outcome:
-            send_property(recording, OUTCOME, {"outcome": f"repaired: cut at step {condition.steps}"})
+            send_property_group(recording, OUTCOME, {"outcome": f"repaired: cut at step {condition.steps}"})
         recording.flush()
     finally:
         recording.disconnect()

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PolicyError
+from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching_presets import MatchingPreset
-from pdtui.spectra.monitor import MonitoredEpisode
 from pdtui.spectra.spectrogram import (
     BLOCK,
-    attribute_series,
     map_unit_blocks,
+    scaled_activation_series,
+    scaled_attribute_series,
     short_time_transform,
     spectrogram,
-    unit_series,
     usable_episodes,
 )
 
@@ -86,11 +86,11 @@ def match_units(
             f"expected an episode of at least {preset.length} steps (one window of preset '{preset}'), "
             f"got {lengths}"
         )
-    targets = [_Spectra(series, preset) for series in attribute_series(used, attributes, preset)]
+    targets = [_Spectra(series, preset) for series in scaled_attribute_series(used, attributes, preset)]
 
     def compare(units: slice) -> tuple[Floats, Floats, dict[int, str]]:
         distance = share = np.zeros((len(attributes), units.stop - units.start))
-        for target, series in zip(targets, unit_series(used, units, preset), strict=True):
+        for target, series in zip(targets, scaled_activation_series(used, units, preset), strict=True):
             one_distance, one_share = _compare(target, _Spectra(series, preset))
             distance, share = distance + one_distance, share + one_share
         return distance / len(used), share / len(used), _find_unit_flaws(used, units, preset)

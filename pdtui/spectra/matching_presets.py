@@ -120,7 +120,7 @@ def preset_values(preset: MatchingPreset) -> dict[str, Any]:
     return {name: everything[name] for name in everything if name in preset_options()}
 
 
-def find_preset(name: str, settings: Sequence[str] = ()) -> MatchingPreset:
+def find_matching_preset(name: str, settings: Sequence[str] = ()) -> MatchingPreset:
     """Return a preset by name, with some of its choices changed.
 
     Each setting is ``NAME=VALUE``; the last one of a name counts.

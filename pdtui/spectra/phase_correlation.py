@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
+from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching_presets import MatchingPreset
-from pdtui.spectra.monitor import MonitoredEpisode
 from pdtui.spectra.spectrogram import (
     BLOCK,
     Complexes,
-    attribute_series,
     map_unit_blocks,
+    scaled_activation_series,
+    scaled_attribute_series,
     short_time_transform,
     spectrogram,
-    unit_series,
     usable_episodes,
 )
 
@@ -75,14 +75,19 @@ def correlate_phases(
     """
     used = usable_episodes(episodes, preset)
     with np.errstate(invalid="ignore", over="ignore"):  # match_units reports what is not finite
-        targets = [short_time_transform(one, preset) for one in attribute_series(used, attributes, preset)]
+        targets = [
+            short_time_transform(one, preset) for one in scaled_attribute_series(used, attributes, preset)
+        ]
         energy = np.sum([spectrogram(target, preset).sum(axis=1) for target in targets], axis=0)
     allowed = np.nan_to_num(energy[:, preset.phase_from_bin :], nan=-1.0)
     bins = np.argmax(allowed, axis=1) + preset.phase_from_bin
     waves = np.concatenate([target[np.arange(len(bins)), :, bins] for target in targets], axis=1)
 
     def compare(units: slice) -> tuple[Floats, Floats]:
-        spectra = [short_time_transform(one, preset)[:, :, bins] for one in unit_series(used, units, preset)]
+        spectra = [
+            short_time_transform(one, preset)[:, :, bins]
+            for one in scaled_activation_series(used, units, preset)
+        ]
         return _correlate(np.concatenate(spectra, axis=1), waves)
 
     units = used[0].activations.shape[1]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from pdtui.core.attributes import Attribute, Floats
+from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching_presets import MatchingPreset
-from pdtui.spectra.monitor import MonitoredEpisode
 
 # Units per block: the spectra of 64 units over one episode of 1000 steps (2 MB) fit into a core's own cache.
 BLOCK = 64
@@ -29,7 +29,7 @@ def usable_episodes(episodes: Sequence[MonitoredEpisode], preset: MatchingPreset
     return [episode for episode in episodes if episode.steps >= preset.length]
 
 
-def attribute_series(
+def scaled_attribute_series(
     episodes: Sequence[MonitoredEpisode], attributes: Sequence[Attribute], preset: MatchingPreset
 ) -> list[Floats]:
     """Return the scaled attributes of each episode, shape (T, J) each."""
@@ -47,7 +47,7 @@ def attribute_series(
     return series
 
 
-def unit_series(
+def scaled_activation_series(
     episodes: Sequence[MonitoredEpisode], units: slice, preset: MatchingPreset
 ) -> list[NDArray[Any]]:
     """Return the scaled activations of B units of each episode, shape (T, B) each."""

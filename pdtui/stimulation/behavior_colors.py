@@ -15,7 +15,7 @@ BEHAVIOR_COLORS = (
 """By row in the map, modulo their number; they differ in lightness as well as in hue."""
 
 
-def behavior_rgb(row: int) -> tuple[int, int, int]:
+def behavior_color_rgb(row: int) -> tuple[int, int, int]:
     """Return red, green and blue, 0 to 255, of the behavior in a row of the map."""
     red, green, blue = bytes.fromhex(BEHAVIOR_COLORS[row % len(BEHAVIOR_COLORS)][1:])
     return red, green, blue

@@ -5,7 +5,7 @@ from __future__ import annotations
 from copy import deepcopy
 from dataclasses import dataclass, replace
 
-from pdtui.core.attributes import Attribute, Floats, column_of
+from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import KeystrokeError
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.core.units import NO_STIMULATION, Stimulation, parse_unit
@@ -57,7 +57,9 @@ class Latch:
                 for outputs in (stimulation_map.units_of(behavior), behavior.base)
             )
             owner = f"{stimulation_map.source}: behavior '{name}'"
-            column = 0 if behavior.pid is None else column_of(behavior.pid.attribute, attributes, owner)
+            column = (
+                0 if behavior.pid is None else attribute_column(behavior.pid.attribute, attributes, owner)
+            )
             steps = None if behavior.period is None else max(1, round(behavior.period / dt))
             self._behaviors[name] = _LatchedBehavior(behavior, weights, base, column, steps)
         self._latched: list[_LatchedBehavior] = []

@@ -41,7 +41,7 @@ def find_map(name: str) -> Path:
     raise MapError(f"no map '{name}'; available: {known}")
 
 
-def bare_map(robot: str, policy: str) -> StimulationMap:
+def map_without_behaviors(robot: str, policy: str) -> StimulationMap:
     """Return a map without behaviors, with which a policy drives alone."""
     source = f"the map of {robot} without behaviors"
     text = compose_map(StimulationMap(robot, policy, "", "space", {}, {}, source=source))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from pdtui.policies.weights.file_search import find_inside
 from pdtui.policies.weights.import_options import NO_NORMALISER, NO_OPTIONS, ImportOptions
+from pdtui.policies.weights.policy_file_lookup import find_file_inside_folders
 from pdtui.stimulation.map_writer import compose_map, replace_policy
 from pdtui.stimulation.stimulation_map import StimulationMap
 
@@ -51,7 +51,7 @@ def locate_map_policy(
 
 def _path_from_here(name: str, folder: Path, source: str) -> str:
     """Return a file's name as seen from the working directory; unchanged if found that way, or nowhere."""
-    found = find_inside(name, (folder,), source) if name else None
+    found = find_file_inside_folders(name, (folder,), source) if name else None
     if found is None or found == Path(name):
         return name
     here = Path.cwd()

@@ -15,7 +15,7 @@ MlpParameters = list[dict[str, jax.Array]]
 and ``shift``."""
 
 
-def init_mlp(key: jax.Array, widths: tuple[int, ...], layer_norm: bool) -> MlpParameters:
+def init_mlp_parameters(key: jax.Array, widths: tuple[int, ...], layer_norm: bool) -> MlpParameters:
     """Draw weights uniformly from ±1/√inputs; biases are zero."""
     layers = []
     for fan_in, fan_out in pairwise(widths):
@@ -29,7 +29,7 @@ def init_mlp(key: jax.Array, widths: tuple[int, ...], layer_norm: bool) -> MlpPa
     return layers
 
 
-def tanh_mlp(params: MlpParameters, x: Any, tanh: Callable[[Any], Any] = jnp.tanh) -> Any:
+def apply_tanh_mlp(params: MlpParameters, x: Any, tanh: Callable[[Any], Any] = jnp.tanh) -> Any:
     """Apply the hidden layers with tanh and the last layer without.
 
     On parameters in NumPy, give NumPy's tanh.

@@ -19,7 +19,7 @@ from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import save_network
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot, is_fall
-from pdtui.training.multilayer_perceptron import MlpParameters, tanh_mlp
+from pdtui.training.multilayer_perceptron import MlpParameters, apply_tanh_mlp
 from pdtui.training.robot_batch import RobotBatch
 from pdtui.training.training_checkpoint import load_checkpoint, save_checkpoint
 from pdtui.training.training_config import TrainingConfig
@@ -73,12 +73,12 @@ def score_actor(make: Callable[[], Robot], actor: Actor, seeds: range, steps: in
     return ActorScore(len(robots), float(returns.mean()), float(returns.std()), mean_speed, int(fallen.sum()))
 
 
-def numpy_actor(params: MlpParameters, rng: np.random.Generator | None) -> Actor:
+def make_numpy_actor(params: MlpParameters, rng: np.random.Generator | None) -> Actor:
     """Return a squashed Gaussian actor in NumPy: its mean actions, or samples where a generator is given."""
     params = jax.tree.map(np.asarray, params)
 
     def act(observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        mean, log_std = np.split(tanh_mlp(params, observation, np.tanh), 2, axis=-1)
+        mean, log_std = np.split(apply_tanh_mlp(params, observation, np.tanh), 2, axis=-1)
         if rng is not None:
             noise = rng.standard_normal(mean.shape, np.float32)
             mean = mean + np.exp(np.clip(log_std, -5.0, 2.0)) * noise
@@ -190,7 +190,7 @@ class PolicyTrainer(ABC, Generic[Config]):
 
     def _evaluate(self) -> ActorScore:
         params = self.averaged_actor()
-        actor = numpy_actor(params, None)
+        actor = make_numpy_actor(params, None)
         score, best = self._score(actor, SELECTION_SEEDS), self._best_score()
         line = {"steps": self.steps, **asdict(score)}
         with (self.folder / "log.jsonl").open("a") as log:

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from pdtui.training.multilayer_perceptron import MlpParameters, init_mlp, tanh_mlp
+from pdtui.training.multilayer_perceptron import MlpParameters, apply_tanh_mlp, init_mlp_parameters
 from pdtui.training.training_config import PpoConfig
 
 _EPSILON = 1e-8
@@ -64,7 +64,7 @@ class _Sample(NamedTuple):
     value_goal: jax.Array
 
 
-def normalise(state: PpoState, observation: jax.Array) -> jax.Array:
+def normalise_observations(state: PpoState, observation: jax.Array) -> jax.Array:
     """Return observations normalised by the running mean and deviation."""
     return (observation - state.mean) / jnp.sqrt(state.variance + _EPSILON)
 
@@ -85,9 +85,9 @@ class PpoLearner:
         """Return the untrained state."""
         config = self.config
         key, actor_key, critic_key = jax.random.split(jax.random.PRNGKey(seed), 3)
-        actor = init_mlp(actor_key, (self.observations, *config.layers, self.actions), False)
+        actor = init_mlp_parameters(actor_key, (self.observations, *config.layers, self.actions), False)
         actor[-1] = jax.tree.map(lambda leaf: 0.01 * leaf, actor[-1])
-        critic = init_mlp(critic_key, (self.observations, *config.layers, 1), False)
+        critic = init_mlp_parameters(critic_key, (self.observations, *config.layers, 1), False)
         log_std = jnp.full(self.actions, config.log_std)
         optimiser, rate = self._tx.init((actor, log_std, critic)), jnp.asarray(config.learning_rate)
         mean, variance, rows_seen = jnp.zeros(self.observations), jnp.ones(self.observations), 1e-4
@@ -133,9 +133,9 @@ class PpoLearner:
 
     def _samples(self, state: PpoState, rollout: PpoRollout) -> _Sample:
         config = self.config
-        observation = normalise(state, rollout.observation)
-        value = tanh_mlp(state.critic, observation)[..., 0]
-        future = tanh_mlp(state.critic, normalise(state, rollout.following))[..., 0]
+        observation = normalise_observations(state, rollout.observation)
+        value = apply_tanh_mlp(state.critic, observation)[..., 0]
+        future = apply_tanh_mlp(state.critic, normalise_observations(state, rollout.following))[..., 0]
         delta = rollout.reward * config.reward_scale + config.discount * rollout.discount * future - value
 
         def backwards(later: jax.Array, now: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
@@ -146,7 +146,7 @@ class PpoLearner:
         _, advantage = jax.lax.scan(
             backwards, jnp.zeros(delta.shape[1]), (delta, rollout.restarted), reverse=True
         )
-        mean = tanh_mlp(state.actor, observation)
+        mean = apply_tanh_mlp(state.actor, observation)
 
         scaled = (advantage - advantage.mean()) / (advantage.std() + _EPSILON)
         log_prob = _log_prob(mean, state.log_std, rollout.action)
@@ -158,11 +158,11 @@ class PpoLearner:
 
         def loss(parameters: tuple[MlpParameters, jax.Array, MlpParameters]) -> tuple[jax.Array, jax.Array]:
             actor, log_std, critic = parameters
-            mean = tanh_mlp(actor, batch.observation)
+            mean = apply_tanh_mlp(actor, batch.observation)
             ratio = jnp.exp(_log_prob(mean, log_std, batch.action) - batch.log_prob)
             clipped = jnp.clip(ratio, 1 - config.clip, 1 + config.clip)
             surrogate = jnp.minimum(ratio * batch.advantage, clipped * batch.advantage).mean()
-            value = tanh_mlp(critic, batch.observation)[..., 0]
+            value = apply_tanh_mlp(critic, batch.observation)[..., 0]
             error = ((value - batch.value_goal) ** 2).mean()
             log_ratio = jnp.log(ratio)
             divergence = (ratio - 1.0 - log_ratio).mean()
@@ -195,6 +195,6 @@ class PpoLearner:
 def sample_actions(state: PpoState, observation: Any, rng: np.random.Generator) -> Any:
     """Draw actions before tanh, in NumPy."""
     x = (observation - np.asarray(state.mean)) / np.sqrt(np.asarray(state.variance) + _EPSILON)
-    mean = tanh_mlp(jax.tree.map(np.asarray, state.actor), x, np.tanh)
+    mean = apply_tanh_mlp(jax.tree.map(np.asarray, state.actor), x, np.tanh)
     noise = rng.standard_normal(mean.shape, np.float32)
     return (mean + np.exp(np.asarray(state.log_std)) * noise).astype(np.float32)

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from pdtui.training.multilayer_perceptron import MlpParameters, init_mlp, tanh_mlp
+from pdtui.training.multilayer_perceptron import MlpParameters, apply_tanh_mlp, init_mlp_parameters
 from pdtui.training.robot_batch import TransitionBatch
 from pdtui.training.training_config import SacConfig
 
@@ -35,7 +35,7 @@ class SacState(NamedTuple):
 
 def actor_forward(params: MlpParameters, observation: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Return mean and log standard deviation before squashing, each (..., actions)."""
-    mean, log_std = jnp.split(tanh_mlp(params, observation), 2, axis=-1)
+    mean, log_std = jnp.split(apply_tanh_mlp(params, observation), 2, axis=-1)
     return mean, jnp.clip(log_std, -5.0, 2.0)
 
 
@@ -79,9 +79,11 @@ class SacLearner:
         """Return the untrained state."""
         config = self.config
         key, actor_key, *critic_keys = jax.random.split(jax.random.PRNGKey(seed), 4)
-        actor = init_mlp(actor_key, (self.observations, *config.layers, 2 * self.actions), False)
+        actor = init_mlp_parameters(actor_key, (self.observations, *config.layers, 2 * self.actions), False)
         widths = (self.observations + self.actions, *config.layers, 1)
-        critics = jax.vmap(partial(init_mlp, widths=widths, layer_norm=True))(jnp.stack(critic_keys))
+        critics = jax.vmap(partial(init_mlp_parameters, widths=widths, layer_norm=True))(
+            jnp.stack(critic_keys)
+        )
         (targets, average), log_alpha = jax.tree.map(jnp.copy, (critics, actor)), jnp.zeros(())
         optimisers = self._actor_tx.init(actor), self._critic_tx.init(critics), self._alpha_tx.init(log_alpha)
         return SacState(actor, critics, targets, log_alpha, *optimisers, key, average)

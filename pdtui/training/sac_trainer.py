@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.training.multilayer_perceptron import MlpParameters
-from pdtui.training.policy_trainer import Actor, PolicyTrainer, numpy_actor
+from pdtui.training.policy_trainer import Actor, PolicyTrainer, make_numpy_actor
 from pdtui.training.robot_batch import RobotBatch, TransitionBatch
 from pdtui.training.sac_learner import SacLearner
 from pdtui.training.training_config import SacConfig
@@ -63,7 +63,7 @@ class SacTrainer(PolicyTrainer[SacConfig]):
     def advance(self) -> int:
         config = self.config
         chunk = config.worlds * config.chunk
-        actor = numpy_actor(self.state.actor, self.rng)
+        actor = make_numpy_actor(self.state.actor, self.rng)
         if self.replay.size >= config.random_steps:
             batches = self.replay.sample(self.rng, chunk // config.steps_per_update, config.batch)
             # The update runs in XLA's threads while the robots below step with the actor before it.

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pdtui.core.errors import TrainingError
-from pdtui.robots import make_robot, robot_names
+from pdtui.robots import list_robot_names, make_robot
 from pdtui.training.training_config import PpoConfig, SacConfig
 
 
@@ -27,9 +27,9 @@ def train_policy(
         TrainingError: The extra ``train`` is not installed, the robot is an environment of Gymnasium or has
             no choice of a forward reward, or the folder holds another run.
     """
-    if robot not in robot_names():
+    if robot not in list_robot_names():
         raise TrainingError(
-            f"expected one of pdtui's own robots ({', '.join(robot_names())}) or another package's, "
+            f"expected one of pdtui's own robots ({', '.join(list_robot_names())}) or another package's, "
             f"found '{robot}'"
         )
     recipe = make_robot(robot).training_recipe

@@ -36,7 +36,7 @@ def format_signed(value: float) -> str:
     return shown if shown.startswith("−") else f"+{shown}"
 
 
-def key_name(key: str) -> str:
+def displayed_key_name(key: str) -> str:
     """Return the name under which the screen shows a key."""
     return make_printable(format_key(key))
 

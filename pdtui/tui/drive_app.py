@@ -18,12 +18,12 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from pdtui.core.errors import PdtuiError
-from pdtui.core.key_table import FIXED_KEYS
+from pdtui.core.fixed_keys import FIXED_KEYS
 from pdtui.driving.client import DriveConnection
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
-from pdtui.tui.cell_text import ScreenRow, key_name
+from pdtui.tui.cell_text import ScreenRow, displayed_key_name
 from pdtui.tui.help_screen import HelpScreen
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
@@ -132,7 +132,7 @@ class DriveApp(App[str]):
         self.screen_stack[0].set_class(too_small, "-too-small")
 
     def set_keymap(self, keymap: Mapping[str, str]) -> None:
-        """Bind other keys, by the bindings' ids in `pdtui.core.key_table`."""
+        """Bind other keys, by the bindings' ids in `pdtui.core.fixed_keys`."""
         super().set_keymap(dict(keymap))
         if self.is_running:
             self._show_keys()
@@ -152,10 +152,12 @@ class DriveApp(App[str]):
 
     def _show_keys(self) -> None:
         now = self.keys_now
-        shown = tuple((key_name(now[name][0]), says) for name, says in _HINTS.items() if name in now)
+        shown = tuple(
+            (displayed_key_name(now[name][0]), says) for name, says in _HINTS.items() if name in now
+        )
         self.query_one(KeyLine).keys = shown
         leave = now.get("quit", now["quit_always"])[0]
-        self.query_one(NoticeLine).hints = f"{key_name(leave)} quits"
+        self.query_one(NoticeLine).hints = f"{displayed_key_name(leave)} quits"
 
     def _poll(self) -> None:
         if self._notice_until and monotonic() > self._notice_until:
@@ -183,12 +185,12 @@ class DriveApp(App[str]):
             event.prevent_default()
             self.action_run_key(event.key)
         elif not self.screen.is_modal and event.key not in self.screen.active_bindings:
-            self.say(f"no behavior has the key {key_name(event.key)}; ? lists all keys")
+            self.say(f"no behavior has the key {displayed_key_name(event.key)}; ? lists all keys")
 
     def action_run_key(self, key: str) -> None:
         """Send a key that changes the run, unless a recording is being watched."""
         if self.watching:
-            self.say(f"{key_name(key)}: this drive follows a recording, so keys cannot change it")
+            self.say(f"{displayed_key_name(key)}: this drive follows a recording, so keys cannot change it")
         elif self.snapshot is not None and self.snapshot.finished:
             self.say("the drive is over")
         elif self.facts is None:

@@ -15,7 +15,7 @@ from textual.widgets import Static
 
 from pdtui.core.printable_text import make_printable
 from pdtui.stimulation.stimulation_map import StimulationMap
-from pdtui.tui.cell_text import key_name
+from pdtui.tui.cell_text import displayed_key_name
 from pdtui.tui.theme import STYLES
 
 _LATCHING = (
@@ -52,8 +52,8 @@ class HelpScreen(ModalScreen[None]):
         text = Text(no_wrap=False)
 
         def line(key: str, says: str, cap: Style, style: Style) -> None:
-            text.append(f" {key_name(key)} ", cap)
-            text.append(" " * max(1, 9 - len(key_name(key))))
+            text.append(f" {displayed_key_name(key)} ", cap)
+            text.append(" " * max(1, 9 - len(displayed_key_name(key))))
             text.append(f"{make_printable(says)}\n", style)
 
         text.append("behaviors\n", STYLES.accent)

@@ -14,14 +14,16 @@ _LEAST = 1.0
 """Radius of the smallest disc, in dots: larger than a dot of the ground."""
 
 
-def draw_from_above(canvas: BrailleCanvas, camera: PerspectiveCamera, obstacles: Floats, ink: int) -> None:
+def draw_obstacles_from_above(
+    canvas: BrailleCanvas, camera: PerspectiveCamera, obstacles: Floats, ink: int
+) -> None:
     """Draw a disc per obstacle, with a rim that keeps the ground grid away."""
     dots, magnification, before = camera.project(obstacles * _ON_GROUND)
     for dot, scale, radius in zip(dots[before], magnification[before], obstacles[before, 2], strict=True):
         canvas.draw_capsule(dot, dot, max(_LEAST, float(radius * scale) * camera.zoom), ink, halo=1.0)
 
 
-def draw_from_side(
+def draw_obstacles_from_side(
     canvas: BrailleCanvas, camera: PerspectiveCamera, obstacles: Floats, ink: int, *, behind: bool
 ) -> None:
     """Draw a trunk per obstacle, far ones first; in front of the robot only its outline, which hides nothing.

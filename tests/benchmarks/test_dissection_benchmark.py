@@ -14,9 +14,9 @@ from pdtui.cli import main
 from pdtui.core.attributes import Attribute
 from pdtui.core.errors import PdtuiError
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import PRESETS
-from pdtui.spectra.monitor import MonitoredEpisode
 
 SMALL = [
     "--episodes",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.console import Console
 
-from pdtui.core.text_tables import list_facts, new_table, seed_range
+from pdtui.core.text_tables import format_seed_range, new_facts_table, new_table
 
 
 def _shown(table: object) -> list[str]:
@@ -25,8 +25,8 @@ def test_columns_are_aligned_as_asked() -> None:
     table = new_table("", "time", "what", left=("what",))
     table.add_row("1 s", "a")
     assert _shown(table) == ["time  what", " 1 s  a"]
-    assert _shown(list_facts([("seed", "3"), ("robot", "ant")])) == ["seed   3", "robot  ant"]
+    assert _shown(new_facts_table([("seed", "3"), ("robot", "ant")])) == ["seed   3", "robot  ant"]
 
 
 def test_one_seed_is_no_range() -> None:
-    assert (seed_range([7]), seed_range(range(100, 120))) == ("seed 7", "20 seeds, 100–119")
+    assert (format_seed_range([7]), format_seed_range(range(100, 120))) == ("seed 7", "20 seeds, 100–119")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.core.attributes import Attribute
-from pdtui.core.key_table import RESERVED_KEYS
+from pdtui.core.fixed_keys import RESERVED_KEYS
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
 from pdtui.dissection.dissection_config import QUICK_DISSECTION
 from pdtui.dissection.draft_map import KeyAllocator
@@ -14,9 +14,9 @@ from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.primitive_confirmation import select_units_to_refine
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
+from pdtui.spectra.episode_monitor import MonitoredEpisode, monitor_episodes
 from pdtui.spectra.matching import match_units
-from pdtui.spectra.matching_presets import find_preset
-from pdtui.spectra.monitor import MonitoredEpisode, monitor_episodes
+from pdtui.spectra.matching_presets import find_matching_preset
 from tests.wired_policy import WIRED_MOTOR, WIRED_UNIT
 
 
@@ -29,7 +29,7 @@ def test_the_unit_that_is_wired_to_a_motor_moves_the_body_both_ways(wired_file: 
         screen = prober.measure_units(range(crew.policy.units), (-4.0, 4.0), starts[:2], steps=16)
         everything = range(len(crew.robot.attributes))
         chosen = select_units_to_refine(
-            screen, match_units(episodes, crew.robot.attributes, find_preset("paper")), everything, 1
+            screen, match_units(episodes, crew.robot.attributes, find_matching_preset("paper")), everything, 1
         )
         refined = prober.measure_units(chosen, (-4.0, 0.0, 4.0), starts[2:4], steps=16)
         plan = replace(QUICK_DISSECTION, mover_steps=18, mover_singles=3, mover_pairs=3)

@@ -25,11 +25,11 @@ from pdtui.probing.primitive_confirmation import rank_correlation
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
 from pdtui.robots.robot_goals import WALKING_GOALS
-from pdtui.search.behavior_goals import goal_gains, goal_scores
+from pdtui.search.behavior_goals import measure_goal_gains, score_plans_by_goal
 from pdtui.search.behavior_search import BehaviorSearchResult, SearchStartStates
 from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.search.plan_search import TimeBudget
-from pdtui.spectra.matching_presets import PRESETS, find_preset, preset_values
+from pdtui.spectra.matching_presets import PRESETS, find_matching_preset, preset_values
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains
 from tests.small_dissection import SMALL
@@ -80,7 +80,7 @@ def test_a_silent_unit_and_a_broken_attribute_are_marked_rows(dissection: Dissec
         flaws={"vx": "not finite in the episodes of seeds [1000]; left out"},
         unit_flaws={9: "never fires"},
     )
-    broken = replace(dissection, matching=matching, preset=find_preset("paper", ["hop=8"]))
+    broken = replace(dissection, matching=matching, preset=find_matching_preset("paper", ["hop=8"]))
     summary = json.loads(json.dumps(summarise_dissection(broken), allow_nan=False))
     assert summary["settings_changed"] == ["hop=8"]
     assert summary["unit_flaws"] == {"1:1": "never fires"}
@@ -172,7 +172,7 @@ def effects(means: list[list[float]], falls: list[list[bool]], unperturbed: list
 def test_a_stop_gains_the_share_of_the_speed_that_is_gone() -> None:
     stop = GOALS[0]
     result = effects([[0.0, 1.0, 3.0]], [[False, False, False]], [4.0, 2.0, 2.0])
-    np.testing.assert_allclose(goal_gains(stop, 0, result), [[1.0, 0.5, -0.5]])
+    np.testing.assert_allclose(measure_goal_gains(stop, 0, result), [[1.0, 0.5, -0.5]])
 
 
 def test_scores_want_every_start_and_no_falls() -> None:
@@ -180,11 +180,11 @@ def test_scores_want_every_start_and_no_falls() -> None:
     never = [[False] * 5] * 2
     result = effects([[0.7] * 5, [2.0, 2.0, 2.0, 0.0, 0.0]], never, [0.0] * 5)
     # By hand: halfway between mean (0.7 and 1.2) and lower fifth (0.7 and 0), in parts of 0.7.
-    np.testing.assert_allclose(goal_scores(up, 0, result, [1, 1]), [1.0, 0.6 / 0.7])
-    np.testing.assert_allclose(goal_scores(up, 0, result, [4, 4]), [0.96, 0.6 / 0.7 - 0.04])
-    assert goal_scores(down, 0, result, [1, 1])[0] == pytest.approx(-1.0)
+    np.testing.assert_allclose(score_plans_by_goal(up, 0, result, [1, 1]), [1.0, 0.6 / 0.7])
+    np.testing.assert_allclose(score_plans_by_goal(up, 0, result, [4, 4]), [0.96, 0.6 / 0.7 - 0.04])
+    assert score_plans_by_goal(down, 0, result, [1, 1])[0] == pytest.approx(-1.0)
     fell = effects([[1.4] * 5], [[True, False, False, False, False]], [0.0] * 5)
-    np.testing.assert_allclose(goal_gains(up, 0, fell), [[0.0, 1.4, 1.4, 1.4, 1.4]])
+    np.testing.assert_allclose(measure_goal_gains(up, 0, fell), [[0.0, 1.4, 1.4, 1.4, 1.4]])
 
 
 def test_rank_correlation() -> None:

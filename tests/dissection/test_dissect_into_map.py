@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pdtui.cli.dissect_command import dissect
+from pdtui.cli.dissect_command import dissect_command
 from pdtui.core.errors import MapError, PictureError
 from pdtui.dissection.dissect_into_map import dissect_into_map, journal_path
 from pdtui.dissection.dissection_config import DissectionConfig
@@ -51,7 +51,7 @@ def test_roll_outs_are_kept_until_map_and_pictures_are_written(policy_file: Path
 
 def test_the_command_has_the_defaults_of_the_python_api() -> None:
     defaults = {field.name: field.default for field in fields(DissectionConfig)}
-    options = {option.name: option.default for option in dissect.params}
+    options = {option.name: option.default for option in dissect_command.params}
     shared = {name for name in options.keys() & defaults.keys() if isinstance(options[name], str | int)}
     assert {"preset", "episodes", "seed"} <= shared
     for name in shared - {"policy"}:

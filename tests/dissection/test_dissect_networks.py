@@ -12,9 +12,9 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.start_states import StartState, collect_start_states
 from pdtui.probing.stimulated_rollout import run_rollout
 from pdtui.robots.robot import Robot
+from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.spectra.matching import match_units
-from pdtui.spectra.matching_presets import find_preset
-from pdtui.spectra.monitor import monitor_episodes
+from pdtui.spectra.matching_presets import find_matching_preset
 from tests.small_worlds import Dot, Pole, dot_policy, pole_policy, trained_conv
 
 WORLDS = [(Dot, dot_policy), (Pole, pole_policy)]
@@ -27,7 +27,7 @@ def test_every_unit_is_monitored_and_matched(
     robot, policy = world(), network()
     episodes = monitor_episodes(robot, policy, range(3), 130)
     assert [episode.activations.shape for episode in episodes] == [(130, policy.units)] * 3
-    found = match_units(episodes, robot.attributes, find_preset("paper"))
+    found = match_units(episodes, robot.attributes, find_matching_preset("paper"))
     assert found.discrepancy.shape == (len(robot.attributes), policy.units)
     assert np.isfinite(found.discrepancy).all()
     again = monitor_episodes(robot, policy, [1], 130)

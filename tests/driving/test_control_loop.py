@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.errors import KeystrokeError
-from pdtui.core.events import Event, group_events_by_step
+from pdtui.core.events import DriveEvent, group_events_by_step
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.runtime.policy import Policy
@@ -21,19 +21,19 @@ def _loop(policy: Policy, small_map: StimulationMap, seed: int = 3, **options: A
     return ControlLoop(make_robot("ant"), policy, small_map, seed, **options)
 
 
-def _drive(loop: ControlLoop, steps: int, events: Iterable[Event] = ()) -> list[StepRecord]:
+def _drive(loop: ControlLoop, steps: int, events: Iterable[DriveEvent] = ()) -> list[StepRecord]:
     by_step = group_events_by_step(events)
     return [loop.advance(by_step.get(step, ())) for step in range(loop.step, loop.step + steps)]
 
 
 EVENTS = (
-    Event(20, "behavior", "push", key="w"),
-    Event(20, "behavior", "twitch", key="t"),
-    Event(40, "default", key="space"),
-    Event(50, "behavior", "hold heading", key="h"),
-    Event(55, "target", "hold heading", 0.4, key="left"),
-    Event(80, "rewind", value=30.0, key="backspace"),
-    Event(90, "reset", key="r"),
+    DriveEvent(20, "behavior", "push", key="w"),
+    DriveEvent(20, "behavior", "twitch", key="t"),
+    DriveEvent(40, "default", key="space"),
+    DriveEvent(50, "behavior", "hold heading", key="h"),
+    DriveEvent(55, "target", "hold heading", 0.4, key="left"),
+    DriveEvent(80, "rewind", value=30.0, key="backspace"),
+    DriveEvent(90, "reset", key="r"),
 )
 
 
@@ -71,17 +71,17 @@ def test_an_event_acts_in_the_step_that_it_is_stamped_with(policy: Policy, small
 def test_a_rewind_restores_the_state_before_that_step(policy: Policy, small_map: StimulationMap) -> None:
     loop = _loop(policy, small_map)
     first = _drive(loop, 60)
-    again = _drive(loop, 20, [Event(60, "rewind", value=30.0)])
+    again = _drive(loop, 20, [DriveEvent(60, "rewind", value=30.0)])
     assert [record.digest for record in again] == [record.digest for record in first[30:50]]
     with pytest.raises(KeystrokeError, match="cannot rewind to step 33; kept steps: every 10th of 0..80"):
-        loop.advance([Event(80, "rewind", value=33.0)])
+        loop.advance([DriveEvent(80, "rewind", value=33.0)])
 
 
 def test_a_fall_starts_the_next_episode_and_clears_the_behaviors(
     policy: Policy, small_map: StimulationMap
 ) -> None:
     loop = _loop(policy, small_map)
-    _drive(loop, 5, [Event(2, "behavior", "push")])
+    _drive(loop, 5, [DriveEvent(2, "behavior", "push")])
     robot = loop.robot
     qpos = robot.data.qpos.copy()  # type: ignore[attr-defined]
     qpos[3:7] = 0, 1, 0, 0
@@ -108,4 +108,4 @@ def test_a_divergence_leaves_a_record(policy: Policy, small_map: StimulationMap)
 
 def test_an_event_of_another_step_is_refused(policy: Policy, small_map: StimulationMap) -> None:
     with pytest.raises(KeystrokeError, match="event for step 7 given to step 0"):
-        _loop(policy, small_map).advance([Event(7, "default")])
+        _loop(policy, small_map).advance([DriveEvent(7, "default")])

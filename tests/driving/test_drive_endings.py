@@ -17,7 +17,7 @@ from pdtui.driving import server
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import ENDING_SIGNALS, catch_ending_signals
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_repair import examine_session
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -60,7 +60,7 @@ def test_an_exception_in_the_simulation_is_told_and_recorded(
     """A world may raise anything; the screen is told what, where, and where the recording is."""
 
     def broken(config: DriveConfig) -> ControlLoop:
-        loop = build_loop(config)
+        loop = build_control_loop(config)
         step = loop.robot.step
 
         def fails(action: object) -> object:

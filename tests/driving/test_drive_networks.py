@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pdtui.core.events import Event, group_events_by_step
+from pdtui.core.events import DriveEvent, group_events_by_step
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.runtime.policy import Policy
@@ -16,14 +16,14 @@ from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 from tests.small_worlds import Dot, Pole, dot_policy, pole_policy
 
 EVENTS = (
-    Event(15, "behavior", "push", key="w"),
-    Event(25, "default", key="space"),
-    Event(33, "rewind", value=20.0),
-    Event(50, "reset"),
+    DriveEvent(15, "behavior", "push", key="w"),
+    DriveEvent(25, "default", key="space"),
+    DriveEvent(33, "rewind", value=20.0),
+    DriveEvent(50, "reset"),
 )
 
 
-def _drive(robot: Robot, policy: Policy, unit: str, events: tuple[Event, ...]) -> list[StepRecord]:
+def _drive(robot: Robot, policy: Policy, unit: str, events: tuple[DriveEvent, ...]) -> list[StepRecord]:
     push = Behavior("push", "w", "pushes", {unit: 1.5})
     loop = ControlLoop(robot, policy, StimulationMap(robot.name, "", "", "space", {}, {"push": push}), 3)
     by_step = group_events_by_step(events)
@@ -49,14 +49,14 @@ def test_events_repeat_the_drive_with_rewind_and_reset(
 
 def test_a_rewind_brings_the_memory_back_with_the_world() -> None:
     plain = _drive(Pole(), pole_policy(), "lstm:7", ())
-    rewound = _drive(Pole(), pole_policy(), "lstm:7", (Event(33, "rewind", value=20.0),))
+    rewound = _drive(Pole(), pole_policy(), "lstm:7", (DriveEvent(33, "rewind", value=20.0),))
     for before, after in zip(plain[20:57], rewound[33:], strict=True):
         np.testing.assert_array_equal(before.activations, after.activations)
         assert before.digest == after.digest
 
 
 def test_an_episode_begins_without_memory() -> None:
-    records = _drive(Pole(), pole_policy(), "lstm:7", (Event(50, "reset"),))
+    records = _drive(Pole(), pole_policy(), "lstm:7", (DriveEvent(50, "reset"),))
     policy = pole_policy()
     robot = Pole()
     robot.reset(seed=3)

@@ -18,10 +18,10 @@ from pdtui.core.text_tables import mean_with_interval
 from pdtui.core.units import Stimulation
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.evaluation.behavior_evaluation import STEPS, evaluate_map, run_behavior
+from pdtui.evaluation.behavior_evaluation import STEPS, evaluate_behaviors, run_behavior_episode
 from pdtui.evaluation.evaluation_tables import tracking_table
 from pdtui.evaluation.policy_evaluation import evaluate_policy
-from pdtui.evaluation.target_tracking import evaluate_tracking, find_pid_behaviors
+from pdtui.evaluation.target_tracking import evaluate_target_tracking, find_pid_behaviors
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -49,7 +49,7 @@ def _mean_vy(policy: Policy, seed: int, pushed: bool) -> float:
 
 def test_effects_are_paired_differences_over_the_last_200_steps(config: DriveConfig, policy: Policy) -> None:
     seeds = [100, 101, 102]
-    result = evaluate_map(config, seeds).behaviors[0]
+    result = evaluate_behaviors(config, seeds).behaviors[0]
     if result.falls or result.default_falls:
         pytest.fail("the untrained policy was chosen to stay up on these seeds")
     pushed = np.array([_mean_vy(policy, seed, True) for seed in seeds])
@@ -62,7 +62,9 @@ def test_effects_are_paired_differences_over_the_last_200_steps(config: DriveCon
 
 
 def test_the_number_of_workers_changes_nothing(config: DriveConfig) -> None:
-    assert evaluate_map(config, [100, 101], workers=1) == evaluate_map(config, [100, 101], workers=2)
+    assert evaluate_behaviors(config, [100, 101], workers=1) == evaluate_behaviors(
+        config, [100, 101], workers=2
+    )
 
 
 def test_a_killed_worker_ends_an_evaluation(config: DriveConfig) -> None:
@@ -70,7 +72,7 @@ def test_a_killed_worker_ends_an_evaluation(config: DriveConfig) -> None:
         multiprocessing.active_children()[0].kill()
 
     with deadline(60), pytest.raises(WorkerError, match="evaluation of ant: .*killed by SIGKILL"):
-        evaluate_map(config, range(100, 110), workers=2, progress=kill_one)
+        evaluate_behaviors(config, range(100, 110), workers=2, progress=kill_one)
 
 
 def test_the_interval_is_students() -> None:
@@ -101,12 +103,12 @@ class _Tipping(Vehicle):
 def test_a_fall_counts_up_to_the_last_step(step: int, fell: bool) -> None:
     standing = turning_loop()
     loop = ControlLoop(_Tipping(step), standing.policy, standing.map, 0)
-    assert run_behavior(loop, "turn", 1).fell == fell
-    assert run_behavior(loop, "", 1).fell == fell
+    assert run_behavior_episode(loop, "turn", 1).fell == fell
+    assert run_behavior_episode(loop, "", 1).fell == fell
 
 
 def test_one_seed_gives_a_mean_without_an_interval(config: DriveConfig) -> None:
-    result = evaluate_tracking(config, "yaw", [100], targets=(0.5,))
+    result = evaluate_target_tracking(config, "yaw", [100], targets=(0.5,))
     console = Console(width=120)
     with console.capture() as shown:
         console.print(tracking_table(result))
@@ -117,7 +119,7 @@ def test_one_seed_gives_a_mean_without_an_interval(config: DriveConfig) -> None:
 
 
 def test_tracking_measures_the_wrapped_error(config: DriveConfig) -> None:
-    result = evaluate_tracking(config, "yaw", [100], targets=(0.5,))
+    result = evaluate_target_tracking(config, "yaw", [100], targets=(0.5,))
     loop = make_robot("ant")
     assert result.unit == "rad"
     assert loop.attributes[loop.attribute_index("yaw")].wraps

@@ -70,9 +70,9 @@ def read_session_file(path: Path) -> None:
     """Everything that a command does with a session before it simulates."""
     from rich.console import Console
 
-    from pdtui.cli.session_tables import compare_table, show_table
+    from pdtui.cli.session_tables import session_comparison_table, session_table
     from pdtui.driving.keystrokes import format_keystrokes
-    from pdtui.driving.replay import replay_config
+    from pdtui.driving.replay import config_from_session
     from pdtui.sessions.session_comparison import compare_sessions
     from pdtui.sessions.session_header import read_session_header
     from pdtui.sessions.session_reader import read_activations, read_session
@@ -93,10 +93,10 @@ def read_session_file(path: Path) -> None:
     examine_session(path)
     with Path("/dev/null").open("w") as nowhere:
         console = Console(file=nowhere)
-        console.print(show_table(session, summarise_session(session)))
-        console.print(compare_table(compare_sessions(session, session)))
+        console.print(session_table(session, summarise_session(session)))
+        console.print(session_comparison_table(compare_sessions(session, session)))
     format_keystrokes(session.events)
-    replay_config(session, str(path))
+    config_from_session(session, str(path))
 
 
 def _reads(map_path: Path) -> dict[str, Callable[[Path], object]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pdtui.core.errors import PdtuiError
-from pdtui.guide.guide_pages import GuidePage, find_page, read_guide, search_guide
+from pdtui.guide.guide_pages import GuidePage, find_guide_page, read_guide, search_guide
 
 PAGE = GuidePage(
     "ants",
@@ -70,4 +70,4 @@ def test_an_unknown_topic_lists_the_topics() -> None:
     with pytest.raises(
         PdtuiError, match="no topic 'drvng' in the guide; available: index, driving, .*, changelog$"
     ):
-        find_page(read_guide(), "drvng")
+        find_guide_page(read_guide(), "drvng")

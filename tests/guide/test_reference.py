@@ -11,15 +11,17 @@ import pytest
 
 from pdtui import api
 from pdtui.guide.guide_pages import GUIDE_FOLDER
-from pdtui.guide.reference.command_reference import command_reference
-from pdtui.guide.reference.python_reference import python_reference
-from pdtui.guide.reference.write_reference import generate_pages
+from pdtui.guide.reference.command_reference import render_command_reference
+from pdtui.guide.reference.python_reference import render_python_reference
+from pdtui.guide.reference.write_reference import generate_reference_pages
 
 
 @pytest.mark.parametrize("topic", ["commands", "python"])
 def test_the_generated_pages_are_up_to_date(topic: str) -> None:
     stale = "run `python -m pdtui.guide.reference.write_reference`"
-    assert (GUIDE_FOLDER / f"{topic}.md").read_text(encoding="utf-8") == generate_pages()[topic], stale
+    assert (GUIDE_FOLDER / f"{topic}.md").read_text(encoding="utf-8") == generate_reference_pages()[topic], (
+        stale
+    )
 
 
 def test_commands_come_from_click() -> None:
@@ -36,7 +38,7 @@ def test_commands_come_from_click() -> None:
         and on *nothing* else.
         """
 
-    text = command_reference(program, "prog")
+    text = render_command_reference(program, "prog")
     assert "## prog act\n\n```text\nprog act [OPTIONS] FILE\n```\n\nAct on FILE,\n" in text
     assert "and on \\*nothing\\* else.\n" in text
     assert "- `--count INTEGER`: How often \\[roughly\\].  \\[default: 3\\]\n" in text
@@ -69,7 +71,7 @@ class Toy:
 
 
 def test_python_comes_from_docstrings() -> None:
-    text = python_reference(Toy)
+    text = render_python_reference(Toy)
     assert (
         "## play\n\n```python\nplay(ball: str, *, times: int = 2) -> int\n```\n\nPlay with a ball.\n" in text
     )

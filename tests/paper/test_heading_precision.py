@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from pdtui.cli import main
 from pdtui.core.errors import MapError
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.paper.heading_precision import compare_heading_precision, paired_ratio
+from pdtui.paper.heading_precision import compare_heading_precision, paired_error_ratio
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.policies.weights.policy_loading import load_any_network
 from pdtui.search.tracking_drives import STEPS_EACH, TrackingDrive, TrackingDriveResult, TrackingDriveRunner
@@ -98,12 +98,12 @@ def test_ratios_are_paired_by_seed() -> None:
     base = rng.uniform(0.05, 0.5, 12)
     command = [_followed(seed, [error]) for seed, error in enumerate(base)]
     units = [_followed(seed, [1.2 * error]) for seed, error in enumerate(base)]
-    ratio = paired_ratio(units, command)
+    ratio = paired_error_ratio(units, command)
     # Unpaired, the spread of the seeds would make it wide.
     assert (ratio.value, ratio.low, ratio.high) == pytest.approx((1.2, 1.2, 1.2))
-    lost = paired_ratio([_followed(12, [np.nan]), *units], [_followed(12, [9.0]), *command])
+    lost = paired_error_ratio([_followed(12, [np.nan]), *units], [_followed(12, [9.0]), *command])
     assert lost.value == pytest.approx(1.2)
-    assert paired_ratio(units[:1], command[:1]).high == np.inf
+    assert paired_error_ratio(units[:1], command[:1]).high == np.inf
 
 
 def test_a_map_without_a_heading_to_hold_is_named(map_text: str, tmp_path: Path) -> None:

@@ -7,13 +7,17 @@ import pytest
 
 from pdtui.core.attributes import Floats
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.pictures.dissection_chart_data import matched_spectrograms, side_effect_matrix, spectrogram_of
-from pdtui.pictures.plot_colors import BLUE, GREY, VERMILLION, diverging
+from pdtui.pictures.dissection_chart_data import (
+    compute_spectrogram_chart,
+    matched_spectrograms,
+    side_effect_matrix,
+)
+from pdtui.pictures.plot_colors import BLUE, GREY, VERMILLION, diverging_colors
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
+from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.spectra.matching import match_units
-from pdtui.spectra.matching_presets import PRESETS, find_preset
-from pdtui.spectra.monitor import monitor_episodes
+from pdtui.spectra.matching_presets import PRESETS, find_matching_preset
 
 
 def test_the_pictured_spectrograms_are_those_that_were_compared(
@@ -37,7 +41,7 @@ def test_a_sine_is_loudest_at_its_frequency_and_its_windows_lie_inside(name: str
     preset, dt = PRESETS[name], 0.05
     frequency = preset.frequencies(dt)[6]
     series = np.sin(2 * np.pi * frequency * np.arange(200) * dt)
-    shown = spectrogram_of(series, preset, dt)
+    shown = compute_spectrogram_chart(series, preset, dt)
     assert shown.frequencies[shown.decibels.mean(axis=0).argmax()] == frequency
     # A sine of amplitude 1 puts half of it into its bin: −6.02 dB.
     np.testing.assert_allclose(shown.decibels[:, 6], 20 * np.log10(0.5), atol=1e-6)
@@ -46,8 +50,8 @@ def test_a_sine_is_loudest_at_its_frequency_and_its_windows_lie_inside(name: str
 
 
 def test_what_a_preset_does_not_compare_is_not_shown() -> None:
-    preset = find_preset("paper", ["level=removed"])
-    shown = spectrogram_of(np.ones(100) + np.cos(np.arange(100.0)), preset, 0.05)
+    preset = find_matching_preset("paper", ["level=removed"])
+    shown = compute_spectrogram_chart(np.ones(100) + np.cos(np.arange(100.0)), preset, 0.05)
     assert np.isneginf(shown.decibels[:, : preset.level_bins]).all()
     assert np.isfinite(shown.decibels[:, preset.level_bins :]).all()
 
@@ -65,7 +69,7 @@ def test_side_effects_leave_out_units_that_are_only_controls(dissection: Dissect
 
 def test_diverging_colours() -> None:
     values: Floats = np.array([-9.0, -2.0, 0.0, 1.0, 2.0, np.nan])
-    colors = diverging(values, 2.0)
+    colors = diverging_colors(values, 2.0)
     assert colors.dtype == np.uint8
     np.testing.assert_array_equal(colors[[0, 1, 2, 4, 5]], [VERMILLION, VERMILLION, (255,) * 3, BLUE, GREY])
     assert (colors[3] > np.array(BLUE)).all()

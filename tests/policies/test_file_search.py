@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import PolicyError
-from pdtui.policies.weights.file_search import FOLDERS, find_inside
+from pdtui.policies.weights.policy_file_lookup import POLICY_FOLDERS_VARIABLE, find_file_inside_folders
 
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working directory with a folder of maps; weights there and beside it."""
-    monkeypatch.delenv(FOLDERS, raising=False)
+    monkeypatch.delenv(POLICY_FOLDERS_VARIABLE, raising=False)
     work = tmp_path / "work"
     (work / "maps").mkdir(parents=True)
     for path in (tmp_path / "outside.st", work / "own.st", work / "maps" / "beside.st"):
@@ -25,11 +25,11 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_files_of_the_working_directory_and_the_maps_folder_are_found(here: Path) -> None:
     maps = (Path("maps"),)
-    assert find_inside("own.st", maps, "m") == Path("own.st")
-    assert find_inside("beside.st", maps, "m") == Path("maps/beside.st")
-    assert find_inside("../own.st", maps, "m") == Path("maps/../own.st")
-    assert find_inside(str(here / "own.st"), maps, "m") == here / "own.st"
-    assert find_inside("ant", maps, "m") is None
+    assert find_file_inside_folders("own.st", maps, "m") == Path("own.st")
+    assert find_file_inside_folders("beside.st", maps, "m") == Path("maps/beside.st")
+    assert find_file_inside_folders("../own.st", maps, "m") == Path("maps/../own.st")
+    assert find_file_inside_folders(str(here / "own.st"), maps, "m") == here / "own.st"
+    assert find_file_inside_folders("ant", maps, "m") is None
 
 
 @pytest.mark.parametrize(
@@ -37,14 +37,14 @@ def test_files_of_the_working_directory_and_the_maps_folder_are_found(here: Path
 )
 def test_what_leads_outside_is_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(PolicyError, match=r"m\.toml: names the file .* which lies outside"):
-        find_inside(name.format(tmp_path), (Path("maps"),), "m.toml")
+        find_file_inside_folders(name.format(tmp_path), (Path("maps"),), "m.toml")
 
 
 def test_a_folder_can_be_allowed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(FOLDERS, str(tmp_path))
-    assert find_inside("../outside.st", (), "m") == Path("../outside.st")
-    assert find_inside("link.st", (), "m") == Path("link.st")
+    monkeypatch.setenv(POLICY_FOLDERS_VARIABLE, str(tmp_path))
+    assert find_file_inside_folders("../outside.st", (), "m") == Path("../outside.st")
+    assert find_file_inside_folders("link.st", (), "m") == Path("link.st")
 
 
 def test_names_that_cannot_be_files_are_none() -> None:
-    assert find_inside("a" * 5000, (), "m") is None
+    assert find_file_inside_folders("a" * 5000, (), "m") is None

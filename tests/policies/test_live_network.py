@@ -11,7 +11,7 @@ from torch import nn
 
 from pdtui.core.errors import PolicyError
 from pdtui.core.units import LayerWidths, Stimulation, format_unit, parse_unit
-from pdtui.policies.runtime.action_decoders import categorical
+from pdtui.policies.runtime.action_decoders import decode_categorical_action
 from pdtui.policies.runtime.policy import Policy
 from tests.small_worlds import (
     SIDE,
@@ -105,12 +105,12 @@ def test_a_stimulated_unit_chooses_the_move() -> None:
 def test_discrete_actions_are_drawn_from_the_softmax() -> None:
     logits = torch.tensor([[0.0, 1.0, -1.0]])
     rng = np.random.default_rng(0)
-    draws = np.array([categorical(logits, rng) for _ in range(4000)])
+    draws = np.array([decode_categorical_action(logits, rng) for _ in range(4000)])
     assert draws.shape == (4000, 1)
     assert draws.dtype == np.float32
     counted = np.bincount(draws[:, 0].astype(int), minlength=3) / 4000
     np.testing.assert_allclose(counted, torch.softmax(logits[0], 0).numpy(), atol=0.03)
-    assert categorical(logits, None) == [1.0]
+    assert decode_categorical_action(logits, None) == [1.0]
 
 
 def test_an_overwritten_memory_cell_is_read_by_the_next_layer_and_not_by_the_next_step() -> None:

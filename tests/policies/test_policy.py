@@ -11,7 +11,7 @@ from torch import nn
 
 from pdtui.core.errors import PolicyError
 from pdtui.core.units import Stimulation, format_unit, parse_unit
-from pdtui.policies.runtime.action_decoders import decoder_for
+from pdtui.policies.runtime.action_decoders import make_action_decoder
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.policies.weights.weights_file import load_network
@@ -23,7 +23,7 @@ def _observations(count: int, size: int = 27) -> np.ndarray:
 
 def test_without_stimulation_actions_are_those_of_the_bare_network(weights: Path, policy: Policy) -> None:
     network = load_network(weights)
-    decode = decoder_for(network)
+    decode = make_action_decoder(network)
     for observation in _observations(100):
         with torch.inference_mode():
             bare = decode(network(torch.from_numpy(observation.astype(np.float32))), None)

@@ -12,7 +12,7 @@ import pytest
 from pdtui.core.attributes import wrap_angle
 from pdtui.core.errors import RobotError
 from pdtui.robots import make_robot
-from pdtui.robots.geometry import place_links
+from pdtui.robots.geometry import compute_link_poses
 
 pytest.importorskip("pybullet", reason="PyBullet is not installed (it has no wheels for this Python)")
 
@@ -121,7 +121,7 @@ def test_it_stands_on_four_feet(a1: A1) -> None:
     ] == [1] * 4
     assert 0.24 < _value(a1, "height") < 0.28
     assert abs(_value(a1, "speed")) < 0.02
-    placed = place_links(a1.links, a1.read_poses())
+    placed = compute_link_poses(a1.links, a1.read_poses())
     feet = [index for index, link in enumerate(a1.links) if link.name.endswith("toe")]
     assert len(feet) == 4
     radii = [a1.links[index].size[0] for index in feet]

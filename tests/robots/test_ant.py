@@ -13,7 +13,7 @@ from pdtui.core.attributes import wrap_angle
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.robots import make_robot
 from pdtui.robots.ant import Ant
-from pdtui.robots.geometry import capsule_ends, place_links
+from pdtui.robots.geometry import capsule_ends, compute_link_poses
 
 
 def _actions(count: int, seed: int = 0) -> np.ndarray:
@@ -86,7 +86,7 @@ def test_attributes_agree_with_an_independent_computation(ant: Ant) -> None:
 def test_links_lie_where_mujoco_puts_the_geoms(ant: Ant) -> None:
     for action in _actions(10):
         ant.step(action)
-    placed = place_links(ant.links, ant.read_poses())
+    placed = compute_link_poses(ant.links, ant.read_poses())
     geoms = [index for index in range(ant.model.ngeom) if ant.model.geom(index).bodyid[0] != 0]
     np.testing.assert_allclose(placed[:, :3], ant.data.geom_xpos[geoms], atol=1e-12)
     ends = capsule_ends(ant.links, placed)

@@ -9,7 +9,7 @@ import pytest
 
 from pdtui.api import load_policy
 from pdtui.core.errors import MapError
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.robots import make_robot
 from pdtui.robots.anymal import DEFAULT_ANGLES, Anymal, AnymalForward
@@ -125,9 +125,9 @@ def test_behaviors_set_what_the_policy_is_asked_for() -> None:
     loop = _loop()
     column = loop.robot.attribute_index("forward command")
     assert loop.advance().attributes[column] == 1.0
-    assert loop.advance([Event(1, "behavior", "slowly")]).attributes[column] == 0.25
-    assert loop.advance([Event(2, "default")]).attributes[column] == 1.0
-    loop.advance([Event(3, "behavior", "hold heading"), Event(3, "target", "hold heading", 0.4)])
+    assert loop.advance([DriveEvent(1, "behavior", "slowly")]).attributes[column] == 0.25
+    assert loop.advance([DriveEvent(2, "default")]).attributes[column] == 1.0
+    loop.advance([DriveEvent(3, "behavior", "hold heading"), DriveEvent(3, "target", "hold heading", 0.4)])
     turned = loop.advance()
     asked = turned.attributes[loop.robot.attribute_index("yaw rate command")]
     active = turned.behaviors[0]

@@ -24,7 +24,7 @@ from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
 from pdtui.robots.robot import Robot
 from pdtui.robots.task import RunTrace, Task, TaskVerdict
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
-from pdtui.spectra.monitor import monitor_episodes
+from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.stimulation.map_reader import parse_map
 
 LAST = 20

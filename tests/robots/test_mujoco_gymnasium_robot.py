@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.robots import make_robot
-from pdtui.robots.geometry import capsule_ends, place_links
+from pdtui.robots.geometry import capsule_ends, compute_link_poses
 from pdtui.robots.robot import Robot
 from tests.robots.wrapped_environments import follow, random_actions, values_of
 
@@ -128,7 +128,7 @@ def test_a_cart_has_a_place_and_a_force() -> None:
 def test_shapes_lie_where_the_simulator_has_them(name: str) -> None:
     robot: Any = make_robot(name)
     robot.reset(seed=0)  # a reset leaves the simulator's kinematics up to date
-    placed = place_links(robot.links, robot.read_poses())
+    placed = compute_link_poses(robot.links, robot.read_poses())
     model, data = robot.world.model, robot.world.data
     drawn = [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] and model.geom_rgba[geom, 3] > 0]
     np.testing.assert_allclose(placed[:, :3], data.geom_xpos[drawn], atol=1e-12)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import RobotError
-from pdtui.robots import check_robot, file_stem, make_robot
+from pdtui.robots import make_robot, resolve_robot_name, robot_file_stem
 
 GUIDE = Path(__file__).parents[2] / "pdtui" / "guide" / "your-world.md"
 MODULE = """\
@@ -49,9 +49,9 @@ def test_an_unknown_name_lists_close_ones() -> None:
     with pytest.raises(RobotError, match="unknown robot 'Hoper-v5'; did you mean Hopper-v5"):
         make_robot("Hoper-v5")
     with pytest.raises(RobotError, match="unknown robot 'qqqqqqqq'; available: a1, a1-vision, ant, anymal, "):
-        check_robot("qqqqqqqq")
+        resolve_robot_name("qqqqqqqq")
     with pytest.raises(RobotError, match="unknown robot 'Hopper'"):
-        check_robot("Hopper")  # a map must say which version its numbers hold for
+        resolve_robot_name("Hopper")  # a map must say which version its numbers hold for
 
 
 def test_an_environment_that_needs_more_says_what_to_install(tmp_path: Path) -> None:
@@ -147,8 +147,8 @@ def test_a_broken_entry_point_is_named_with_its_package(
 
 
 def test_a_name_becomes_part_of_a_file_name() -> None:
-    assert file_stem("Hopper-v5") == "Hopper-v5"
-    assert file_stem("a.b:ALE/Pong-v5") == "a.b-ALE-Pong-v5"
+    assert robot_file_stem("Hopper-v5") == "Hopper-v5"
+    assert robot_file_stem("a.b:ALE/Pong-v5") == "a.b-ALE-Pong-v5"
 
 
 ROBOT = '''

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pdtui.core.errors import MapError
-from pdtui.search.gain_search_space import gains_from_point, point_from_gains, sample_gain_points
 from pdtui.search.gain_tuning import TuningSettings, tune_gains
+from pdtui.search.pid_gain_space import gains_from_point, point_from_gains, sample_gain_points
 from pdtui.search.tracking_drives import TrackingDriveRunner
 from pdtui.search.tracking_summary import choose_tracking_targets
 from pdtui.stimulation.stimulation_map import PidGains

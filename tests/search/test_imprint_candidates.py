@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from pdtui.core.attributes import Attribute
-from pdtui.search.imprint_candidates import ImprintSettings, build_imprint_candidates, range_parts
-from pdtui.spectra.monitor import MonitoredEpisode
+from pdtui.search.imprint_candidates import ImprintSettings, assign_range_bins, build_imprint_candidates
+from pdtui.spectra.episode_monitor import MonitoredEpisode
 
 HEIGHT, YAW, TORQUE = Attribute("height", "m"), Attribute("yaw", "rad", wraps=True), Attribute("knee", "N m")
 
 
 def test_values_are_cut_into_parts_of_equal_size_and_angles_into_equal_arcs() -> None:
-    np.testing.assert_array_equal(range_parts(np.array([5.0, 1.0, 3.0, 8.0]), HEIGHT, 2), [1, 0, 0, 1])
+    np.testing.assert_array_equal(assign_range_bins(np.array([5.0, 1.0, 3.0, 8.0]), HEIGHT, 2), [1, 0, 0, 1])
     angles = np.array([-3.0, -0.1, 0.1, 3.0, 3.0 + 2 * np.pi])
-    np.testing.assert_array_equal(range_parts(angles, YAW, 2), [0, 0, 1, 1, 1])
+    np.testing.assert_array_equal(assign_range_bins(angles, YAW, 2), [0, 0, 1, 1, 1])
 
 
 def test_an_imprint_shows_what_the_telling_units_put_out_in_that_part() -> None:

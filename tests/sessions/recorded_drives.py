@@ -7,7 +7,7 @@ from pathlib import Path
 
 import torch
 
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.weights.policy_loading import load_policy
@@ -44,19 +44,19 @@ def make_loop(weights: Path, seed: int = 5, *, stochastic: bool = False) -> Cont
     return ControlLoop(make_robot("ant"), policy, the_map, seed, stochastic=stochastic)
 
 
-def events_of(step: int) -> list[Event]:
+def events_of(step: int) -> list[DriveEvent]:
     """What the operator does: three keys before step 12, a rewind, a reset."""
     return {
-        4: [Event(4, "behavior", "go", key="w")],
+        4: [DriveEvent(4, "behavior", "go", key="w")],
         12: [
-            Event(12, "behavior", "hold", key="h"),
-            Event(12, "target", "hold", 0.1 + 0.2, key="up"),
-            Event(12, "factor", "go", 1.5, key="plus"),
+            DriveEvent(12, "behavior", "hold", key="h"),
+            DriveEvent(12, "target", "hold", 0.1 + 0.2, key="up"),
+            DriveEvent(12, "factor", "go", 1.5, key="plus"),
         ],
-        40: [Event(40, "behavior", "turn", key="a")],
-        60: [Event(60, "rewind", value=10, key="backspace")],
-        70: [Event(70, "default", key="space")],
-        80: [Event(80, "reset")],
+        40: [DriveEvent(40, "behavior", "turn", key="a")],
+        60: [DriveEvent(60, "rewind", value=10, key="backspace")],
+        70: [DriveEvent(70, "default", key="space")],
+        80: [DriveEvent(80, "reset")],
     }.get(step, [])
 
 

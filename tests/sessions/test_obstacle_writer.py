@@ -10,7 +10,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from pdtui.core.attributes import Floats
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.episode_statistics import EpisodeStatistics, EpisodeStatisticsCounter
 from pdtui.sessions.session_reader import read_session
@@ -21,10 +21,10 @@ from tests.obstacle_course import course_loop
 from tests.real_viewer import RealViewer
 
 EVENTS = {
-    4: [Event(4, "behavior", "push", key="w")],
-    12: [Event(12, "reset", key="r")],
-    15: [Event(15, "behavior", "push", key="w"), Event(15, "default", key="space")],
-    18: [Event(18, "rewind", value=10.0, key="backspace")],
+    4: [DriveEvent(4, "behavior", "push", key="w")],
+    12: [DriveEvent(12, "reset", key="r")],
+    15: [DriveEvent(15, "behavior", "push", key="w"), DriveEvent(15, "default", key="space")],
+    18: [DriveEvent(18, "rewind", value=10.0, key="backspace")],
 }
 STEPS = 24
 Course = tuple[Path, list[Floats], list[EpisodeStatistics]]

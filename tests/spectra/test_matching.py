@@ -8,9 +8,9 @@ from scipy.signal import ShortTimeFFT, get_window
 
 from pdtui.core.attributes import Attribute
 from pdtui.core.errors import PolicyError
+from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching import match_units
-from pdtui.spectra.matching_presets import PRESETS, MatchingPreset, find_preset
-from pdtui.spectra.monitor import MonitoredEpisode
+from pdtui.spectra.matching_presets import PRESETS, MatchingPreset, find_matching_preset
 from pdtui.spectra.spectrogram import short_time_transform, spectrogram
 
 ATTRIBUTES = (Attribute("speed", "m/s"), Attribute("torque", "N m", scale=0.1))
@@ -155,7 +155,7 @@ def test_what_is_constant_is_left_out_where_levels_do_not_count(setting: str) ->
     one = episode(15, 100)
     one.attributes[:, 0] = 3.0
     one.activations[:, 2] = 0.75
-    found = match_units([one], ATTRIBUTES, find_preset("paper", [setting]))
+    found = match_units([one], ATTRIBUTES, find_matching_preset("paper", [setting]))
     assert found.flaws == {"speed": "constant in every episode, and levels do not count; left out"}
     assert found.unit_flaws == {2: "constant in every episode, and levels do not count; left out"}
     assert found.ranked_units(0).size == 0
@@ -165,7 +165,7 @@ def test_what_is_constant_is_left_out_where_levels_do_not_count(setting: str) ->
 def test_a_level_that_is_removed_does_not_count() -> None:
     one = episode(16, 200)
     shifted = MonitoredEpisode(16, one.activations, one.attributes + 4.0)
-    preset = find_preset("paper", ["level=removed"])
+    preset = find_matching_preset("paper", ["level=removed"])
     found = match_units([shifted], ATTRIBUTES, preset)
     np.testing.assert_allclose(
         found.discrepancy, match_units([one], ATTRIBUTES, preset).discrepancy, rtol=1e-9
@@ -175,10 +175,10 @@ def test_a_level_that_is_removed_does_not_count() -> None:
 
 def test_scalings_say_how_attributes_and_units_are_compared() -> None:
     one = episode(17, 200)
-    raw = match_units([one], ATTRIBUTES, find_preset("paper", ["scaling=raw"]))
+    raw = match_units([one], ATTRIBUTES, find_matching_preset("paper", ["scaling=raw"]))
     by_hand = [Attribute(attribute.name, attribute.unit) for attribute in ATTRIBUTES]
     np.testing.assert_array_equal(raw.discrepancy, match_units([one], by_hand, PRESETS["paper"]).discrepancy)
-    standard = match_units([one], ATTRIBUTES, find_preset("paper", ["scaling=standardised"]))
+    standard = match_units([one], ATTRIBUTES, find_matching_preset("paper", ["scaling=standardised"]))
     z = (one.activations - one.activations.mean(0, float)) / one.activations.std(0, dtype=float)
     s = (one.attributes - one.attributes.mean(0)) / one.attributes.std(0)
     expected = by_scipy(MonitoredEpisode(17, z, s), by_hand, PRESETS["paper"])
@@ -190,6 +190,8 @@ def test_angles_can_stay_wrapped() -> None:
     wrapped = np.angle(np.exp(1j * turning))
     units = episode(18, 200).activations
     yaw = (Attribute("yaw", "rad", wraps=True),)
-    found = match_units([MonitoredEpisode(0, units, turning)], yaw, find_preset("paper", ["angles=wrapped"]))
+    found = match_units(
+        [MonitoredEpisode(0, units, turning)], yaw, find_matching_preset("paper", ["angles=wrapped"])
+    )
     expected = match_units([MonitoredEpisode(0, units, wrapped)], yaw, PRESETS["paper"])
     np.testing.assert_allclose(found.discrepancy, expected.discrepancy, rtol=1e-9)

@@ -4,7 +4,7 @@ import pytest
 from scipy.signal import get_window
 
 from pdtui.core.errors import PdtuiError
-from pdtui.spectra.matching_presets import PRESETS, find_preset, preset_options, preset_values
+from pdtui.spectra.matching_presets import PRESETS, find_matching_preset, preset_options, preset_values
 
 
 def test_presets_are_those_of_the_paper_and_of_its_code() -> None:
@@ -15,29 +15,29 @@ def test_presets_are_those_of_the_paper_and_of_its_code() -> None:
 
 def test_unknown_preset_lists_those_there_are() -> None:
     with pytest.raises(PdtuiError, match=r"unknown preset 'welch'; available: paper, authors"):
-        find_preset("welch")
+        find_matching_preset("welch")
 
 
 def test_every_choice_can_be_set_and_is_kept() -> None:
     for name, values in preset_options().items():
         for value in values:
             text = [f"{name}={value}"] if name != "length" else [f"length={value}", "hop=1"]
-            preset = find_preset("paper", text if name != "hop" else ["hop=1"])
+            preset = find_matching_preset("paper", text if name != "hop" else ["hop=1"])
             assert preset_values(preset).keys() == preset_options().keys()
             if name != "hop":
                 assert preset_values(preset)[name] == value
 
 
 def test_what_differs_from_the_preset_is_named() -> None:
-    preset = find_preset("paper", ["length=32", "window=blackman", "hop=8"])
+    preset = find_matching_preset("paper", ["length=32", "window=blackman", "hop=8"])
     assert (preset.name, preset.length, preset.hop, preset.spectrogram) == ("paper", 32, 8, "power")
     assert str(preset) == "paper length=32 hop=8"
-    assert str(find_preset("authors")) == "authors"
+    assert str(find_matching_preset("authors")) == "authors"
 
 
 @pytest.mark.parametrize("name", preset_options()["window"])
 def test_windows_are_the_periodic_ones(name: str) -> None:
-    preset = find_preset("authors", [f"window={name}", "length=30"])
+    preset = find_matching_preset("authors", [f"window={name}", "length=30"])
     expected = get_window({"rectangular": "boxcar"}.get(name, name), 30)
     assert preset.weights == pytest.approx(expected / expected.sum(), abs=1e-15)
 
@@ -56,4 +56,4 @@ def test_windows_are_the_periodic_ones(name: str) -> None:
 )
 def test_a_wrong_setting_lists_what_there_is(setting: str, message: str) -> None:
     with pytest.raises(PdtuiError, match=message):
-        find_preset("paper", [setting])
+        find_matching_preset("paper", [setting])

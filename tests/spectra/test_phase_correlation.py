@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pdtui.core.attributes import Attribute
-from pdtui.spectra.matching_presets import PRESETS, MatchingPreset, find_preset
-from pdtui.spectra.monitor import MonitoredEpisode
+from pdtui.spectra.episode_monitor import MonitoredEpisode
+from pdtui.spectra.matching_presets import PRESETS, MatchingPreset, find_matching_preset
 from pdtui.spectra.phase_correlation import correlate_phases, phase_correlation
 
 SPEED = (Attribute("speed", "m/s"),)
@@ -64,7 +64,7 @@ def test_the_predominant_frequency_can_be_that_of_the_movement() -> None:
     activations = np.column_stack([0.5 + wave(1.0), -0.5 + wave(0.0)]).astype(np.float32)
     level = MonitoredEpisode(0, activations, (5.0 + wave(0.0))[:, None])
     for setting in ("predominant=moving", "level=removed"):
-        found = correlate_phases([level], SPEED, find_preset("paper", [setting]), block=1)
+        found = correlate_phases([level], SPEED, find_matching_preset("paper", [setting]), block=1)
         assert found.bins[0] == 8
         np.testing.assert_allclose(found.circular[0], [1 - 2 / np.pi, 1.0], atol=1e-6)
 
@@ -74,4 +74,4 @@ def test_the_preset_says_which_mean_counts() -> None:
         [episode(wave(np.pi - 0.2)), episode(wave(0.2 - np.pi))], SPEED, PRESETS["paper"]
     )
     assert found.rho(PRESETS["paper"])[0, 0] == found.circular[0, 0]
-    assert found.rho(find_preset("paper", ["phase_mean=plain"]))[0, 0] == found.plain[0, 0]
+    assert found.rho(find_matching_preset("paper", ["phase_mean=plain"]))[0, 0] == found.plain[0, 0]

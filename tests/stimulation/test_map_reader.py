@@ -9,7 +9,7 @@ import pytest
 
 from pdtui.core.attributes import BehaviorAim
 from pdtui.core.errors import MapError
-from pdtui.stimulation.map_library import bare_map, find_map, list_maps
+from pdtui.stimulation.map_library import find_map, list_maps, map_without_behaviors
 from pdtui.stimulation.map_reader import load_map, parse_map
 from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains, StimulationMap
 
@@ -123,7 +123,7 @@ def test_mistakes_in_a_table_of_its_own_lines_are_named(map_text: str) -> None:
 
 
 def test_only_a_map_without_behaviors_may_leave_its_policy_open(small_map: StimulationMap) -> None:
-    bare = bare_map("my robot", 'runs/"best".safetensors')
+    bare = map_without_behaviors("my robot", 'runs/"best".safetensors')
     assert (bare.robot, bare.policy) == ("my robot", 'runs/"best".safetensors')
     bare.check("my robot", (16, 16), "f" * 64)
     with pytest.raises(MapError, match="made for robot 'my robot'"):

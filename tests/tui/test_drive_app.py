@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pdtui.core.errors import PdtuiError
-from pdtui.core.events import Event
-from pdtui.core.key_table import RESERVED_KEYS
+from pdtui.core.events import DriveEvent
+from pdtui.core.fixed_keys import RESERVED_KEYS
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.snapshot_builder import SnapshotBuilder
@@ -274,7 +274,10 @@ async def test_a_live_loop_is_drawn(policy: Policy, small_map: StimulationMap, m
     )
     snapshots = []
     for step in range(24):
-        events = {4: [Event(4, "behavior", "push", key="w")], 12: [Event(12, "behavior", "twitch", key="t")]}
+        events = {
+            4: [DriveEvent(4, "behavior", "push", key="w")],
+            12: [DriveEvent(12, "behavior", "twitch", key="t")],
+        }
         observer.add_step(loop.advance(events.get(step, [])))
         if step % 2:
             snapshots.append(

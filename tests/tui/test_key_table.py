@@ -5,15 +5,15 @@ from __future__ import annotations
 import pytest
 
 from pdtui.core.errors import MapError
-from pdtui.core.events import Event, describe_event
-from pdtui.core.key_table import EVENT_WORDINGS, FIXED_KEYS, RUN_KEYS, FixedKey
+from pdtui.core.events import DriveEvent, describe_event
+from pdtui.core.fixed_keys import EVENT_WORDINGS, FIXED_KEYS, RUN_KEYS, FixedKey
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.driving.keystrokes import interpret_key, run_keys
+from pdtui.driving.keystrokes import interpret_key, list_drive_keys
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import StimulationMap
-from pdtui.tui.cell_text import key_name
+from pdtui.tui.cell_text import displayed_key_name
 from pdtui.tui.help_screen import HelpScreen
 from tests.tui.conftest import MakeApp
 from tests.tui.screens import played
@@ -25,7 +25,7 @@ def driven(policy: Policy, small_map: StimulationMap) -> ControlLoop:
     loop = ControlLoop(make_robot("ant"), policy, small_map, 3)
     while loop.step < 75:
         loop.advance()
-    loop.advance([Event(75, "behavior", "hold heading", key="h")])
+    loop.advance([DriveEvent(75, "behavior", "hold heading", key="h")])
     return loop
 
 
@@ -40,13 +40,13 @@ def test_a_key_that_changes_a_run_makes_its_event(
     row: FixedKey, driven: ControlLoop, small_map: StimulationMap
 ) -> None:
     event = interpret_key(row.key, driven)
-    assert isinstance(event, Event)
+    assert isinstance(event, DriveEvent)
     assert (event.kind, event.key, event.step) == (row.event, row.key, driven.step)
-    assert row.key in run_keys(small_map)
+    assert row.key in list_drive_keys(small_map)
 
 
 def test_every_event_is_worded() -> None:
-    said = {kind: describe_event(Event(7, kind, "spin", 40.0)) for kind in EVENT_WORDINGS}
+    said = {kind: describe_event(DriveEvent(7, kind, "spin", 40.0)) for kind in EVENT_WORDINGS}
     assert all(said.values())
     assert said["rewind"] == "rewound to step 40"
     assert said["factor"] == "magnitudes of 'spin' set to 40 times the map's"
@@ -60,4 +60,4 @@ async def test_the_help_lists_every_key_with_its_sentence(make_app: MakeApp) -> 
         assert isinstance(app.screen, HelpScreen)
         lines = [strip.text for strip in app.screen._compositor.render_strips()]
     for row in FIXED_KEYS:
-        assert any(f" {key_name(row.key)} " in line and row.says in line for line in lines), row.id
+        assert any(f" {displayed_key_name(row.key)} " in line and row.says in line for line in lines), row.id

@@ -10,7 +10,7 @@ import pytest
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.sessions.episode_statistics import EpisodeStatistics
 from pdtui.tui.braille_canvas import BrailleCanvas
-from pdtui.tui.obstacle_drawing import draw_from_above, draw_from_side
+from pdtui.tui.obstacle_drawing import draw_obstacles_from_above, draw_obstacles_from_side
 from pdtui.tui.perspective_camera import PerspectiveCamera
 from pdtui.tui.theme import STYLES
 from pdtui.tui.widgets.robot_view import RobotView
@@ -26,7 +26,7 @@ def test_a_disc_has_the_radius_of_its_obstacle() -> None:
     canvas = BrailleCanvas(40, 20)
     camera = PerspectiveCamera((0.0, 0.0, 0.0), 90.0, 100.0, 10.0, (40.0, 40.0))
     canvas.dots[:] = True  # a ground as dense as can be
-    draw_from_above(canvas, camera, np.array([[1.0, 2.0, 0.6], [50.0, 0.0, 1.0]]), INK)
+    draw_obstacles_from_above(canvas, camera, np.array([[1.0, 2.0, 0.6], [50.0, 0.0, 1.0]]), INK)
     rows, columns = np.nonzero(canvas.inks == INK)
     assert (columns.min(), columns.max(), rows.min(), rows.max()) == (22, 27, 3, 6)
     distance = np.hypot(np.arange(80)[None, :] + 0.5 - 50.0, np.arange(80)[:, None] + 0.5 - 20.0)
@@ -40,7 +40,7 @@ def test_a_trunk_before_the_robot_hides_nothing() -> None:
     for y in (1.0, -1.0):
         canvas = BrailleCanvas(40, 20)
         for behind in (True, False):
-            draw_from_side(canvas, camera, np.array([[0.0, y, 0.3]]), INK, behind=behind)
+            draw_obstacles_from_side(canvas, camera, np.array([[0.0, y, 0.3]]), INK, behind=behind)
         assert canvas.dots[0].any(), "it reaches up to the picture's edge"
         filled.append(bool(canvas.dots[10, 40]))
     assert filled == [True, False]

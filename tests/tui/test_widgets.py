@@ -10,7 +10,7 @@ from pdtui.core.printable_text import make_printable
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.tui.cell_text import fit_cells, format_number, format_signed
 from pdtui.tui.perspective_camera import PerspectiveCamera, round_length_down
-from pdtui.tui.widgets.activation_heatmap import UnitGrid, layer_rows
+from pdtui.tui.widgets.activation_heatmap import UnitGrid, allocate_layer_rows
 from pdtui.tui.widgets.attribute_table import AttributeHistory, draw_sparklines
 from pdtui.tui.widgets.path_view import MOST_POINTS, PathTrail
 from pdtui.tui.widgets.unit_table import behaviors_of_units
@@ -141,9 +141,9 @@ def test_a_unit_is_where_its_mark_is(units: int) -> None:
 
 
 def test_lines_are_shared_out_between_layers() -> None:
-    assert layer_rows(2, 2) == [(0, 1), (1, 1)]
-    assert layer_rows(2, 8) == [(0, 4), (4, 4)]
-    assert layer_rows(3, 2) == [(0, 1), (1, 1), (2, 0)]
+    assert allocate_layer_rows(2, 2) == [(0, 1), (1, 1)]
+    assert allocate_layer_rows(2, 8) == [(0, 4), (4, 4)]
+    assert allocate_layer_rows(3, 2) == [(0, 1), (1, 1), (2, 0)]
 
 
 def test_the_behavior_latched_last_owns_a_shared_unit() -> None:

@@ -16,7 +16,7 @@ with 1.
 """
 
 
-def command_reference(program: click.Group, name: str) -> str:
+def render_command_reference(program: click.Group, name: str) -> str:
     """Return the Markdown of every command of a program, subcommands after their group."""
     context = click.Context(program, info_name=name)
     return "\n".join([_HEAD, *_sections(program, context)])

@@ -27,7 +27,7 @@ class _Annotation(str):
         return str(self)
 
 
-def python_reference(module: Any, *more: type) -> str:
+def render_python_reference(module: Any, *more: type) -> str:
     """Return the Markdown of a module's public functions, then its classes, then its constants.
 
     Args:

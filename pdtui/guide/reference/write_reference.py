@@ -7,18 +7,18 @@ from pdtui.cli import main
 from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.driving.replay import ReplayResult
 from pdtui.guide.guide_pages import GUIDE_FOLDER
-from pdtui.guide.reference.command_reference import command_reference
-from pdtui.guide.reference.python_reference import python_reference
+from pdtui.guide.reference.command_reference import render_command_reference
+from pdtui.guide.reference.python_reference import render_python_reference
 
 
-def generate_pages() -> dict[str, str]:
+def generate_reference_pages() -> dict[str, str]:
     """Return the text of the generated pages, by topic."""
     return {
-        "commands": command_reference(main, "pdtui"),
-        "python": python_reference(api, DissectionConfig, ReplayResult),
+        "commands": render_command_reference(main, "pdtui"),
+        "python": render_python_reference(api, DissectionConfig, ReplayResult),
     }
 
 
 if __name__ == "__main__":
-    for topic, text in generate_pages().items():
+    for topic, text in generate_reference_pages().items():
         (GUIDE_FOLDER / f"{topic}.md").write_text(text, encoding="utf-8")

@@ -15,7 +15,7 @@ from pdtui.core.errors import PdtuiError, PolicyError, SessionError
 from pdtui.core.worker_pool import StepProgress, WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.paper.forest.forest_episode import (
     FOREST,
     ROUGH,
@@ -31,7 +31,7 @@ from pdtui.paper.forest.key_motion_fit import fit_key_motion_models
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
 from pdtui.paper.forest.scripted_operator import operator_keys
 from pdtui.policies.weights.weights_file import find_weights_file
-from pdtui.robots import check_robot, file_stem
+from pdtui.robots import resolve_robot_name, robot_file_stem
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 ForestCondition = Literal["alone", "operator", "vision"]
@@ -79,7 +79,7 @@ def evaluate_forest(
     if conditions and (not seeds or len(seeds) % repeats):
         raise PdtuiError(f"{len(seeds)} seeds cannot be divided into {repeats} equal repeats")
     config = replace(config, seed=0, start=FOREST)
-    loop = build_loop(config)
+    loop = build_control_loop(config)
     name, dt, policy = config.robot, loop.robot.control_dt, loop.policy.name
     person_drives = [(path, *read_forest_episode(path, name, steps)) for path in sessions]
     configs, left_out = _configs(config, conditions)
@@ -144,7 +144,7 @@ class _LoopCache:
     def loop(self, config: DriveConfig, seed: int) -> ControlLoop:
         common = replace(config, start="")
         if self._built is None or self._built[0] != common:
-            self._built = common, build_loop(common)
+            self._built = common, build_control_loop(common)
         built = self._built[1]
         return ControlLoop(built.robot, built.policy, built.map, seed, start=config.start)
 
@@ -160,7 +160,7 @@ def _run_episode(loops: _LoopCache, job: _Episode) -> ForestEpisode:
     operator = build_operator(loop, key_models) if key_models else None
     if operator is None or folder is None:
         return drive_forest_episode(loop, steps, operator)[0]
-    path = folder / f"{file_stem(config.robot)}-forest-seed{seed}.rrd"
+    path = folder / f"{robot_file_stem(config.robot)}-forest-seed{seed}.rrd"
     return record_forest_episode(loop, steps, operator, path, config.activations)
 
 
@@ -180,7 +180,7 @@ def _configs(
 
 def _with_vision(config: DriveConfig) -> DriveConfig:
     """Return the drive of the robot with vision, with its shipped policy and without behaviors."""
-    name = check_robot(f"{config.robot}-vision")
+    name = resolve_robot_name(f"{config.robot}-vision")
     try:
         find_weights_file(name)
     except PolicyError as error:

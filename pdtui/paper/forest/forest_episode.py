@@ -10,9 +10,9 @@ import numpy as np
 
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import SessionError
-from pdtui.core.events import Event
+from pdtui.core.events import DriveEvent
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.driving.headless_drive import key_events, run_episode
+from pdtui.driving.headless_drive import make_key_events, run_episode
 from pdtui.driving.keystrokes import format_keystrokes
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
 from pdtui.paper.forest.scripted_operator import DEFAULT, ScriptedOperator, operator_keys
@@ -54,7 +54,7 @@ def drive_forest_episode(
     steps: int,
     operator: ScriptedOperator | None = None,
     recorder: SessionRecorder | None = None,
-) -> tuple[ForestEpisode, tuple[Event, ...]]:
+) -> tuple[ForestEpisode, tuple[DriveEvent, ...]]:
     """Drive one episode, up to a fall, the far end of the forest, or the last step; return score and events.
 
     The drive is before its first step. Without an operator no key is pressed; the caller closes the recorder.
@@ -63,15 +63,15 @@ def drive_forest_episode(
     yaw = loop.robot.attribute_index("yaw")
     keys = operator_keys(loop.map) if operator is not None else {}
 
-    def press(_: int) -> list[Event]:
+    def press(_: int) -> list[DriveEvent]:
         if operator is None:
             return []
         x, y = loop.robot.read_poses()[0, :2].tolist()
         name = operator.choose_key(x, y, float(loop.attributes[yaw]))
-        return key_events([keys[name]] if name else [], loop)
+        return make_key_events([keys[name]] if name else [], loop)
 
     rewards, costs, distances = [], [], []
-    events: list[Event] = []
+    events: list[DriveEvent] = []
     for record in run_episode(loop, steps, press):
         if recorder is not None:
             recorder.write(record)
@@ -141,7 +141,7 @@ def _score(
     rewards: Sequence[float],
     costs: Sequence[float],
     distances: Sequence[float],
-    events: Sequence[Event],
+    events: Sequence[DriveEvent],
     fell: bool,
 ) -> ForestEpisode:
     pressed = [event.step for event in events if event.key]
@@ -175,7 +175,7 @@ def drive_with_random_keys(loop: ControlLoop, steps: int) -> ObservedDrive:
             upcoming = upcoming or [int(one) for one in rng.permutation(len(keys)) if one != latched]
             latched = upcoming.pop(0)
             until = step + int(rng.integers(*_STEPS_HELD))
-        record = loop.advance(key_events([keys[latched]] if pressed else [], loop))
+        record = loop.advance(make_key_events([keys[latched]] if pressed else [], loop))
         places.append(read_place())
         choices.append(latched)
         if record.ended:

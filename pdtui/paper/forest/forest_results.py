@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from rich.console import Group
 
-from pdtui.core.text_tables import new_table, seed_range
+from pdtui.core.text_tables import format_seed_range, new_table
 from pdtui.paper.forest.forest_episode import ForestEpisode
 from pdtui.paper.forest.key_motion_model import KeyMotionModel
 
@@ -97,7 +97,7 @@ def summarise_condition(
 
 def forest_table(result: ForestExperimentResult) -> Group:
     """Return a table with one column per condition and figures per episode, and notes below it."""
-    measured = f", {seed_range(result.seeds)} in {result.repeats} repeats" if result.seeds else ""
+    measured = f", {format_seed_range(result.seeds)} in {result.repeats} repeats" if result.seeds else ""
     rows = result.conditions
     table = new_table(
         f"{result.robot} in the forest, at most {result.steps} steps ({result.seconds:g} s){measured}",

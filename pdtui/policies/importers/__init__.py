@@ -8,22 +8,22 @@ from pathlib import Path
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.cleanrl import import_cleanrl
 from pdtui.policies.importers.network_assembly import assemble_network
-from pdtui.policies.importers.observation_statistics import read_statistics
+from pdtui.policies.importers.observation_statistics import read_observation_statistics
 from pdtui.policies.importers.partial_policy import PartialPolicy
 from pdtui.policies.importers.plain_state_dict import import_plain_state_dict
 from pdtui.policies.importers.rllib import import_rllib
 from pdtui.policies.importers.rsl_rl import import_rsl_rl
-from pdtui.policies.importers.stable_baselines3 import OTHER_NETWORKS, import_sb3, is_sb3
+from pdtui.policies.importers.stable_baselines3 import OTHER_NETWORKS, import_sb3, is_sb3_archive
 from pdtui.policies.importers.tensor_files import (
     FileKind,
     Tensors,
-    file_kind_of,
+    detect_file_kind,
     flatten_tensors,
-    from_npz,
-    from_safetensors,
-    from_torch,
+    read_npz_tensors,
+    read_safetensors_tensors,
+    read_torch_archive,
 )
-from pdtui.policies.importers.zip_archive import ZipArchive, read_bounded, shorten
+from pdtui.policies.importers.zip_archive import ZipArchive, read_file_bytes, shorten_name_list
 from pdtui.policies.weights.import_options import NO_NORMALISER, NO_OPTIONS, ImportOptions, WorldSpaces
 from pdtui.policies.weights.policy_network import PolicyNetwork
 
@@ -53,9 +53,11 @@ def import_network(
     """
     source = str(path)
     try:
-        found = _read_policy(read_bounded(path), source, import_options)
+        found = _read_policy(read_file_bytes(path), source, import_options)
         if normaliser is not None and import_options.normaliser != NO_NORMALISER:
-            found = replace(found, statistics=read_statistics(normaliser, found.layers[0].shape[1]))
+            found = replace(
+                found, statistics=read_observation_statistics(normaliser, found.layers[0].shape[1])
+            )
         return assemble_network(found, import_options, spaces, source)
     except PolicyError as error:
         text = str(error)
@@ -64,11 +66,11 @@ def import_network(
 
 
 def _read_policy(content: bytes, source: str, import_options: ImportOptions) -> PartialPolicy:
-    match file_kind_of(content):
+    match detect_file_kind(content):
         case FileKind.ZIP:
             return _from_zip(content, source, import_options)
         case FileKind.SAFETENSORS:
-            return _from_tensors(flatten_tensors(from_safetensors(content, source)), source)
+            return _from_tensors(flatten_tensors(read_safetensors_tensors(content, source)), source)
         case FileKind.PICKLE:
             raise PolicyError(
                 f"{source}: a pickle, which can run any code when it is read, so pdtui refuses it; save the "
@@ -81,16 +83,16 @@ def _read_policy(content: bytes, source: str, import_options: ImportOptions) -> 
 def _from_zip(content: bytes, source: str, import_options: ImportOptions) -> PartialPolicy:
     archive = ZipArchive(content, source)
     names = archive.names
-    if is_sb3(names):
+    if is_sb3_archive(names):
         return import_sb3(archive, import_options)
     if names and all(name.endswith(".npy") for name in names):
-        return _from_tensors(flatten_tensors(from_npz(archive)), source)
+        return _from_tensors(flatten_tensors(read_npz_tensors(archive)), source)
     if any(name.endswith("/constants.pkl") for name in names):
         raise PolicyError(
             f"{source}: TorchScript, which is a computation, not a set of weights; load it as a policy"
         )
     if any(name.endswith("/data.pkl") for name in names):
-        return _from_tensors(flatten_tensors(from_torch(content, source)), source)
+        return _from_tensors(flatten_tensors(read_torch_archive(content, source)), source)
     raise PolicyError(f"{source}: a zip that holds no policy: its entries are {archive.listing()}")
 
 
@@ -100,7 +102,8 @@ def _from_tensors(tensors: Tensors, source: str) -> PartialPolicy:
     if any(tensor.ndim > 2 and "weight" in name for name, tensor in tensors.items()):
         kernels = [f"{name} {tuple(t.shape)}" for name, t in tensors.items() if t.ndim > 2]
         raise PolicyError(
-            f"{source}: expected linear layers, found convolutions: {shorten(kernels)}; {OTHER_NETWORKS}"
+            f"{source}: expected linear layers, found convolutions: {shorten_name_list(kernels)}; "
+            f"{OTHER_NETWORKS}"
         )
     return (
         import_rllib(tensors)

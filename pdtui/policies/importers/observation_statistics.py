@@ -18,12 +18,12 @@ from pdtui.policies.importers.partial_policy import ObservationStatistics
 from pdtui.policies.importers.tensor_files import (
     FileKind,
     Tensors,
-    file_kind_of,
+    detect_file_kind,
     flatten_tensors,
-    from_npz,
-    from_safetensors,
+    read_npz_tensors,
+    read_safetensors_tensors,
 )
-from pdtui.policies.importers.zip_archive import ZipArchive, read_bounded
+from pdtui.policies.importers.zip_archive import ZipArchive, read_file_bytes
 
 _EPSILON = 1e-8
 """The default of VecNormalize."""
@@ -33,7 +33,7 @@ HOW_TO_CONVERT = (
 )
 
 
-def read_statistics(path: Path, observations: int) -> ObservationStatistics:
+def read_observation_statistics(path: Path, observations: int) -> ObservationStatistics:
     """Read the statistics of observations of this length."""
     tensors = _read_tensors(path)
     if "mean" not in tensors or not {"var", "std"} & tensors.keys():
@@ -55,12 +55,12 @@ def read_statistics(path: Path, observations: int) -> ObservationStatistics:
 
 
 def _read_tensors(path: Path) -> Tensors:
-    content = read_bounded(path)
-    match file_kind_of(content):
+    content = read_file_bytes(path)
+    match detect_file_kind(content):
         case FileKind.ZIP:
-            return from_npz(ZipArchive(content, str(path)))
+            return read_npz_tensors(ZipArchive(content, str(path)))
         case FileKind.SAFETENSORS:
-            return flatten_tensors(from_safetensors(content, str(path)))
+            return flatten_tensors(read_safetensors_tensors(content, str(path)))
         case FileKind.PICKLE:
             raise PolicyError(
                 f"{path}: a pickle, which can run any code when it is read, so pdtui refuses it. "

@@ -15,7 +15,7 @@ import torch
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.tensor_files import Tensors
-from pdtui.policies.importers.zip_archive import shorten
+from pdtui.policies.importers.zip_archive import shorten_name_list
 
 MAX_WIDTH = 1_000_000
 """Inputs or outputs of a layer, beyond which a file is damaged or hostile."""
@@ -122,4 +122,4 @@ def join_mean_and_deviation(mean: LinearLayer, log_std: LinearLayer) -> LinearLa
 
 def describe_tensors(tensors: Tensors) -> str:
     """List names and shapes for messages."""
-    return shorten([f"{name} {tuple(tensor.shape)}" for name, tensor in tensors.items()])
+    return shorten_name_list([f"{name} {tuple(tensor.shape)}" for name, tensor in tensors.items()])

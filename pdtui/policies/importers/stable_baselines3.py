@@ -23,7 +23,7 @@ from pdtui.policies.importers.partial_policy import (
     read_layer_sequence,
     read_linear_layer,
 )
-from pdtui.policies.importers.tensor_files import Tensors, flatten_tensors, from_torch
+from pdtui.policies.importers.tensor_files import Tensors, flatten_tensors, read_torch_archive
 from pdtui.policies.importers.zip_archive import ZipArchive
 from pdtui.policies.weights.import_options import NO_NORMALISER, ImportOptions
 from pdtui.policies.weights.policy_network import ACTIVATIONS
@@ -35,7 +35,7 @@ _FUNCTION = re.compile(r"<function ([\w.<>]+)\.__init__ at")
 OTHER_NETWORKS = "export such a network as TorchScript, or load it from Python"
 
 
-def is_sb3(names: tuple[str, ...]) -> bool:
+def is_sb3_archive(names: tuple[str, ...]) -> bool:
     """Return whether these are the entries of a Stable-Baselines3 archive."""
     return "data" in names and "policy.pth" in names
 
@@ -46,7 +46,7 @@ def import_sb3(archive: ZipArchive, import_options: ImportOptions) -> PartialPol
     The options tell whether the user gave the statistics of VecNormalize, which the archive lacks.
     """
     source, data = archive.source, _read_data(archive)
-    tensors = flatten_tensors(from_torch(archive.read("policy.pth"), f"{source}: policy.pth"))
+    tensors = flatten_tensors(read_torch_archive(archive.read("policy.pth"), f"{source}: policy.pth"))
     _check_flat(tensors, data, source)
     if _is_normalised(data) and not import_options.normaliser:
         raise PolicyError(

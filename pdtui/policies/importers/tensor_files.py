@@ -44,7 +44,7 @@ class FileKind(Enum):
     UNKNOWN = "no format that pdtui knows"
 
 
-def file_kind_of(content: bytes) -> FileKind:
+def detect_file_kind(content: bytes) -> FileKind:
     """Return the kind of a file, told by its first bytes and not by its name."""
     if not content:
         return FileKind.EMPTY
@@ -66,7 +66,7 @@ def file_kind_of(content: bytes) -> FileKind:
     return FileKind.UNKNOWN
 
 
-def from_npz(archive: ZipArchive) -> Tensors:
+def read_npz_tensors(archive: ZipArchive) -> Tensors:
     """Return the arrays of an ``.npz`` in the order of the file; arrays of Python objects are refused."""
     return {
         name.removesuffix(".npy"): torch.from_numpy(
@@ -99,7 +99,7 @@ def _read_array(content: bytes, where: str) -> np.ndarray[Any, Any]:
     return np.array(array, kind.newbyteorder("="), order="C")
 
 
-def from_safetensors(content: bytes, source: str) -> Tensors:
+def read_safetensors_tensors(content: bytes, source: str) -> Tensors:
     """Return the tensors of a safetensors file."""
     try:
         tensors: Tensors = load_safetensors(content)
@@ -108,7 +108,7 @@ def from_safetensors(content: bytes, source: str) -> Tensors:
     return tensors
 
 
-def from_torch(content: bytes, source: str) -> dict[str, Any]:
+def read_torch_archive(content: bytes, source: str) -> dict[str, Any]:
     """Return what a PyTorch archive holds: tensors inside containers, for `flatten_tensors`."""
     archive = ZipArchive(content, source)
     with zipfile.ZipFile(io.BytesIO(content)) as packed:

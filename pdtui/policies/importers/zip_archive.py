@@ -57,17 +57,17 @@ class ZipArchive:
 
     def listing(self) -> str:
         """List the entries for messages."""
-        return shorten(self.names)
+        return shorten_name_list(self.names)
 
 
-def shorten(names: tuple[str, ...] | list[str]) -> str:
+def shorten_name_list(names: tuple[str, ...] | list[str]) -> str:
     """List the first names and how many more there are, all printable."""
     shown = [name if name.isprintable() else ascii(name) for name in names[:_SHOWN]]
     more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
     return (", ".join(name[:80] for name in shown) or "nothing") + more
 
 
-def read_bounded(path: Path) -> bytes:
+def read_file_bytes(path: Path) -> bytes:
     """Return the content of a file; one that cannot be read or is too large is a `PolicyError`."""
     try:
         return read_bounded_file(path, MAX_BYTES)

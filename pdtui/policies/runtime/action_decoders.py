@@ -15,13 +15,13 @@ _Floats = NDArray[np.float32]
 Decoder = Callable[[torch.Tensor, np.random.Generator | None], _Floats]
 
 
-def mean_action(output: torch.Tensor, _rng: np.random.Generator | None) -> _Floats:
+def decode_mean_action(output: torch.Tensor, _rng: np.random.Generator | None) -> _Floats:
     """Take the network's output as the action."""
     action: _Floats = output.reshape(-1).numpy().astype(np.float32)
     return action
 
 
-def categorical(output: torch.Tensor, rng: np.random.Generator | None) -> _Floats:
+def decode_categorical_action(output: torch.Tensor, rng: np.random.Generator | None) -> _Floats:
     """Take the network's output as logits of discrete actions; the action is an index, shape (1,).
 
     Without a generator, the most likely action is taken, the first among equals; with one, it is drawn from
@@ -35,14 +35,14 @@ def categorical(output: torch.Tensor, rng: np.random.Generator | None) -> _Float
     return np.array([min(int(index), logits.size - 1)], np.float32)
 
 
-def decoder_for(network: PolicyNetwork) -> Decoder:
+def make_action_decoder(network: PolicyNetwork) -> Decoder:
     """Return the decoder of a network: its actions are float32 and inside the bounds.
 
     Actions have the shape (actions,), or (1,) with an index where actions are discrete.
     """
     spec = network.spec
     if spec.head == "categorical":
-        return categorical
+        return decode_categorical_action
     fixed = network.log_std.numpy() if spec.gaussian and spec.log_std == "parameter" else None
     squash = spec.head in ("squashed_gaussian", "tanh")
     low, high = np.array(spec.action_low, np.float32), np.array(spec.action_high, np.float32)

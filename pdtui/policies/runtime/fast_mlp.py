@@ -86,7 +86,7 @@ class FastMlp:
         return self._output, values.copy(), natural
 
 
-def fast_mlp_of(module: nn.Module, observations: int) -> FastMlp | None:
+def make_fast_mlp(module: nn.Module, observations: int) -> FastMlp | None:
     """Return the module as a `FastMlp`; None unless that gives the same bits on a few observations.
 
     The module must be an `nn.Sequential` of unnamed layers, or have a method ``stages()`` that returns its

@@ -11,7 +11,7 @@ from gymnasium import spaces
 from torch import nn
 
 from pdtui.core.errors import PolicyError
-from pdtui.policies.runtime.action_decoders import Decoder, categorical, mean_action
+from pdtui.policies.runtime.action_decoders import Decoder, decode_categorical_action, decode_mean_action
 from pdtui.policies.runtime.policy import Policy
 
 
@@ -59,7 +59,9 @@ def policy_from_network(
     if shape is None:
         raise PolicyError(f"{owner}: expected the shape of the observation, or the robot that gives it")
     if decode is None:
-        decode = categorical if isinstance(action_space, spaces.Discrete) else mean_action
+        decode = (
+            decode_categorical_action if isinstance(action_space, spaces.Discrete) else decode_mean_action
+        )
     return Policy(
         module,
         shape,

@@ -17,10 +17,10 @@ from torch import nn
 from pdtui.core.errors import PolicyError
 from pdtui.core.units import NO_STIMULATION, LayerWidths, Stimulation, describe_layers
 from pdtui.policies.runtime import recurrent_state
-from pdtui.policies.runtime.action_decoders import Decoder, mean_action
-from pdtui.policies.runtime.fast_mlp import fast_mlp_of
+from pdtui.policies.runtime.action_decoders import Decoder, decode_mean_action
+from pdtui.policies.runtime.fast_mlp import make_fast_mlp
 from pdtui.policies.runtime.recurrent_state import PolicyState
-from pdtui.policies.runtime.unit_layers import UnitHooks, hidden_modules, name_layers
+from pdtui.policies.runtime.unit_layers import UnitHooks, find_hidden_modules, name_layers
 
 
 @contextmanager
@@ -89,7 +89,7 @@ class Policy:
         observations: int | Sequence[int],
         *,
         hidden: Sequence[str] | None = None,
-        decode: Decoder = mean_action,
+        decode: Decoder = decode_mean_action,
         batched: bool = False,
         initial_state: Any = None,
         name: str = "policy",
@@ -98,12 +98,14 @@ class Policy:
         self.module, self.name, self.sha256 = copy.deepcopy(module).eval(), name, sha256
         self.shape = (observations,) if isinstance(observations, int) else tuple(observations)
         self._decode, self._batched = decode, batched
-        self._initial = None if initial_state is None else recurrent_state.clone_state(initial_state)
+        self._initial = (
+            None if initial_state is None else recurrent_state.clone_recurrent_state(initial_state)
+        )
         self._state = self._initial
         self._hooks = UnitHooks()
         plain = hidden is None and initial_state is None and not batched and len(self.shape) == 1
         with _one_thread():
-            self._fast_mlp = fast_mlp_of(self.module, self.shape[0]) if plain else None
+            self._fast_mlp = make_fast_mlp(self.module, self.shape[0]) if plain else None
             if self._fast_mlp is not None:
                 self.layers = LayerWidths(self._fast_mlp.layers, [])
             else:
@@ -126,11 +128,11 @@ class Policy:
     def reset(self) -> None:
         """Return to the initial recurrent state, for a new episode."""
         if self._initial is not None:
-            self._state = recurrent_state.clone_state(self._initial)
+            self._state = recurrent_state.clone_recurrent_state(self._initial)
 
     def snapshot(self) -> PolicyState:
         """Return a copy of the recurrent state; empty for a network without one."""
-        return () if self._initial is None else recurrent_state.state_to_arrays(self._state)
+        return () if self._initial is None else recurrent_state.recurrent_state_to_arrays(self._state)
 
     def restore(self, state: PolicyState) -> None:
         """Return to a recurrent state that `snapshot` gave; that of another network is a `PolicyError`."""
@@ -139,10 +141,10 @@ class Policy:
             raise PolicyError(f"{self.name}: expected a recurrent state of shapes {expected}, got {found}")
         if state:
             tensors = (torch.from_numpy(array.copy()) for array in state)
-            self._state = recurrent_state.rebuild_state(self._initial, tensors)
+            self._state = recurrent_state.rebuild_recurrent_state(self._initial, tensors)
 
     def _watch_units(self, hidden: Sequence[str] | None) -> list[list[str]]:
-        chosen = hidden_modules(self.module, hidden, self.name)
+        chosen = find_hidden_modules(self.module, hidden, self.name)
         names = name_layers(self.module, chosen, self._try_network)
         for child in chosen:
             child.register_forward_hook(lambda _module, _inputs, output: self._hooks.replace(output))
@@ -152,7 +154,7 @@ class Policy:
         self._hooks.begin()
         try:
             self._run_network(np.zeros(self.shape))
-            recurrent_state.check_state(self._initial, self._state)
+            recurrent_state.check_recurrent_state(self._initial, self._state)
         except PolicyError as error:
             raise PolicyError(f"{self.name}: {error}") from error
         except (RuntimeError, TypeError, ValueError, IndexError) as error:
@@ -172,8 +174,8 @@ class Policy:
                 output: torch.Tensor = self.module(x)
                 return output
             output, state = self.module(x, self._state)
-        self._state = recurrent_state.rebuild_state(
-            state, iter(self._hooks.natural_of(recurrent_state.flatten_state(state)))
+        self._state = recurrent_state.rebuild_recurrent_state(
+            state, iter(self._hooks.natural_of(recurrent_state.flatten_recurrent_state(state)))
         )
         return output
 
@@ -216,7 +218,7 @@ class Policy:
         return PolicyStep(action, activations, natural)
 
 
-def check_fit(policy: Policy, world: gymnasium.Env[Any, Any], name: str) -> None:
+def check_policy_fit(policy: Policy, world: gymnasium.Env[Any, Any], name: str) -> None:
     """Check that a policy takes a world's observations and gives its actions, by acting once on zeros.
 
     Raises:

@@ -15,7 +15,7 @@ from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.fast_mlp import ACTIVATION_TYPES
 
 
-def hidden_modules(module: nn.Module, hidden: Sequence[str] | None, owner: str) -> dict[nn.Module, str]:
+def find_hidden_modules(module: nn.Module, hidden: Sequence[str] | None, owner: str) -> dict[nn.Module, str]:
     """Return the submodules whose outputs are units, with their names.
 
     They are those named in `hidden`, by default every activation function and every recurrent layer.

@@ -52,7 +52,7 @@ _ANY = ("__is__", "__isnot__", "__not__", "len", "list", "__contains__")
 _UNARY = ("neg", "__not__", "len", "list")
 
 
-def call_operator(name: str, arguments: list[Any], keywords: dict[str, Any]) -> Any:
+def apply_torch_operator(name: str, arguments: list[Any], keywords: dict[str, Any]) -> Any:
     """Apply TorchScript's operator ``torch.NAME``.
 
     One that is not listed, cannot be computed, or has too large a result is a `PolicyError`.

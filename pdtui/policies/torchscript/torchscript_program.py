@@ -12,7 +12,7 @@ from torch import nn
 from pdtui.core.errors import PolicyError
 from pdtui.policies.runtime.fast_mlp import ACTIVATION_TYPES
 from pdtui.policies.torchscript.pickle_reader import PickledObject
-from pdtui.policies.torchscript.torchscript_operators import call_operator
+from pdtui.policies.torchscript.torchscript_operators import apply_torch_operator
 
 _RECURRENT = ("LSTM", "GRU", "RNN", "LSTMCell", "GRUCell", "RNNCell")
 _UNITS = {*_RECURRENT, *(kind.__name__ for kind in ACTIVATION_TYPES)}
@@ -203,7 +203,7 @@ class _StackFrame:
         if name.startswith("ops.prim."):
             return _call_primitive(name.removeprefix("ops.prim."), arguments)
         if name.startswith("torch."):
-            return call_operator(name.removeprefix("torch."), arguments, keywords)
+            return apply_torch_operator(name.removeprefix("torch."), arguments, keywords)
         held = self._values.get(name)
         if name.startswith("__torch__.") or isinstance(held, _Function):
             return self._program.call(held or name, arguments, keywords)

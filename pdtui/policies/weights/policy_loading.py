@@ -12,11 +12,15 @@ import numpy as np
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers import import_network
-from pdtui.policies.runtime.action_decoders import categorical, decoder_for, mean_action
+from pdtui.policies.runtime.action_decoders import (
+    decode_categorical_action,
+    decode_mean_action,
+    make_action_decoder,
+)
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.torchscript import is_torchscript, read_torchscript
-from pdtui.policies.weights.file_search import find_beside
 from pdtui.policies.weights.import_options import NO_NORMALISER, NO_OPTIONS, ImportOptions, WorldSpaces
+from pdtui.policies.weights.policy_file_lookup import find_file_beside
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import (
     find_weights_file,
@@ -61,7 +65,9 @@ def load_policy(
     if spaces is not None:
         discrete = spec.head == "categorical"
         spaces.check(str(path), spec.observations, spec.action_size, spec.actions if discrete else 0)
-    return Policy(network, spec.observations, decode=decoder_for(network), name=path.stem, sha256=digest)
+    return Policy(
+        network, spec.observations, decode=make_action_decoder(network), name=path.stem, sha256=digest
+    )
 
 
 def load_any_network(
@@ -102,7 +108,9 @@ def _find_statistics(path: Path, import_options: ImportOptions, folders: Sequenc
     name = import_options.normaliser
     if not name or name == NO_NORMALISER:
         return None
-    found = find_beside(name, (*folders, path.parent)) or find_beside(str(path.parent / Path(name).name), ())
+    found = find_file_beside(name, (*folders, path.parent)) or find_file_beside(
+        str(path.parent / Path(name).name), ()
+    )
     if found is None:
         raise PolicyError(f"{name}: no such file; expected the statistics of the observation for {path}")
     return found
@@ -142,7 +150,7 @@ def load_torchscript_policy(
     if import_options != NO_OPTIONS:
         raise PolicyError(f"{path}: TorchScript states its whole computation; expected no import options")
     shape, outputs = spaces.shape or (spaces.observations,), spaces.discrete_actions or spaces.actions
-    decode = categorical if spaces.discrete_actions else mean_action
+    decode = decode_categorical_action if spaces.discrete_actions else decode_mean_action
     build = partial(Policy, read_torchscript(path), shape, name=path.stem, sha256=hash_file(path))
     problem = ""
     for batched in (False, True):

@@ -156,7 +156,7 @@ class PolicyNetwork(nn.Module):
 
         A tensor that is missing, superfluous, of another shape or not finite is a `PolicyError`.
         """
-        check_tensors(self.state_dict(), tensors)
+        check_tensor_shapes(self.state_dict(), tensors)
         for name, tensor in tensors.items():
             if not bool(torch.isfinite(tensor).all()):
                 raise PolicyError(f"tensor '{name}': expected finite numbers, found NaN or infinity")
@@ -178,7 +178,7 @@ class PolicyNetwork(nn.Module):
         return observation
 
 
-def check_tensors(expected: Mapping[str, torch.Tensor], found: Mapping[str, torch.Tensor]) -> None:
+def check_tensor_shapes(expected: Mapping[str, torch.Tensor], found: Mapping[str, torch.Tensor]) -> None:
     """Check that tensors have the expected names and shapes; others are a `PolicyError`."""
     shapes, others = ({name: tuple(one.shape) for name, one in all.items()} for all in (expected, found))
     for name in sorted(shapes.keys() | others.keys()):

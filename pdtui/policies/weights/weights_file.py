@@ -17,8 +17,8 @@ from safetensors.torch import save
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PolicyError
 from pdtui.core.untrusted_file import open_regular_file
-from pdtui.policies.weights.file_search import find_beside
-from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork, check_tensors
+from pdtui.policies.weights.policy_file_lookup import find_file_beside
+from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork, check_tensor_shapes
 
 WEIGHTS = Path(__file__).parent / "shipped"
 MAX_BYTES = 1 << 30
@@ -31,7 +31,7 @@ def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
 
     If there is none, a `PolicyError` lists the shipped policies.
     """
-    own = find_beside(name, folders)
+    own = find_file_beside(name, folders)
     if own is not None:
         return own
     if (shipped := WEIGHTS / f"{name}.safetensors").is_file():
@@ -84,7 +84,7 @@ def load_network(path: Path) -> PolicyNetwork:
         spec.check_values()
         with torch.device("meta"):
             expected = PolicyNetwork(spec).state_dict()
-        check_tensors(expected, tensors)
+        check_tensor_shapes(expected, tensors)
         network = PolicyNetwork(spec)
         network.load_tensors(tensors)
     except PolicyError as error:

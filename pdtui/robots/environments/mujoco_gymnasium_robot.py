@@ -71,7 +71,7 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
     def digest(self) -> int:
         if self._repeats:
             return super().digest()
-        return mujoco_robot.digest_state(mujoco_robot.read_state(self.world.model, self.world.data))
+        return mujoco_robot.digest_simulator_state(mujoco_robot.read_state(self.world.model, self.world.data))
 
     def _restored_apart(self) -> tuple[type, ...]:
         from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
@@ -93,7 +93,7 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
             done += values.size
 
     def _check_finite(self) -> None:
-        mujoco_robot.check_finite(self.world.data, self.name)
+        mujoco_robot.check_state_is_finite(self.world.data, self.name)
         super()._check_finite()
 
 

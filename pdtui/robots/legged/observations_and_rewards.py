@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.robots.geometry import rotate
+from pdtui.robots.geometry import rotate_vectors
 
 COMMAND_SCALES = np.array([2.0, 2.0, 0.25])
 """Factors on the observed commands: forward and lateral speed (m/s), yaw rate (rad/s)."""
@@ -58,13 +58,13 @@ class LeggedMotion:
     @cached_property
     def linear(self) -> Floats:
         """The trunk's velocity in its own frame, m/s, shape (n, 3)."""
-        return rotate(self.qpos[:, 3:7] * _CONJUGATE, self.qvel[:, :3])
+        return rotate_vectors(self.qpos[:, 3:7] * _CONJUGATE, self.qvel[:, :3])
 
     @cached_property
     def up(self) -> Floats:
         """The world's vertical in the trunk's frame, shape (n, 3)."""
         vertical = np.broadcast_to([0.0, 0.0, 1.0], (len(self.qpos), 3))
-        return rotate(self.qpos[:, 3:7] * _CONJUGATE, vertical)
+        return rotate_vectors(self.qpos[:, 3:7] * _CONJUGATE, vertical)
 
 
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])

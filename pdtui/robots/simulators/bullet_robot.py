@@ -44,7 +44,7 @@ def _silence() -> Iterator[None]:
             os.close(before)
 
 
-def data_folder() -> Path:
+def bullet_data_folder() -> Path:
     """Return the folder of the models of ``pybullet_data``."""
     import pybullet_data
 
@@ -134,16 +134,16 @@ class BulletRobot(Robot):
             self.bullet = None
 
 
-def add_plane(bullet: Any, friction: dict[str, float], level: float = 0.0) -> None:
+def add_ground_plane(bullet: Any, friction: dict[str, float], level: float = 0.0) -> None:
     """Add an endless plane at a level, m."""
     shape = bullet.createCollisionShape(bullet.GEOM_PLANE)
     plane = bullet.createMultiBody(0, shape, basePosition=[0, 0, level])
     bullet.changeDynamics(plane, -1, **friction)
 
 
-def add_ground(bullet: Any, ground: RoughGround, friction: dict[str, float]) -> None:
+def add_rough_ground(bullet: Any, ground: RoughGround, friction: dict[str, float]) -> None:
     """Add uneven ground and a plane around it."""
-    add_plane(bullet, friction, -_DEPTH)
+    add_ground_plane(bullet, friction, -_DEPTH)
     rows, columns = ground.heights.shape
     shape = bullet.createCollisionShape(
         bullet.GEOM_HEIGHTFIELD,

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from pdtui.core.attributes import Attribute, wrap_angle
-from pdtui.robots.geometry import roll_pitch_yaw, rotate
+from pdtui.robots.geometry import roll_pitch_yaw, rotate_vectors
 
 _FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
 _JOINT_MOTORS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
@@ -69,7 +69,7 @@ def _free_root(model: mujoco.MjModel, own: list[int]) -> list[MeasuredAttribute]
 
     def yaw_rate(data: mujoco.MjData) -> float:
         # MuJoCo's angular velocity of a free joint is in the body's frame.
-        return float(rotate(data.qpos[q + 3 : q + 7], data.qvel[v + 3 : v + 6])[2])
+        return float(rotate_vectors(data.qpos[q + 3 : q + 7], data.qvel[v + 3 : v + 6])[2])
 
     linear = [_velocity(v + axis) for axis in range(3)]
     angles = [partial(angle, axis) for axis in range(3)]
@@ -92,7 +92,7 @@ def _planar_root(model: mujoco.MjModel, root: int, own: list[int]) -> list[Measu
     found: list[MeasuredAttribute] = []
     horizontal: list[Read] = []
     for joint, kind in zip(own, kinds, strict=True):
-        direction = rotate(model.body_quat[root], model.jnt_axis[joint])
+        direction = rotate_vectors(model.body_quat[root], model.jnt_axis[joint])
         axis = int(np.argmax(np.abs(direction)))
         if abs(direction[axis]) < _ALIGNED:
             return []

@@ -91,7 +91,8 @@ def suppress_warnings() -> Iterator[None]:
 
 
 def silence_warnings(data: mujoco.MjData) -> None:
-    """Keep MuJoCo from printing warnings about this data until it is reset; `check_finite` reports them.
+    """Keep MuJoCo from printing warnings about this data until it is reset; `check_state_is_finite` reports
+    them.
 
     The process's handler of warnings stays as it is.
     """
@@ -105,12 +106,12 @@ def body_poses(data: mujoco.MjData) -> Floats:
     return poses
 
 
-def digest_state(state: Floats) -> int:
+def digest_simulator_state(state: Floats) -> int:
     """Return a 63-bit digest of what `read_state` returned."""
     return int.from_bytes(blake2b(state.data, digest_size=8).digest(), "little") >> 1
 
 
-def check_finite(data: mujoco.MjData, owner: str) -> None:
+def check_state_is_finite(data: mujoco.MjData, owner: str) -> None:
     """Check that the simulation did not diverge.
 
     MuJoCo resets a diverged state by itself, so only its warning counters tell.
@@ -164,11 +165,11 @@ class MujocoRobot(Robot):
 
     def digest(self) -> int:
         mujoco.mj_getState(self.model, self.data, self._state_buffer, _STATE)
-        return digest_state(self._state_buffer)
+        return digest_simulator_state(self._state_buffer)
 
     @cached_property
     def _state_buffer(self) -> Floats:
         return np.empty(mujoco.mj_stateSize(self.model, _STATE))
 
     def _check_finite(self) -> None:
-        check_finite(self.data, self.name)
+        check_state_is_finite(self.data, self.name)

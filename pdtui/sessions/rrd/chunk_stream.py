@@ -68,10 +68,10 @@ class ChunkStream:
         return self.store
 
     def _chunks(self, file: BinaryIO) -> Iterator[EntityChunk]:
-        framing.check_start(file)
+        framing.check_rrd_start(file)
         for frame in framing.read_message_frames(file, os.fstat(file.fileno()).st_size):
             if frame.kind == framing.LAST:
-                framing.check_end(file, frame)
+                framing.check_rrd_end(file, frame)
                 self.finished = True
             elif frame.kind == framing.STORE:
                 self._add_store(_decode_message(file, frame, decoder.decode_store_info))

@@ -46,7 +46,7 @@ class MessageFrame(NamedTuple):
         return self.start + self.length + (_TRAILER.size if self.kind == LAST else 0)
 
 
-def check_start(file: BinaryIO) -> None:
+def check_rrd_start(file: BinaryIO) -> None:
     """Check that a file begins like a recording."""
     start = file.read(_START.size)
     if start[:4] != _MAGIC:
@@ -82,7 +82,7 @@ def read_message_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
         place = frame.end
 
 
-def check_end(file: BinaryIO, last: MessageFrame) -> None:
+def check_rrd_end(file: BinaryIO, last: MessageFrame) -> None:
     """Check that the last message, an index of the others, has the checksum in the trailer."""
     file.seek(last.start)
     digest, left = xxh32(seed=_SEED), last.length

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 from pdtui.core.errors import MapError
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.stimulation.behavior_colors import behavior_rgb
+from pdtui.stimulation.behavior_colors import behavior_color_rgb
 from pdtui.stimulation.map_reader import parse_map
 
 IDLE = (150, 150, 150)
 """The color where no behavior is active."""
 
 
-class BehaviorLegend:
+class BehaviorColorLegend:
     """Assigns colors to behaviors in the order of the map; unknown behaviors get the colors after those.
 
     A map text that cannot be parsed, for example from another version, is no error: only colors depend on it.
@@ -37,7 +37,7 @@ class BehaviorLegend:
 
     def color(self, name: str) -> tuple[int, int, int]:
         """Return the color of a behavior."""
-        return behavior_rgb(self._rows.setdefault(name, len(self._rows)))
+        return behavior_color_rgb(self._rows.setdefault(name, len(self._rows)))
 
     def color_of_state(self, names: Sequence[str]) -> tuple[int, int, int]:
         """Return the color of behaviors that are active together: that of the one latched last."""

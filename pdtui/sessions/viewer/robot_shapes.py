@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.robot_data import Link
-from pdtui.robots.geometry import capsule_ends, place_links
+from pdtui.robots.geometry import capsule_ends, compute_link_poses
 from pdtui.sessions.writer.arrow_columns import ComponentColumn, vector_list_column
 
 _COLOR = (214, 137, 76)
@@ -42,7 +42,7 @@ class RobotShapes:
         """Return where the shapes are, from the poses of the bodies in n steps, shape (n, B, 7)."""
         columns = []
         if self._round:
-            placed = place_links(self._round, poses)
+            placed = compute_link_poses(self._round, poses)
             # The viewer's capsule starts at its translation and extends along z; ours is centred.
             starts = capsule_ends(self._round, placed)[..., 0, :]
             columns += [
@@ -50,7 +50,7 @@ class RobotShapes:
                 vector_list_column(rr.Capsules3D.descriptor_quaternions(), _xyzw(placed)),
             ]
         if self._boxes:
-            placed = place_links(self._boxes, poses)
+            placed = compute_link_poses(self._boxes, poses)
             columns += [
                 vector_list_column(rr.Boxes3D.descriptor_centers(), placed[..., :3].astype(np.float32)),
                 vector_list_column(rr.Boxes3D.descriptor_quaternions(), _xyzw(placed)),

@@ -13,7 +13,7 @@ from rerun.blueprint.encodings import ComponentSourceKind, TextLogColumnKind, Vi
 from pdtui.core.attributes import Attribute
 from pdtui.sessions import session_schema as schema
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.viewer.behavior_legend import BehaviorLegend
+from pdtui.sessions.viewer.behavior_legend import BehaviorColorLegend
 
 _CURVES = (
     (205, 214, 224),
@@ -147,7 +147,7 @@ def _lay_out_stimulation(content: DriveContent) -> rrb.Vertical | None:
 
 def _lay_out_measurements(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
     """Lay out one plot per physical unit, with targets beside their attributes."""
-    target_attributes = BehaviorLegend(info).target_attributes
+    target_attributes = BehaviorColorLegend(info).target_attributes
     plots = []
     for unit in dict.fromkeys(attribute.unit for attribute in info.attributes):
         columns = [column for column, one in enumerate(info.attributes) if one.unit == unit]

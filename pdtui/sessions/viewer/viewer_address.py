@@ -57,7 +57,7 @@ class ViewerAddress:
         return f"no viewer listens on {self}: start {start}, then drive again with --viewer"
 
 
-def viewer_command(path: Path, *, web: bool = False) -> list[str]:
+def viewer_command_line(path: Path, *, web: bool = False) -> list[str]:
     """Return the command that opens a session in the viewer's window, or serves it to a local browser.
 
     Raises:

@@ -19,7 +19,7 @@ from pdtui.core.units import format_unit
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_schema import BEHAVIORS, HEAT_MAP, MAGNITUDES, PATH, ROBOT, TARGETS, UNITS
 from pdtui.sessions.viewer.activation_heat_map import ActivationHeatMap
-from pdtui.sessions.viewer.behavior_legend import BehaviorLegend
+from pdtui.sessions.viewer.behavior_legend import BehaviorColorLegend
 from pdtui.sessions.viewer.obstacle_writer import ObstacleWriter
 from pdtui.sessions.viewer.robot_shapes import RobotShapes
 from pdtui.sessions.viewer.session_blueprint import DriveContent
@@ -42,7 +42,7 @@ class ViewerDataWriter:
         self._draw_every = max(1, round(_DRAWN_APART / info.dt))
         for part in self._shapes.static():
             log_static(ROBOT, part)
-        self._legend = BehaviorLegend(info)
+        self._legend = BehaviorColorLegend(info)
         self._units = ViewerCurves[tuple[str, int]](
             UNITS,
             lambda key: f"{key[0]}, {format_unit(key[1], info.layers)}",

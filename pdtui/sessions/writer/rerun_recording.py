@@ -38,7 +38,7 @@ def open_recording(path: Path, info: DriveInfo, recording_id: str | None = None)
     return recording
 
 
-def send_property(recording: rr.RecordingStream, name: str, values: Mapping[str, Any]) -> None:
+def send_property_group(recording: rr.RecordingStream, name: str, values: Mapping[str, Any]) -> None:
     """Send a group of properties: plain values or non-empty lists of them."""
     arrays = {}
     for key, value in values.items():

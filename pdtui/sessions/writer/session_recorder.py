@@ -29,9 +29,9 @@ from pdtui.sessions.writer.rerun_recording import (
     flush_recording,
     name_file_in_errors,
     open_recording,
-    send_property,
+    send_property_group,
 )
-from pdtui.sessions.writer.step_record_columns import ending_columns, event_columns, step_record_columns
+from pdtui.sessions.writer.step_record_columns import episode_end_columns, event_columns, step_record_columns
 
 _VIEW_ROWS, _LIVE_ROWS = 128, 8
 _SAFE_ROWS = 16
@@ -195,7 +195,7 @@ class SessionRecorder:
             self._events += len(events)
         ended = [record for record in records if record.ended]
         if ended:
-            self._send(ENDINGS, [record.step for record in ended], ending_columns(ended))
+            self._send(ENDINGS, [record.step for record in ended], episode_end_columns(ended))
 
     def _send(self, entity: str, steps: Sequence[int], columns: list[ComponentColumn]) -> None:
         self._chunks += 1
@@ -214,7 +214,7 @@ class SessionRecorder:
         )
 
     def _property(self, name: str, values: dict[str, Any]) -> None:
-        self._write(lambda recording: send_property(recording, name, values))
+        self._write(lambda recording: send_property_group(recording, name, values))
 
     def _write(self, write: Callable[[rr.RecordingStream], object]) -> None:
         """Write to the recording, and to that of a viewer, whose errors are not the session's."""

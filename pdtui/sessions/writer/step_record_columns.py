@@ -11,7 +11,7 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
-from pdtui.core.events import Event, describe_event
+from pdtui.core.events import DriveEvent, describe_event
 from pdtui.core.step_record import ActiveBehavior, StepRecord
 from pdtui.sessions.session_schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION, ActivationsKept
 from pdtui.sessions.writer.arrow_columns import (
@@ -68,7 +68,7 @@ def _to_half(activations: NDArray[np.float32]) -> NDArray[np.float16]:
         return activations.astype(np.float16)
 
 
-def event_columns(events: Sequence[Event], first: int) -> list[ComponentColumn]:
+def event_columns(events: Sequence[DriveEvent], first: int) -> list[ComponentColumn]:
     """Return columns with one row per event, in the order in which they were applied.
 
     `first` is the number of the first of them in the session.
@@ -85,7 +85,7 @@ def event_columns(events: Sequence[Event], first: int) -> list[ComponentColumn]:
     ]
 
 
-def ending_columns(records: Sequence[StepRecord]) -> list[ComponentColumn]:
+def episode_end_columns(records: Sequence[StepRecord]) -> list[ComponentColumn]:
     """Return columns with one row per episode that ended by itself."""
     levels = ["ERROR" if record.diverged else "WARN" for record in records]
     return [
@@ -94,7 +94,7 @@ def ending_columns(records: Sequence[StepRecord]) -> list[ComponentColumn]:
     ]
 
 
-def _log_line(event: Event) -> str:
+def _log_line(event: DriveEvent) -> str:
     return f"[{event.key}] {describe_event(event)}" if event.key else describe_event(event)
 
 

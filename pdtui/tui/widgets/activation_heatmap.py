@@ -13,7 +13,7 @@ from rich.style import Style
 from textual.color import Color
 from textual.strip import Strip
 
-from pdtui.core.units import format_unit, locate_unit
+from pdtui.core.units import format_unit, split_flat_index
 from pdtui.driving.drive_snapshot import DriveSnapshot, StimulatedUnit
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
@@ -52,7 +52,7 @@ class ActivationHeatmap(SnapshotWidget):
             return []
         columns = width - _LABEL
         lines = max(1, height - 1)
-        places = layer_rows(len(self.facts.layers), lines * 2)
+        places = allocate_layer_rows(len(self.facts.layers), lines * 2)
         pixels = np.zeros((lines * 2, columns), np.int64)
         first = 0
         for layer, units in enumerate(self.facts.layers):
@@ -114,7 +114,7 @@ class ActivationHeatmap(SnapshotWidget):
 
     def _column(self, view: StimulatedUnit, columns: int, places: list[tuple[int, int]]) -> int:
         assert self.facts is not None
-        layer, index = locate_unit(view.unit, self.facts.layers)
+        layer, index = split_flat_index(view.unit, self.facts.layers)
         rows = max(1, places[layer][1])
         return UnitGrid(self.facts.layers[layer], rows, columns).column_of(index)
 
@@ -126,7 +126,7 @@ def _style(upper: Color | None, lower: Color | None) -> Style:
     )
 
 
-def layer_rows(layers: int, rows: int) -> list[tuple[int, int]]:
+def allocate_layer_rows(layers: int, rows: int) -> list[tuple[int, int]]:
     """Return the first pixel row and the number of pixel rows per layer; layers without room get none."""
     each = max(1, rows // layers)
     return [(layer * each, each if (layer + 1) * each <= rows else 0) for layer in range(layers)]

@@ -9,7 +9,7 @@ from rich.style import Style
 from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
-from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number, format_signed, key_name
+from pdtui.tui.cell_text import ScreenRow, displayed_key_name, fit_cells, format_number, format_signed
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
@@ -34,7 +34,7 @@ class BehaviorList(SnapshotWidget):
         if not behaviors:
             return [ScreenRow(width).add("none: the map has no behaviors", STYLES.faint).strip()]
         names = [make_printable(behavior.name) for behavior in behaviors]
-        keys = [key_name(behavior.key) for behavior in behaviors]
+        keys = [displayed_key_name(behavior.key) for behavior in behaviors]
         key_width = max(map(cell_len, keys)) + 2
         name_width = min(max(map(cell_len, names)), max(8, width // 3))
         self._columns = (key_width, name_width)
@@ -83,7 +83,7 @@ class BehaviorList(SnapshotWidget):
 
     def _add_cap(self, line: ScreenRow, key: str, style: Style) -> None:
         """Add the key as a cap, padded to the width of the widest."""
-        cap = f" {key_name(key)} "
+        cap = f" {displayed_key_name(key)} "
         line.add(cap, style).add(" " * (self._columns[0] - cell_len(cap)), STYLES.text)
 
     def _kind(self, behavior: Behavior) -> str:

@@ -10,7 +10,7 @@ from textual.strip import Strip
 
 from pdtui.core.attributes import Floats
 from pdtui.driving.drive_snapshot import DriveSnapshot
-from pdtui.robots.geometry import root_body, rotate
+from pdtui.robots.geometry import root_body_row, rotate_vectors
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import format_number
 from pdtui.tui.perspective_camera import round_length_down
@@ -73,8 +73,8 @@ class PathView(SnapshotWidget):
     def remember(self, snapshot: DriveSnapshot) -> None:
         self.trail.extend(snapshot.path, restarted=snapshot.restarted)
         if self.facts is not None and len(snapshot.poses):
-            root = snapshot.poses[root_body(self.facts.links)]
-            ahead = rotate(root[3:], np.array([1.0, 0.0, 0.0]))
+            root = snapshot.poses[root_body_row(self.facts.links)]
+            ahead = rotate_vectors(root[3:], np.array([1.0, 0.0, 0.0]))
             self._here = root[:2]
             self._heading = atan2(float(ahead[1]), float(ahead[0]))
 

@@ -11,10 +11,10 @@ from textual.strip import Strip
 from pdtui.core.attributes import Floats
 from pdtui.core.robot_data import NO_OBSTACLES
 from pdtui.driving.drive_snapshot import DriveSnapshot
-from pdtui.robots.geometry import capsule_ends, place_links, root_body, rotate
+from pdtui.robots.geometry import capsule_ends, compute_link_poses, root_body_row, rotate_vectors
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import ScreenRow, format_number
-from pdtui.tui.obstacle_drawing import draw_from_above, draw_from_side
+from pdtui.tui.obstacle_drawing import draw_obstacles_from_above, draw_obstacles_from_side
 from pdtui.tui.perspective_camera import PerspectiveCamera, round_length_down
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
@@ -62,7 +62,7 @@ class RobotView(SnapshotWidget):
             if len(snapshot.obstacles) and not self._looked:
                 self._looked, self.view = True, "above"
         if self.facts is not None and len(self._obstacles) and len(snapshot.poses):
-            ahead = _heading(snapshot.poses[root_body(self.facts.links)])
+            ahead = _heading(snapshot.poses[root_body_row(self.facts.links)])
             if self._ahead is None or snapshot.restarted:
                 self._ahead = ahead
             self._ahead = self._ahead + _EASING * (ahead - self._ahead)
@@ -73,23 +73,23 @@ class RobotView(SnapshotWidget):
         if self.snapshot is None or not self.facts.links:
             return []
         canvas = BrailleCanvas(width, height)
-        placed = place_links(self.facts.links, self.snapshot.poses)
+        placed = compute_link_poses(self.facts.links, self.snapshot.poses)
         ends = capsule_ends(self.facts.links, placed)
         if not np.isfinite(ends).all():
             canvas.draw_text(1, height // 2, "the robot's pose is not finite", _LABEL)
             return canvas.render_strips(_INKS)
-        root = self.snapshot.poses[root_body(self.facts.links)]
+        root = self.snapshot.poses[root_body_row(self.facts.links)]
         camera = self._camera(canvas, root, ends)
         self._draw_ground(canvas, camera, root)
         self._draw_shadow(canvas, camera, ends)
         if self.view == "above":
-            draw_from_above(canvas, camera, self._obstacles, _OBSTACLE)
+            draw_obstacles_from_above(canvas, camera, self._obstacles, _OBSTACLE)
         else:
-            draw_from_side(canvas, camera, self._obstacles, _OBSTACLE, behind=True)
+            draw_obstacles_from_side(canvas, camera, self._obstacles, _OBSTACLE, behind=True)
         self._draw_heading(canvas, camera, root)
         self._draw_links(canvas, camera, placed, ends)
         if self.view == "side":
-            draw_from_side(canvas, camera, self._obstacles, _OBSTACLE, behind=False)
+            draw_obstacles_from_side(canvas, camera, self._obstacles, _OBSTACLE, behind=False)
         x, y, z = (format_number(float(value)) for value in root[:3])
         place = f"x {x}  y {y}  z {z} m"
         canvas.draw_text(width - len(place), height - 1, place, _LABEL)
@@ -192,7 +192,7 @@ class RobotView(SnapshotWidget):
         ink: int,
     ) -> None:
         signs = np.array([[(corner >> axis & 1) * 2 - 1 for axis in range(3)] for corner in range(8)])
-        dots, _, before = camera.project(pose[:3] + rotate(pose[3:], signs * np.array(size)))
+        dots, _, before = camera.project(pose[:3] + rotate_vectors(pose[3:], signs * np.array(size)))
         if before.all():
             edges = np.array(_BOX_EDGES)
             canvas.draw_segments(dots[edges[:, 0]], dots[edges[:, 1]], ink)
@@ -200,6 +200,6 @@ class RobotView(SnapshotWidget):
 
 def _heading(root: Floats) -> Floats:
     """Return the ground direction of a pose's x axis, shape (2,); zeros if it points up or down."""
-    ahead: Floats = rotate(root[3:], np.array([1.0, 0.0, 0.0]))[:2]
+    ahead: Floats = rotate_vectors(root[3:], np.array([1.0, 0.0, 0.0]))[:2]
     length = float(np.linalg.norm(ahead))
     return ahead / length if length > 1e-6 else np.zeros(2)

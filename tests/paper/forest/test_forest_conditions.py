@@ -17,7 +17,7 @@ from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import drive_headless
 from pdtui.driving.keystrokes import read_keystrokes
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.replay import replay_session
 from pdtui.paper.forest.forest_conditions import PERSON, REPEATS, evaluate_forest
 from pdtui.paper.forest.forest_episode import (
@@ -91,7 +91,7 @@ def config(a1_map: Path) -> DriveConfig:
 
 @pytest.fixture(scope="module")
 def built(config: DriveConfig) -> ControlLoop:
-    return build_loop(config)
+    return build_control_loop(config)
 
 
 def _loop(built: ControlLoop, seed: int) -> ControlLoop:

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.core.attributes import Floats, column_of
-from pdtui.core.events import Event
+from pdtui.core.attributes import Floats, attribute_column
+from pdtui.core.events import DriveEvent
 from pdtui.core.step_record import StepRecord
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.driving.headless_drive import drive_keys, step_recording
+from pdtui.driving.headless_drive import drive_from_keystrokes, open_step_recorder
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class DriveArrays:
     """The S control steps of one drive.
 
     ``drive["vx"]`` is the series of an attribute, ``drive.unit("0:12")`` that of a hidden unit, shape (S,).
@@ -49,14 +49,14 @@ class Trajectory:
     digests: NDArray[np.int64] = field(repr=False)
     behaviors: tuple[tuple[str, ...], ...] = field(repr=False)
     stimulations: tuple[Stimulation, ...] = field(repr=False)
-    events: tuple[Event, ...] = field(repr=False)
+    events: tuple[DriveEvent, ...] = field(repr=False)
     endings: dict[int, str] = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.digests)
 
     def __getitem__(self, attribute: str) -> Floats:
-        return self.attributes[:, column_of(attribute, self.info.attributes, self.info.robot)]
+        return self.attributes[:, attribute_column(attribute, self.info.attributes, self.info.robot)]
 
     def __repr__(self) -> str:
         seconds = len(self) * self.info.dt
@@ -70,12 +70,12 @@ class Trajectory:
         return self.activations[:, parse_unit(address, self.info.layers)]
 
 
-def collect_trajectory(
+def collect_drive_arrays(
     loop: ControlLoop,
     keys: Mapping[int, str | Sequence[str]],
     steps: int,
     recorder: SessionRecorder | None = None,
-) -> Trajectory:
+) -> DriveArrays:
     """Drive from keystrokes as fast as possible and return the trajectory.
 
     Args:
@@ -90,18 +90,18 @@ def collect_trajectory(
     """
     presses = {step: [pressed] if isinstance(pressed, str) else pressed for step, pressed in keys.items()}
     records: list[StepRecord] = []
-    with step_recording(recorder) as record_step:
-        for record in drive_keys(loop, presses, steps):
+    with open_step_recorder(recorder) as record_step:
+        for record in drive_from_keystrokes(loop, presses, steps):
             records.append(record)
             record_step(record)
     return _stack_records(loop, records)
 
 
-def _stack_records(loop: ControlLoop, records: Sequence[StepRecord]) -> Trajectory:
+def _stack_records(loop: ControlLoop, records: Sequence[StepRecord]) -> DriveArrays:
     def stack(values: list[Any], kind: Any, *width: int) -> NDArray[Any]:
         return np.array(values, kind).reshape(len(records), *width)
 
-    return Trajectory(
+    return DriveArrays(
         info=loop.info,
         attributes=stack([record.attributes for record in records], np.float64, len(loop.robot.attributes)),
         activations=stack([record.activations for record in records], np.float32, loop.policy.units),

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from pdtui.benchmarks.matching_benchmark import measure_seconds
-from pdtui.core.events import Event
+from pdtui.benchmarks.matching_benchmark import time_call_in_seconds
+from pdtui.core.events import DriveEvent
 from pdtui.core.units import Stimulation
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 ROUNDS = 7
@@ -54,12 +54,12 @@ def bench_loop(
     Raises:
         PdtuiError: the robot, policy or map cannot be loaded.
     """
-    loop = build_loop(config)
+    loop = build_control_loop(config)
     walked = _actions(loop, config.seed, steps)
     behavior = next(iter(config.stimulation_map.behaviors), "")
     parts: dict[str, Callable[[], float]] = {
         "bare": lambda: _bare(loop, config.seed, walked),
-        "policy": lambda: steps / measure_seconds(lambda: _actions(loop, config.seed, steps)),
+        "policy": lambda: steps / time_call_in_seconds(lambda: _actions(loop, config.seed, steps)),
         "stimulated": lambda: _whole(loop, config.seed, steps, behavior, recorded=False),
         "recorded": lambda: _whole(loop, config.seed, steps, behavior, recorded=True),
     }
@@ -103,9 +103,9 @@ def _whole(loop: ControlLoop, seed: int, steps: int, behavior: str, *, recorded:
         recorder = SessionRecorder(Path(folder) / "bench.rrd", loop.info) if recorded else None
         start = time.perf_counter()
         for step in range(steps):
-            events = [Event(step, "behavior", behavior)] if behavior and step % 200 == 100 else []
+            events = [DriveEvent(step, "behavior", behavior)] if behavior and step % 200 == 100 else []
             if step % 200 == 150:
-                events = [Event(step, "default")]
+                events = [DriveEvent(step, "default")]
             record = fresh.advance(events)
             if recorder is not None:
                 recorder.write(record)

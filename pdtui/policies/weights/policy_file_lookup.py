@@ -8,21 +8,21 @@ from pathlib import Path
 
 from pdtui.core.errors import PolicyError
 
-FOLDERS = "PDTUI_POLICY_FOLDERS"
+POLICY_FOLDERS_VARIABLE = "PDTUI_POLICY_FOLDERS"
 """Environment variable: further folders whose files maps and sessions may name, separated as in PATH."""
 
 
-def find_beside(name: str, folders: Sequence[Path]) -> Path | None:
+def find_file_beside(name: str, folders: Sequence[Path]) -> Path | None:
     """Return the path of a file in the working directory or one of the folders, None if it is in none."""
     places = (Path(name), *(folder / name for folder in folders))
     return next((path for path in places if _is_file(path)), None)
 
 
-def find_inside(name: str, folders: Sequence[Path], source: str) -> Path | None:
-    """Find a file as `find_beside` does, but only inside allowed folders, for names in untrusted files.
+def find_file_inside_folders(name: str, folders: Sequence[Path], source: str) -> Path | None:
+    """Find a file as `find_file_beside` does, but only inside allowed folders, for names in untrusted files.
 
-    Allowed are the working directory, `folders`, and the folders in the environment variable `FOLDERS`. A
-    symbolic link counts as the file that it points to.
+    Allowed are the working directory, `folders`, and the folders in the environment variable
+    `POLICY_FOLDERS_VARIABLE`. A symbolic link counts as the file that it points to.
 
     Args:
         name: Name of the file.
@@ -32,7 +32,11 @@ def find_inside(name: str, folders: Sequence[Path], source: str) -> Path | None:
     Raises:
         PolicyError: The name leads outside of the allowed folders.
     """
-    allowed = [Path.cwd(), *folders, *map(Path, filter(None, os.environ.get(FOLDERS, "").split(os.pathsep)))]
+    allowed = [
+        Path.cwd(),
+        *folders,
+        *map(Path, filter(None, os.environ.get(POLICY_FOLDERS_VARIABLE, "").split(os.pathsep))),
+    ]
     inside = [folder.resolve() for folder in allowed]
     outside = False
     for path in (Path(name), *(folder / name for folder in folders)):
@@ -47,7 +51,8 @@ def find_inside(name: str, folders: Sequence[Path], source: str) -> Path | None:
     if outside:
         raise PolicyError(
             f"{source}: names the file '{name}', which lies outside of its folder and of the working "
-            f"directory; name it on the command line (--policy, --normaliser), or its folder in {FOLDERS}"
+            f"directory; name it on the command line (--policy, --normaliser), or its folder in "
+            f"{POLICY_FOLDERS_VARIABLE}"
         )
     return None
 

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pdtui.paper.experiment import Experiment, ExperimentReport, ExperimentRequest
 
 
-def run_commands_experiment(request: ExperimentRequest) -> ExperimentReport:
+def run_command_following_experiment(request: ExperimentRequest) -> ExperimentReport:
     """Measure the policy of each map.
 
     Raises:
@@ -15,7 +15,7 @@ def run_commands_experiment(request: ExperimentRequest) -> ExperimentReport:
     """
     from rich.console import Group
 
-    from pdtui.paper.command_following import commands_table, evaluate_command_following
+    from pdtui.paper.command_following import command_following_table, evaluate_command_following
 
     count = len(request.configs)
     results = []
@@ -27,7 +27,9 @@ def run_commands_experiment(request: ExperimentRequest) -> ExperimentReport:
 
         results.append(evaluate_command_following(config, request.seeds, progress=tell))
     data = [asdict(result) for result in results]
-    return ExperimentReport(data[0] if count == 1 else data, Group(*map(commands_table, results)))
+    return ExperimentReport(data[0] if count == 1 else data, Group(*map(command_following_table, results)))
 
 
-EXPERIMENT = Experiment("commands", "following commands", run_commands_experiment, takes_several_maps=True)
+EXPERIMENT = Experiment(
+    "commands", "following commands", run_command_following_experiment, takes_several_maps=True
+)

@@ -6,9 +6,9 @@ import numpy as np
 
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
+from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.spectra.matching_presets import PRESETS
-from pdtui.spectra.monitor import monitor_episodes
-from pdtui.spectra.spectrogram import attribute_series
+from pdtui.spectra.spectrogram import scaled_attribute_series
 
 
 def test_a_row_holds_the_activations_and_the_state_that_they_led_to(policy_file: Path) -> None:
@@ -39,6 +39,6 @@ def test_scales_bring_torques_to_the_size_of_commands(policy_file: Path) -> None
     (recorded,) = monitor_episodes(robot, policy, [1], 20)
     torque = robot.attribute_index("front left hip torque")
     commanded = robot.attributes[torque].scale * recorded.attributes[:, torque]
-    (compared,) = attribute_series([recorded], robot.attributes, PRESETS["paper"])
+    (compared,) = scaled_attribute_series([recorded], robot.attributes, PRESETS["paper"])
     np.testing.assert_array_equal(compared[:, torque], commanded)
     assert 0 < np.abs(commanded).max() <= 1
