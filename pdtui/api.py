@@ -19,13 +19,13 @@ from pdtui.driving.drive_arrays import DriveArrays, collect_drive_arrays
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.keystrokes import read_keystrokes
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.driving.replay import ReplayResult, replay_session
+from pdtui.driving.session_replay import ReplayResult, replay_session
 from pdtui.policies.runtime.action_decoders import Decoder
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.torchscript import is_torchscript, read_torchscript
 from pdtui.policies.weights import policy_loading
-from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, WorldSpaces
+from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.weights_file import hash_file
 from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
@@ -120,7 +120,7 @@ def load_policy(
                 policy,
                 None if world is None else world.name,
                 import_options=import_options,
-                spaces=None if world is None else WorldSpaces.of_world(world),
+                spaces=None if world is None else ObservationActionSpaces.of_world(world),
             )
         return policy_from_network(
             policy,
@@ -238,7 +238,7 @@ def replay(
         robot: The robot, if the session's cannot be built from its name.
         policy: The policy, if the session's is not where its map says.
         judging: ``strict``, ``tolerance``, ``required_steps`` and ``force``, as for
-            `pdtui.driving.replay.replay_session`.
+            `pdtui.driving.session_replay.replay_session`.
 
     Raises:
         PdtuiError: The session cannot be read, or the robot or the policy cannot be loaded.

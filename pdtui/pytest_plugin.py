@@ -11,8 +11,8 @@ Example::
 
 A failing test names the first step that differs, and how far each attribute is off. On the machine and with
 the versions that recorded the session, every bit must be the same. Elsewhere, the attributes have to agree
-in the first control steps (see `pdtui.driving.replay.TOLERANCE`), unless ``strict=True`` demands the same
-bits.
+in the first control steps (see `pdtui.driving.session_replay.TOLERANCE`), unless ``strict=True`` demands the
+same bits.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ import pytest
 if TYPE_CHECKING:
     from torch import nn
 
-    from pdtui.driving.replay import ReplayResult
+    from pdtui.driving.session_replay import ReplayResult
     from pdtui.policies.runtime.policy import Policy
     from pdtui.robots.robot import Robot
 
 _SHOWN = 8  # attributes in the report of a difference
 
 
-class SessionFixture:
+class SessionReplayFixture:
     """Type of the fixture `pdtui_session`.
 
     Args:
@@ -68,7 +68,7 @@ class SessionFixture:
 
 
 @pytest.fixture
-def pdtui_session(request: pytest.FixtureRequest) -> SessionFixture:
+def pdtui_session(request: pytest.FixtureRequest) -> SessionReplayFixture:
     """Repeat a recorded drive, and fail the test at the first step that differs.
 
     The fixture is a function. Its arguments are
@@ -77,11 +77,11 @@ def pdtui_session(request: pytest.FixtureRequest) -> SessionFixture:
     - ``policy``: a weights file (found like the session), the name of a shipped policy, or a live network;
       by default the session's. Other weights than the session's are run and compared all the same;
     - ``robot``: the robot, if the session's cannot be built from its name;
-    - ``strict``, ``tolerance``, ``required_steps``: as for `pdtui.driving.replay.replay_session`.
+    - ``strict``, ``tolerance``, ``required_steps``: as for `pdtui.driving.session_replay.replay_session`.
 
     It returns the `ReplayResult` of a drive that repeats.
     """
-    return SessionFixture(request.path.parent, request.config.rootpath)
+    return SessionReplayFixture(request.path.parent, request.config.rootpath)
 
 
 def _find(name: str | Path, folders: tuple[Path, ...]) -> Path:

@@ -16,13 +16,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pdtui.core.errors import PdtuiError
-from pdtui.driving.client import DriveClient
+from pdtui.driving.drive_client import DriveClient
 from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.drive_server import PACED_ROWS_PER_WRITE
 from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.driving.headless_drive import make_key_events
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.driving.replay import replay_session
-from pdtui.driving.server import PACED_ROWS_PER_WRITE
+from pdtui.driving.session_replay import replay_session
 from pdtui.sessions.session_repair import examine_session, repair_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_reader import load_map

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.core.robot_data import Link, RobotState
+from pdtui.core.robot_links_and_state import Link, RobotState
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.runtime.action_decoders import make_action_decoder
 from pdtui.policies.runtime.policy import Policy

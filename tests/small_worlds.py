@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.core.robot_data import Link, RobotState
+from pdtui.core.robot_links_and_state import Link, RobotState
 from pdtui.policies.runtime.action_decoders import decode_categorical_action
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot

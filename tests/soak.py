@@ -21,7 +21,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pdtui.driving.replay import ReplayResult, replay_session
+from pdtui.driving.session_replay import ReplayResult, replay_session
 from pdtui.sessions.session_reader import read_session
 
 KEYS = (

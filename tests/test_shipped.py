@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from pdtui.cli import main
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.driving.replay import replay_session
+from pdtui.driving.session_replay import replay_session
 from pdtui.policies.weights.weights_file import find_weights_file, hash_file, load_network
 from pdtui.sessions.session_reader import read_session
 from pdtui.stimulation.map_library import find_map, shipped_folder

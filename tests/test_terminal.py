@@ -14,7 +14,7 @@ import pytest
 
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.driving.replay import replay_session
+from pdtui.driving.session_replay import replay_session
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.stimulation_map import StimulationMap

@@ -13,7 +13,7 @@ import torch
 from click.testing import CliRunner, Result
 
 from pdtui.cli import main
-from pdtui.core.events import DriveEvent
+from pdtui.core.drive_events import DriveEvent
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts
 from pdtui.driving.loop_builder import build_control_loop

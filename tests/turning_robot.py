@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.api import load_policy
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
-from pdtui.core.robot_data import Link, RobotState
+from pdtui.core.robot_links_and_state import Link, RobotState
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.robots.robot import Robot
 from pdtui.stimulation.map_reader import parse_map

@@ -5,14 +5,14 @@ from __future__ import annotations
 from rich.console import Group
 from rich.table import Table
 
-from pdtui.benchmarks.control_loop_benchmark import LoopBenchmark
+from pdtui.benchmarks.control_loop_benchmark import ControlLoopBenchmark
 from pdtui.benchmarks.dissection_benchmark import DissectionBenchmark
 from pdtui.benchmarks.recording_benchmark import MemoryBenchmark, RecordingBenchmark
 from pdtui.benchmarks.screen_benchmark import ScreenBenchmark
 from pdtui.core.text_tables import new_table
 
 
-def loop_benchmark_table(result: LoopBenchmark) -> Table:
+def loop_benchmark_table(result: ControlLoopBenchmark) -> Table:
     """Return the steps per second of each part, and its share of the bare simulator."""
     table = new_table("Control loop", "part", "steps/s", "share of bare")
     for name in ("bare", "policy", "stimulated", "recorded"):

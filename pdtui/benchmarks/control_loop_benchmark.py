@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.benchmarks.matching_benchmark import time_call_in_seconds
-from pdtui.core.events import DriveEvent
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.units import Stimulation
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
@@ -23,7 +23,7 @@ ROUNDS = 7
 
 
 @dataclass(frozen=True)
-class LoopBenchmark:
+class ControlLoopBenchmark:
     """Medians over rounds.
 
     Attributes:
@@ -45,7 +45,7 @@ class LoopBenchmark:
 
 def bench_loop(
     config: DriveConfig, *, steps: int = 5000, rounds: int = ROUNDS, progress: StepProgress | None = None
-) -> LoopBenchmark:
+) -> ControlLoopBenchmark:
     """Measure the four in turn over several rounds, so that a drifting machine affects all alike.
 
     The robot walks in all four: the bare simulator gets the actions that the policy chose from the same
@@ -71,7 +71,7 @@ def bench_loop(
             progress(done + 1, rounds)
     share = float(np.median(np.array(rates["recorded"]) / np.array(rates["bare"])))
     medians = {name: float(np.median(values)) for name, values in rates.items()}
-    return LoopBenchmark(**medians, recorded_share=share, forward_us=_forward(loop))
+    return ControlLoopBenchmark(**medians, recorded_share=share, forward_us=_forward(loop))
 
 
 def _actions(loop: ControlLoop, seed: int, steps: int) -> list[np.ndarray]:

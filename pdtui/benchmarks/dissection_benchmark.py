@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.benchmarks.matching_benchmark import (
-    MatchingComparison,
+    MatchingSpeedup,
     compare_matching,
     load_librosa,
     measure_matching_memory,
@@ -23,7 +23,7 @@ from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
 from pdtui.probing.stimulated_rollout import RolloutJob
 from pdtui.spectra.episode_monitor import MonitoredEpisode, monitor_episodes
-from pdtui.spectra.matching import Discrepancies, match_units
+from pdtui.spectra.matching import UnitDiscrepancies, match_units
 from pdtui.spectra.matching_presets import MatchingPreset, find_matching_preset
 
 Progress = Callable[[int, int, str], None]
@@ -92,7 +92,7 @@ class DissectionBenchmark:
     """
 
     recorded: str
-    compared: tuple[MatchingComparison, ...]
+    compared: tuple[MatchingSpeedup, ...]
     curves: tuple[ScalingCurve, ...]
     memory_units: int
     memory_data_gb: float
@@ -186,7 +186,7 @@ def record_episodes(
                 f"{pool.robot.name}: expected {settings.steps} steps, but the episode of seed {episode.seed} "
                 f"ended after {episode.steps}: {episode.ended}"
             )
-    episodes = [widen_episode(episode, settings.units, settings.attributes) for episode in walks]
+    episodes = [repeat_episode_columns(episode, settings.units, settings.attributes) for episode in walks]
     known = pool.robot.attributes
     attributes = tuple(
         replace(known[column % len(known)], name=f"{known[column % len(known)].name} {column}")
@@ -195,7 +195,7 @@ def record_episodes(
     return episodes, attributes
 
 
-def widen_episode(episode: MonitoredEpisode, units: int, attributes: int) -> MonitoredEpisode:
+def repeat_episode_columns(episode: MonitoredEpisode, units: int, attributes: int) -> MonitoredEpisode:
     """Return the episode with other widths; columns beyond the recorded ones repeat them, shifted in time."""
     return replace(
         episode,
@@ -218,8 +218,11 @@ def measure_matching_growth(
 ) -> tuple[ScalingCurve, ...]:
     """Time matching while one size grows and the others stay the same."""
 
-    def sized(units: int, columns: int, count: int) -> Callable[[], Discrepancies]:
-        data = [widen_episode(episodes[number % len(episodes)], units, columns) for number in range(count)]
+    def sized(units: int, columns: int, count: int) -> Callable[[], UnitDiscrepancies]:
+        data = [
+            repeat_episode_columns(episodes[number % len(episodes)], units, columns)
+            for number in range(count)
+        ]
         chosen = [attributes[column % len(attributes)] for column in range(columns)]
         return lambda: match_units(data, chosen, preset)
 

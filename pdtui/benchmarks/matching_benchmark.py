@@ -15,7 +15,7 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PdtuiError
 from pdtui.core.worker_pool import WorkerProcess
 from pdtui.spectra.episode_monitor import MonitoredEpisode
-from pdtui.spectra.matching import Discrepancies, match_units
+from pdtui.spectra.matching import UnitDiscrepancies, match_units
 from pdtui.spectra.matching_presets import MatchingPreset, find_matching_preset
 from pdtui.spectra.phase_correlation import correlate_phases
 
@@ -25,7 +25,7 @@ _STATUS = Path("/proc/self/status")
 
 
 @dataclass(frozen=True)
-class MatchingComparison:
+class MatchingSpeedup:
     """Matching compared with `match_by_loop`, for one preset.
 
     Attributes:
@@ -47,7 +47,7 @@ class MatchingComparison:
 
 def compare_matching(
     episodes: Sequence[MonitoredEpisode], attributes: Sequence[Attribute], preset: MatchingPreset, rounds: int
-) -> MatchingComparison:
+) -> MatchingSpeedup:
     """Time our matching and the loop in turn on the same data; the first call of each does not count."""
     found = match_units(episodes, attributes, preset)
     reference = match_by_loop(episodes, attributes, preset)
@@ -56,7 +56,7 @@ def compare_matching(
         ours.append(time_call_in_seconds(lambda: match_units(episodes, attributes, preset)))
         loops.append(time_call_in_seconds(lambda: match_by_loop(episodes, attributes, preset)))
     same, ties = same_ranking(found, reference)
-    return MatchingComparison(
+    return MatchingSpeedup(
         preset=preset.name,
         ours_ms=float(np.median(ours)) * 1e3,
         loop_ms=float(np.median(loops)) * 1e3,
@@ -67,7 +67,7 @@ def compare_matching(
     )
 
 
-def same_ranking(found: Discrepancies, reference: Floats) -> tuple[bool, int]:
+def same_ranking(found: UnitDiscrepancies, reference: Floats) -> tuple[bool, int]:
     """Return whether both rank the units of every attribute alike, and the number of tied neighbours.
 
     Neighbours are tied where their discrepancies differ by less than rounding.

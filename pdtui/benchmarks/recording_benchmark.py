@@ -9,15 +9,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import ScreenError
-from pdtui.core.events import DriveEvent
 from pdtui.core.step_record import StepRecord
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.drive_server import PACED_ROWS_PER_WRITE
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.driving.replay import replay_session
-from pdtui.driving.server import PACED_ROWS_PER_WRITE
+from pdtui.driving.session_replay import replay_session
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_repair import examine_session
 from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept

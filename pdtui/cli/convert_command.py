@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from pdtui.cli.shared_options import FILE_PATH, import_option_flags
-from pdtui.policies.weights.import_options import ImportOptions, WorldSpaces
+from pdtui.policies.weights.import_options import ImportOptions, ObservationActionSpaces
 
 
 @click.command()
@@ -30,7 +30,7 @@ def convert_command(file: Path, output: Path, robot: str | None, import_options:
     spaces = None
     if robot is not None:
         with open_robot(robot) as world:
-            spaces = WorldSpaces.of_world(world)
+            spaces = ObservationActionSpaces.of_world(world)
     spec = convert_policy(file, output, import_options, spaces)
     layers = " ".join(str(width) for width in spec.layers)
     click.echo(

@@ -128,7 +128,7 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, record: 
 def show_drive(config: DriveConfig, *, fps: int = 12, watching: bool = False) -> None:
     """Start the simulation's process, then show it on the screen."""
     _check_terminal()
-    from pdtui.driving.client import DriveClient
+    from pdtui.driving.drive_client import DriveClient
 
     connection = DriveClient(config)
     try:

@@ -47,7 +47,7 @@ def replay_command(session: Path, watch: bool, options: dict[str, Any]) -> None:
 
     Exit codes: 0 if the drive repeats; 1 if it does not, or cannot be replayed.
     """
-    from pdtui.driving.replay import config_from_session, replay_session
+    from pdtui.driving.session_replay import config_from_session, replay_session
 
     if watch:
         from pdtui.sessions.session_reader import read_session

@@ -11,10 +11,10 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from pdtui.core.events import describe_event
+from pdtui.core.drive_events import describe_event
 from pdtui.core.printable_text import make_printable
 from pdtui.core.text_tables import new_facts_table, new_table
-from pdtui.sessions.session_comparison import AttributeDeviation, SessionComparison
+from pdtui.sessions.session_comparison import ReplayDeviation, SessionComparison
 from pdtui.sessions.session_reader import Session
 from pdtui.sessions.session_summary import SessionSummary
 
@@ -117,7 +117,7 @@ def _happened(session: Session) -> Table:
     return table
 
 
-def attribute_deviation_table(deviations: Sequence[AttributeDeviation]) -> Table:
+def attribute_deviation_table(deviations: Sequence[ReplayDeviation]) -> Table:
     """Return one row per attribute that differs."""
     table = new_table("", "attribute", "first", "mean", "largest", "step", "unit", left=("attribute", "unit"))
     for row in deviations:

@@ -118,7 +118,7 @@ def verify_command(files: tuple[Path, ...], options: dict[str, Any], as_json: bo
 
 
 def _verify_file(file: Path, options: dict[str, Any], as_json: bool) -> dict[str, Any]:
-    from pdtui.driving.replay import replay_session
+    from pdtui.driving.session_replay import replay_session
     from pdtui.sessions.session_repair import examine_session
 
     row: dict[str, Any] = {"path": str(file), "whole": False, "repeats": None}

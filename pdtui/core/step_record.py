@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.core.events import DriveEvent
-from pdtui.core.robot_data import NO_OBSTACLES
+from pdtui.core.drive_events import DriveEvent
+from pdtui.core.robot_links_and_state import NO_OBSTACLES
 from pdtui.core.units import Stimulation
 
 

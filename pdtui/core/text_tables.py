@@ -38,7 +38,7 @@ def format_seed_range(seeds: Sequence[int]) -> str:
     return f"{len(seeds)} seeds, {seeds[0]}–{seeds[-1]}" if len(seeds) > 1 else f"seed {seeds[0]}"
 
 
-def mean_with_interval(mean: float, low: float, high: float, form: str = ".2f") -> str:
+def format_mean_with_interval(mean: float, low: float, high: float, form: str = ".2f") -> str:
     """Return a mean and its interval as text; without the interval where a single value gave none."""
     if not (math.isfinite(low) and math.isfinite(high)):
         return f"{mean:{form}}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.core.intervals import bootstrap_interval
+from pdtui.core.confidence_intervals import bootstrap_interval
 from pdtui.core.units import Stimulation
 from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.dissection_config import DissectionSettings
@@ -46,7 +46,9 @@ class AttributeMover:
     alone: float | None = None
 
 
-def movable_columns(attributes: Sequence[Attribute], episodes: Sequence[MonitoredEpisode]) -> list[int]:
+def movable_attribute_columns(
+    attributes: Sequence[Attribute], episodes: Sequence[MonitoredEpisode]
+) -> list[int]:
     """Return the columns of the attributes that behaviors may be proposed for.
 
     Left out are torques, which the policy commands; the reward; attributes that do not vary; attributes that

@@ -16,7 +16,7 @@ from torch import nn
 from pdtui.core.errors import RobotError
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.core.worker_pool import StepProgress
-from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
+from pdtui.dissection.attribute_movers import find_attribute_movers, movable_attribute_columns
 from pdtui.dissection.dissection_config import DissectionConfig, DissectionSettings
 from pdtui.dissection.dissection_result import Dissection, pick_sample_episode
 from pdtui.dissection.dissection_searches import DissectionSearches
@@ -29,7 +29,7 @@ from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import StartState, collect_start_states, measure_walk_lengths
 from pdtui.robots import open_robot
 from pdtui.search.behavior_search import SearchStartStates
-from pdtui.search.plan_search import TimeBudget
+from pdtui.search.plan_search import SharedTimeBudget
 from pdtui.sessions.environment_versions import collect_versions
 from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.spectra.matching import match_units
@@ -116,12 +116,12 @@ def dissect(config: DissectionConfig) -> Dissection:
             progress=stage("refine the best"),
         )
         spread = np.concatenate([episode.attributes for episode in episodes]).std(axis=0)
-        columns = movable_columns(robot.attributes, episodes)
+        columns = movable_attribute_columns(robot.attributes, episodes)
         movers = find_attribute_movers(
             prober, columns, spread, screen, refined, starts.searches.held_out, settings, stage("up and down")
         )
         searches = DissectionSearches(
-            prober, robot, settings, seed, TimeBudget(config.budget_minutes, began), stage, known
+            prober, robot, settings, seed, SharedTimeBudget(config.budget_minutes, began), stage, known
         )
         behaviors, controllers = searches.run(screen, refined, starts.searches)
         return Dissection(

@@ -17,7 +17,7 @@ from pdtui.robots.robot_goals import RobotGoals
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.spectra.episode_monitor import MonitoredEpisode
-from pdtui.spectra.matching import Discrepancies
+from pdtui.spectra.matching import UnitDiscrepancies
 from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.phase_correlation import PhaseCorrelations
 from pdtui.spectra.spectrogram import scaled_activation_series, scaled_attribute_series, usable_episodes
@@ -64,7 +64,7 @@ class Dissection:
     dt: float
     preset: MatchingPreset
     seed: int
-    matching: Discrepancies
+    matching: UnitDiscrepancies
     phase: PhaseCorrelations
     sample_episode: SampleEpisode
     screen: UnitEffects
@@ -157,7 +157,7 @@ class SampleEpisode:
 def pick_sample_episode(
     episodes: Sequence[MonitoredEpisode],
     attributes: Sequence[Attribute],
-    matching: Discrepancies,
+    matching: UnitDiscrepancies,
     preset: MatchingPreset,
 ) -> SampleEpisode:
     """Return the first episode that matching used, with the units that match each attribute best."""

@@ -13,11 +13,11 @@ from pdtui.dissection.dissection_config import DissectionSettings
 from pdtui.probing.effect_probe import EffectProbe, UnitEffects
 from pdtui.robots.robot import Robot
 from pdtui.robots.robot_goals import BehaviorGoal
-from pdtui.search.behavior_goals import STANDING, reachable_goals
 from pdtui.search.behavior_search import BehaviorSearch, BehaviorSearchResult, SearchStartStates
 from pdtui.search.controller_search import ControllerGoal, ControllerSearch, ControllerSearchResult
+from pdtui.search.goal_scores import STANDING, reachable_goals
 from pdtui.search.imprint_candidates import build_imprint_candidates
-from pdtui.search.plan_search import TimeBudget
+from pdtui.search.plan_search import SharedTimeBudget
 from pdtui.search.shared_candidates import SharedCandidates, sample_random_candidates
 from pdtui.spectra.episode_monitor import monitor_episodes
 
@@ -41,7 +41,7 @@ class DissectionSearches:
     robot: Robot
     settings: DissectionSettings
     seed: int
-    budget: TimeBudget
+    budget: SharedTimeBudget
     stage: Callable[[str], StepProgress | None]
     known: Sequence[Stimulation] = ()
 

@@ -17,7 +17,7 @@ from pdtui.probing.primitive_confirmation import (
 )
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
-from pdtui.spectra.matching_presets import preset_values
+from pdtui.spectra.matching_presets import list_preset_values
 
 
 def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str, Any]:
@@ -31,7 +31,7 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
         "policy": dissection.policy,
         "sha256": dissection.policy_hash,
         "preset": dissection.preset.name,
-        "settings": preset_values(dissection.preset),
+        "settings": list_preset_values(dissection.preset),
         "settings_changed": list(dissection.preset.changed),
         "seed": dissection.seed,
         "episodes": list(matching.used),

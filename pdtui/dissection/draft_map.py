@@ -7,11 +7,11 @@ import string
 import numpy as np
 
 from pdtui.core.attributes import BehaviorAim
-from pdtui.core.fixed_keys import RESERVED_KEYS
+from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.core.units import Stimulation, describe_units, format_unit
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.probing.primitive_confirmation import rank_probed_units
-from pdtui.robots.robot_goals import HoldGoal
+from pdtui.robots.robot_goals import HoldBehaviorGoal
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.stimulation.map_writer import compose_map
@@ -167,7 +167,7 @@ def _draft_controller(found: ControllerSearchResult, dissection: Dissection) -> 
     )
 
 
-def _hold_goal(found: ControllerSearchResult, dissection: Dissection) -> HoldGoal:
+def _hold_goal(found: ControllerSearchResult, dissection: Dissection) -> HoldBehaviorGoal:
     return next(goal for goal in dissection.goals.holds if goal.attribute == found.pid.attribute)
 
 

@@ -16,7 +16,7 @@ from pdtui.core.units import Stimulation, parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.task import average_figures
-from pdtui.search.plan_search import TimeBudget
+from pdtui.search.plan_search import SharedTimeBudget
 from pdtui.search.task_rollout import TimedStimulation
 from pdtui.search.task_search import TaskSearch, TaskSearchResult, TaskSearchSettings
 from pdtui.stimulation.map_reader import load_map
@@ -98,7 +98,7 @@ def search_task_into_map(
             known.check(robot, layers, pool.policy.sha256)
         begin = [] if known is None else _known_plans(known, task, pool)
         search = TaskSearch(pool, goal, seed, settings, begin)
-        result = search.run(TimeBudget(minutes).share(), progress)
+        result = search.run(SharedTimeBudget(minutes).share(), progress)
         new_map = StimulationMap(
             robot, pool.policy.name, pool.policy.sha256, "space", {}, {}, import_options=import_options
         )

@@ -9,14 +9,14 @@ from functools import partial
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import KeystrokeError, MapError, SimulationDiverged
-from pdtui.core.events import DriveEvent
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.rewind_history import STEPS_PER_KEPT_STATE, DriveState, RewindHistory
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot, is_fall
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.stimulation.latch import Latch
+from pdtui.stimulation.behavior_latch import BehaviorLatch
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 
@@ -50,7 +50,7 @@ class ControlLoop:
         self.start = robot.check_start(start)
         self.step = 0
         self.episode = 0
-        self.latch = Latch(stimulation_map, policy.layers, robot.attributes, robot.control_dt)
+        self.latch = BehaviorLatch(stimulation_map, policy.layers, robot.attributes, robot.control_dt)
         self._noise = np.random.default_rng(seed) if stochastic else None
         self._ended = False
         self.history = RewindHistory()

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats, attribute_column
-from pdtui.core.events import DriveEvent
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.step_record import StepRecord
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.driving.control_loop import ControlLoop

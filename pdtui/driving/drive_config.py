@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pdtui.core.events import DriveEvent
+from pdtui.core.drive_events import DriveEvent
 from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
 from pdtui.stimulation.stimulation_map import StimulationMap

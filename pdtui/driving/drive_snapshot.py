@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pdtui.core.attributes import Attribute, Floats
-    from pdtui.core.robot_data import Link
+    from pdtui.core.robot_links_and_state import Link
     from pdtui.core.step_record import ActiveBehavior
 
 

@@ -10,6 +10,7 @@ from types import FrameType
 
 import numpy as np
 
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import (
     DriveEnded,
     KeystrokeError,
@@ -17,7 +18,6 @@ from pdtui.core.errors import (
     SimulationDiverged,
     format_error_in_one_line,
 )
-from pdtui.core.events import DriveEvent
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.keystrokes import interpret_keys

@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import KeystrokeError
-from pdtui.core.events import DriveEvent
-from pdtui.core.fixed_keys import RUN_KEYS, FixedKey
+from pdtui.core.reserved_keys import RUN_KEYS, ReservedKey
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -59,21 +59,21 @@ def interpret_keys(keys: Iterable[str], loop: ControlLoop) -> list[DriveEvent | 
     return meanings
 
 
-def _factor_event(row: FixedKey, loop: ControlLoop) -> DriveEvent | str:
+def _factor_event(row: ReservedKey, loop: ControlLoop) -> DriveEvent | str:
     if not loop.latch.active:
         return "no behavior is latched, so there is no strength to change"
     latest = loop.latch.active[-1]
     return DriveEvent(loop.step, "factor", latest.name, latest.factor * FACTOR_STEP**row.direction, row.key)
 
 
-def _rewind_event(row: FixedKey, loop: ControlLoop) -> DriveEvent | str:
+def _rewind_event(row: ReservedKey, loop: ControlLoop) -> DriveEvent | str:
     target = loop.history.step_before(loop.step, round(REWIND_SECONDS / loop.robot.control_dt))
     if target is None:
         return "nothing to rewind to yet"
     return DriveEvent(loop.step, "rewind", value=float(target), key=row.key)
 
 
-def _target_event(row: FixedKey, loop: ControlLoop) -> DriveEvent | str:
+def _target_event(row: ReservedKey, loop: ControlLoop) -> DriveEvent | str:
     """Return the event of an arrow: left and right move the target of a heading, up and down any other."""
     held = [view for view in loop.latch.active if view.target is not None]
     if not held:

@@ -10,7 +10,7 @@ from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy, check_policy_fit
-from pdtui.policies.weights.import_options import WorldSpaces
+from pdtui.policies.weights.import_options import ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot
@@ -30,7 +30,7 @@ def build_control_loop(
         config.policy or stimulation_map.policy,
         config.robot,
         import_options=stimulation_map.import_options,
-        spaces=WorldSpaces.of_world(robot),
+        spaces=ObservationActionSpaces.of_world(robot),
         folders=(Path(stimulation_map.source).parent,),
     )
     stimulation_map.check(config.robot, policy.layers, policy.sha256, force=config.force)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pdtui.core.errors import KeystrokeError
-from pdtui.core.robot_data import RobotState
+from pdtui.core.robot_links_and_state import RobotState
 from pdtui.policies.runtime.recurrent_state import PolicyState
 
 STEPS_PER_KEPT_STATE = 10

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pdtui.core.attributes import Floats
-from pdtui.core.events import describe_event
-from pdtui.core.robot_data import NO_OBSTACLES
+from pdtui.core.drive_events import describe_event
+from pdtui.core.robot_links_and_state import NO_OBSTACLES
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_snapshot import DriveSnapshot, StimulatedUnit

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 
 from pdtui.core.attributes import Floats
-from pdtui.core.events import DriveEvent
-from pdtui.core.intervals import confidence_interval
+from pdtui.core.confidence_intervals import confidence_interval
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.worker_pool import StepProgress, WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import run_episode
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.evaluation.task_evaluation import TaskEvaluation, TaskRun, run_task_episode, summarise_task
+from pdtui.evaluation.task_evaluation import TaskEvaluation, TaskRunResult, run_task_episode, summarise_task
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
 
 STEPS = 400
@@ -80,7 +80,7 @@ class MapEvaluation:
 
 
 @dataclass(frozen=True)
-class BehaviorRun:
+class BehaviorRunMeans:
     """Means of attributes over the measured steps of one episode, shape (J,), and whether the robot fell."""
 
     mean: Floats
@@ -127,14 +127,14 @@ _Job = tuple[str, int, str]
 """A behavior's name, a seed, and what to run: ``aim``, ``task``, or ``untouched`` for a task without it."""
 
 
-def _run_job(loop: ControlLoop, job: _Job) -> BehaviorRun | TaskRun:
+def _run_job(loop: ControlLoop, job: _Job) -> BehaviorRunMeans | TaskRunResult:
     name, seed, kind = job
     if kind == "aim":
         return run_behavior_episode(loop, name, seed)
     return run_task_episode(loop, loop.map.behaviors[name], seed, untouched=kind == "untouched")
 
 
-def run_behavior_episode(built: ControlLoop, name: str, seed: int) -> BehaviorRun:
+def run_behavior_episode(built: ControlLoop, name: str, seed: int) -> BehaviorRunMeans:
     """Run one episode with a behavior, or with the policy alone where the name is empty.
 
     If the episode ends early, the mean is over the steps from `STIMULATED_FROM` to its end.
@@ -148,7 +148,7 @@ def run_behavior_episode(built: ControlLoop, name: str, seed: int) -> BehaviorRu
     rows = [record.attributes for record in records]
     ended = bool(records[-1].ended)
     window = rows[min(STIMULATED_FROM, len(rows) - 1) :] if ended else rows[-WINDOW:]
-    return BehaviorRun(np.mean(window, axis=0), records[-1].fell)
+    return BehaviorRunMeans(np.mean(window, axis=0), records[-1].fell)
 
 
 def _summarise(

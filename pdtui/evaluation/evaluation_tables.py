@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rich.console import Group
 from rich.table import Table
 
-from pdtui.core.text_tables import format_seed_range, mean_with_interval, new_table
+from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.evaluation.behavior_evaluation import MapEvaluation
 from pdtui.evaluation.policy_evaluation import PolicyEvaluation
 from pdtui.search.gain_tuning import TunedGains
@@ -55,7 +55,7 @@ def _aim_table(result: MapEvaluation) -> Table:
             row.measure,
             f"{row.value:.2f}",
             f"{row.default:.2f}",
-            mean_with_interval(row.effect, row.low, row.high, "+.2f"),
+            format_mean_with_interval(row.effect, row.low, row.high, "+.2f"),
             f"{row.right_sign}/{count}",
             f"{row.falls}/{count}",
         )
@@ -124,7 +124,7 @@ def add_tracking_figures(table: Table, columns: Sequence[TrackingSummary]) -> No
 
 
 def _with_interval(figures: TrackingSummary) -> str:
-    return mean_with_interval(figures.error, figures.low, figures.high, ".3f")
+    return format_mean_with_interval(figures.error, figures.low, figures.high, ".3f")
 
 
 def _rise(responses: StepResponseSummary) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pdtui.core.errors import MapError
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveRunner
+from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveRunner
 from pdtui.search.tracking_summary import (
     TrackingSummary,
     choose_tracking_targets,
@@ -40,7 +40,7 @@ def evaluate_target_tracking(
     with TrackingDriveRunner(config, workers) as runner:
         chosen = tuple(targets) or choose_tracking_targets(runner, behavior, seeds[:3])
         drives = [
-            TrackingDrive(attribute, name, seed, chosen) for name in (behavior.name, "") for seed in seeds
+            TrackingDriveJob(attribute, name, seed, chosen) for name in (behavior.name, "") for seed in seeds
         ]
         results = runner.run(drives, progress)
         unit = runner.attribute(attribute).unit

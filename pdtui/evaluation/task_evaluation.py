@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.core.attributes import unwrap_angles
-from pdtui.core.events import DriveEvent
+from pdtui.core.drive_events import DriveEvent
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import run_episode
-from pdtui.robots.task import RunTrace, Task, TaskVerdict, average_figures
+from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict, average_figures
 from pdtui.search.task_rollout import count_walk_steps
 from pdtui.stimulation.stimulation_map import Behavior
 
@@ -40,14 +40,14 @@ class TaskEvaluation:
 
 
 @dataclass(frozen=True)
-class TaskRun:
+class TaskRunResult:
     """The verdict on one run, and whether the robot fell."""
 
     verdict: TaskVerdict
     fell: bool
 
 
-def run_task_episode(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bool) -> TaskRun:
+def run_task_episode(built: ControlLoop, behavior: Behavior, seed: int, *, untouched: bool) -> TaskRunResult:
     """Run a behavior's task once through the control loop, as in a drive.
 
     Raises:
@@ -65,14 +65,14 @@ def run_task_episode(built: ControlLoop, behavior: Behavior, seed: int, *, untou
     rows = [before, *(record.attributes for record in records)]
     fell = records[-1].fell
     if len(rows) <= walk + 1:
-        return TaskRun(TaskVerdict(False, 0.0, {}), fell)
+        return TaskRunResult(TaskVerdict(False, 0.0, {}), fell)
     attributes, values = loop.robot.attributes, np.array(rows)
-    trace = RunTrace(attributes, values[: walk + 1], unwrap_angles(values[walk + 1 :], attributes), fell)
-    return TaskRun(task.judge(trace), fell)
+    trace = TaskRunTrace(attributes, values[: walk + 1], unwrap_angles(values[walk + 1 :], attributes), fell)
+    return TaskRunResult(task.judge(trace), fell)
 
 
 def summarise_task(
-    behavior: Behavior, task: Task, runs: Sequence[TaskRun], untouched: Sequence[TaskRun]
+    behavior: Behavior, task: Task, runs: Sequence[TaskRunResult], untouched: Sequence[TaskRunResult]
 ) -> TaskEvaluation:
     """Summarise the runs of one behavior."""
     return TaskEvaluation(

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from rich.table import Table
 
+from pdtui.core.confidence_intervals import confidence_interval
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import RobotError
-from pdtui.core.events import DriveEvent
-from pdtui.core.intervals import confidence_interval
-from pdtui.core.text_tables import format_seed_range, mean_with_interval, new_table
+from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
@@ -25,7 +25,7 @@ _ASKED = "asked"
 
 
 @dataclass(frozen=True)
-class CommandTracking:
+class CommandTrackingError:
     """How closely one command is followed: mean |attribute − command| and its 95 % interval over seeds.
 
     Attributes:
@@ -56,7 +56,7 @@ class CommandFollowingResult:
     policy: str
     seeds: tuple[int, ...]
     steps: int
-    commands: tuple[CommandTracking, ...]
+    commands: tuple[CommandTrackingError, ...]
     finished: int
 
 
@@ -96,7 +96,7 @@ def evaluate_command_following(
     for index, (name, column) in enumerate(zip(ranges, columns, strict=True)):
         error = np.array(errors)[:, index]
         rows.append(
-            CommandTracking(
+            CommandTrackingError(
                 name,
                 robot.attributes[column].unit,
                 tuple(np.array(asked)[:, index].tolist()),
@@ -120,7 +120,7 @@ def command_following_table(result: CommandFollowingResult) -> Table:
         table.add_row(
             f"{row.command} ({row.unit})",
             f"{min(row.asked):+.2f} to {max(row.asked):+.2f}",
-            mean_with_interval(row.error, row.low, row.high, ".3f"),
+            format_mean_with_interval(row.error, row.low, row.high, ".3f"),
             f"{row.bias:.3f}",
             f"{count - result.finished}/{count}",
         )

@@ -18,7 +18,12 @@ from pdtui.core.errors import MapError
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.target_tracking import find_pid_behaviors
-from pdtui.search.tracking_drives import STEPS_EACH, TrackingDrive, TrackingDriveResult, TrackingDriveRunner
+from pdtui.search.tracking_drives import (
+    STEPS_EACH,
+    TrackingDriveJob,
+    TrackingDriveResult,
+    TrackingDriveRunner,
+)
 from pdtui.search.tracking_summary import HEADINGS, TrackingSummary, mean_errors_by_seed, summarise_tracking
 from pdtui.stimulation.stimulation_map import Behavior
 
@@ -139,7 +144,7 @@ def compare_heading_precision(
         with TrackingDriveRunner(config, workers) as runner:
             steps[config.stimulation_map.source] = runner.loop.robot.control_dt
             drives = [
-                TrackingDrive(ATTRIBUTE, one.name, seed, tuple(targets))
+                TrackingDriveJob(ATTRIBUTE, one.name, seed, tuple(targets))
                 for one in behaviors
                 for seed in seeds
             ]

@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.pictures.dissection_chart_data import effect_curves, matched_spectrograms, unit_ranking
-from pdtui.pictures.matplotlib_page import open_figure_page, policy_title
+from pdtui.pictures.dissection_chart_data import (
+    compute_effect_curves,
+    matched_spectrograms,
+    rank_nearest_units,
+)
+from pdtui.pictures.matplotlib_page import format_policy_title, open_figure_page
 from pdtui.pictures.plot_colors import BLUE, GREEN, GREY, VERMILLION, color_to_hex
 
 if TYPE_CHECKING:
@@ -26,7 +30,7 @@ def draw_attribute_page(dissection: Dissection, column: int) -> bytes:
     """Draw everything about one attribute on a page, and return the PNG file."""
     attribute, target = dissection.attributes[column], io.BytesIO()
     label = f"{attribute.name} ({attribute.unit})" if attribute.unit else attribute.name
-    with open_figure_page(target, 4.4, f"{policy_title(dissection)}: {label}") as figure:
+    with open_figure_page(target, 4.4, f"{format_policy_title(dissection)}: {label}") as figure:
         (upper_left, upper_right), (lower_left, lower_right) = figure.subplots(2, 2)
         draw_spectrograms(figure, upper_left, upper_right, dissection, column)
         draw_ranking(lower_left, dissection, column)
@@ -63,7 +67,7 @@ def draw_spectrograms(figure: Figure, left: Axes, right: Axes, dissection: Disse
 
 def draw_ranking(panel: Axes, dissection: Dissection, column: int) -> None:
     """Draw the discrepancies of the nearest units as bars, the nearest on top."""
-    labels, discrepancies, level_shares = unit_ranking(dissection, column)
+    labels, discrepancies, level_shares = rank_nearest_units(dissection, column)
     if not labels:
         _leave_out(panel, dissection, column)
         return
@@ -80,7 +84,7 @@ def draw_effects(panel: Axes, dissection: Dissection, column: int) -> None:
     """Draw how the attribute changes with the output of the best probed unit and of the first match."""
     attribute = dissection.attributes[column]
     panel.axhline(0, color=_FAINT, linewidth=0.6)
-    for curve in effect_curves(dissection, column):
+    for curve in compute_effect_curves(dissection, column):
         color = _MATCHED if curve.matched else _PROBED
         spread = np.vstack([curve.means - curve.lows, curve.highs - curve.means])
         panel.errorbar(

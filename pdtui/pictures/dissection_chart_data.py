@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.core.intervals import bootstrap_interval
+from pdtui.core.confidence_intervals import bootstrap_interval
 from pdtui.core.units import format_unit
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.probing.primitive_confirmation import rank_probed_units
@@ -134,7 +134,7 @@ def matched_spectrograms(dissection: Dissection, column: int) -> MatchedSpectrog
     return MatchedSpectrograms(attribute, unit, label, one, other, high - DECIBELS, high)
 
 
-def unit_ranking(dissection: Dissection, column: int) -> tuple[list[str], Floats, Floats]:
+def rank_nearest_units(dissection: Dissection, column: int) -> tuple[list[str], Floats, Floats]:
     """Return the units nearest to an attribute; none for an attribute that matching left out.
 
     They are addresses, discrepancies, and the shares of the squared distances that are mean level.
@@ -145,7 +145,7 @@ def unit_ranking(dissection: Dissection, column: int) -> tuple[list[str], Floats
     return labels, matching.discrepancy[column, ranked], matching.level_share[column, ranked]
 
 
-def effect_curves(dissection: Dissection, column: int) -> list[EffectCurve]:
+def compute_effect_curves(dissection: Dissection, column: int) -> list[EffectCurve]:
     """Return the effect curves of the unit that moves an attribute most and of its first match."""
     probed = rank_probed_units(column, dissection.screen, dissection.refined, dissection.seed)[:1]
     ranked = dissection.matching.ranked_units(column)

@@ -15,7 +15,7 @@ from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.pictures.attribute_plots import draw_effect_key, draw_effects, draw_ranking, draw_spectrograms
 from pdtui.pictures.dissection_chart_data import side_effect_matrix
-from pdtui.pictures.matplotlib_page import open_figure_page, policy_title
+from pdtui.pictures.matplotlib_page import format_policy_title, open_figure_page
 from pdtui.pictures.plot_colors import GREEN, GREY, VERMILLION, color_to_hex, diverging_colors
 from pdtui.probing.primitive_confirmation import TOP_MATCHES
 
@@ -68,14 +68,14 @@ def _panel_page(
 
 
 def _draw_spectrograms(path: Path, dissection: Dissection, columns: Sequence[int]) -> None:
-    title = f"{policy_title(dissection)}: spectrograms of attributes and of their best matches"
+    title = f"{format_policy_title(dissection)}: spectrograms of attributes and of their best matches"
     with _panel_page(path, 2 * len(columns), 1.55, title) as (figure, panels):
         for column, left, right in zip(columns, panels[::2], panels[1::2], strict=True):
             draw_spectrograms(figure, left, right, dissection, column)
 
 
 def _draw_rankings(path: Path, dissection: Dissection, columns: Sequence[int]) -> None:
-    title = f"{policy_title(dissection)}: discrepancy of the nearest units"
+    title = f"{format_policy_title(dissection)}: discrepancy of the nearest units"
     with _panel_page(path, len(columns), 1.9, title) as (_, panels):
         for panel, column in zip(panels, columns, strict=True):
             draw_ranking(panel, dissection, column)
@@ -83,7 +83,7 @@ def _draw_rankings(path: Path, dissection: Dissection, columns: Sequence[int]) -
 
 
 def _draw_effects(path: Path, dissection: Dissection, columns: Sequence[int]) -> None:
-    title = f"{policy_title(dissection)}: effect of single units, mean and 95 % interval"
+    title = f"{format_policy_title(dissection)}: effect of single units, mean and 95 % interval"
     with _panel_page(path, len(columns), 1.8, title, margin=0.75) as (figure, panels):
         for panel, column in zip(panels, columns, strict=True):
             draw_effects(panel, dissection, column)
@@ -93,7 +93,7 @@ def _draw_effects(path: Path, dissection: Dissection, columns: Sequence[int]) ->
 def draw_side_effects(target: Path | BytesIO, dissection: Dissection) -> None:
     """Draw units × attributes as a heat map for each sign of the output."""
     effects = side_effect_matrix(dissection)
-    title = f"{policy_title(dissection)}: side effects of single units"
+    title = f"{format_policy_title(dissection)}: side effects of single units"
     rows = max(1, len(effects.by_value))
     with open_figure_page(target, 0.6 + rows * (0.6 + 0.155 * len(effects.attributes)), title) as figure:
         panels = list(figure.subplots(rows, 1, squeeze=False).flat)
@@ -127,7 +127,7 @@ def draw_matching_hits(target: Path | BytesIO, dissection: Dissection) -> None:
         return np.array([attribute["hits"][key] for attribute in attributes], np.float64)
 
     places = np.arange(len(names))
-    title = f"{policy_title(dissection)}: how well matching finds units that act"
+    title = f"{format_policy_title(dissection)}: how well matching finds units that act"
     with open_figure_page(target, 1.1 + 0.19 * len(names), title) as figure:
         left, right = figure.subplots(1, 2, sharey=True)
         width = 0.8 / (1 + len(TOP_MATCHES))

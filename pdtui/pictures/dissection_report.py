@@ -22,10 +22,10 @@ from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.dissection.dissection_tables import dissection_remarks, dissection_tables
 from pdtui.pictures.attribute_plots import draw_attribute_page
 from pdtui.pictures.dissection_chart_data import (
-    effect_curves,
+    compute_effect_curves,
     matched_spectrograms,
+    rank_nearest_units,
     side_effect_matrix,
-    unit_ranking,
 )
 from pdtui.pictures.dissection_figures import (
     draw_dissection_figures,
@@ -106,7 +106,7 @@ def _image(content: bytes) -> rr.EncodedImage:
 
 
 def _log_ranking(log: Log, dissection: Dissection, column: int) -> None:
-    labels, discrepancies, level_shares = unit_ranking(dissection, column)
+    labels, discrepancies, level_shares = rank_nearest_units(dissection, column)
     if labels:
         columns = {"unit": labels, "discrepancy": discrepancies, "mean_level": level_shares}
         numbers = rr.AnyValues(**{name: pa.array(values) for name, values in columns.items()})
@@ -114,7 +114,7 @@ def _log_ranking(log: Log, dissection: Dissection, column: int) -> None:
 
 
 def _log_effects(log: Log, dissection: Dissection, column: int) -> None:
-    for curve in effect_curves(dissection, column):
+    for curve in compute_effect_curves(dissection, column):
         name = rr.escape_entity_path_part(f"unit {curve.label}, {curve.role}")
         numbers = {
             "output": curve.values,

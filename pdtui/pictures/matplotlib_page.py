@@ -74,6 +74,6 @@ def check_figure_path(path: Path, overwrite: bool) -> None:
         raise PictureError(f"{path}: already exists; --overwrite replaces it, -o writes elsewhere")
 
 
-def policy_title(dissection: Dissection) -> str:
+def format_policy_title(dissection: Dissection) -> str:
     """Return robot and policy as titles name them."""
     return f"{dissection.robot}, driven by {Path(dissection.policy).stem}"

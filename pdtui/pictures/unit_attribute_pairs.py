@@ -15,7 +15,7 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PictureError
 from pdtui.core.units import format_unit, parse_unit
 from pdtui.core.worker_pool import StepProgress
-from pdtui.dissection.attribute_movers import movable_columns
+from pdtui.dissection.attribute_movers import movable_attribute_columns
 from pdtui.pictures.matplotlib_page import open_figure_page
 from pdtui.pictures.plot_colors import CYCLE, color_to_hex
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
@@ -110,7 +110,7 @@ def pair_units_with_attributes(
         rho = correlate_phases(recorded, world.attributes, spectrum).rho(spectrum)
         shown = next(episode for episode in recorded if episode.seed == matching.used[0])
         if not attributes:
-            columns = movable_columns(world.attributes, recorded)[:_DEFAULT_PAIRS]
+            columns = movable_attribute_columns(world.attributes, recorded)[:_DEFAULT_PAIRS]
         best = [matching.ranked_units(column) for column in columns]
         if not columns or (not units and any(not ranked.size for ranked in best)):
             flaws = "; ".join(f"{name}: {flaw}" for name, flaw in matching.flaws.items())

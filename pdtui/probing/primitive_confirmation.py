@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from pdtui.core.intervals import bootstrap_interval
+from pdtui.core.confidence_intervals import bootstrap_interval
 from pdtui.probing.effect_probe import UnitEffects
-from pdtui.spectra.matching import Discrepancies
+from pdtui.spectra.matching import UnitDiscrepancies
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
 RANDOM_QUANTILE = 0.9
@@ -74,7 +74,7 @@ class MatchingHitRate:
 
 
 def select_units_to_refine(
-    screen: UnitEffects, matching: Discrepancies, columns: Sequence[int], keep: int
+    screen: UnitEffects, matching: UnitDiscrepancies, columns: Sequence[int], keep: int
 ) -> tuple[int, ...]:
     """Choose the first match of each attribute, and the `keep` strongest probed units in each direction."""
     chosen: set[int] = set()
@@ -132,7 +132,11 @@ def rank_probed_units(
 
 
 def measure_matching_hits(
-    column: int, screen: UnitEffects, matching: Discrepancies, refined: UnitEffects, controls: Sequence[int]
+    column: int,
+    screen: UnitEffects,
+    matching: UnitDiscrepancies,
+    refined: UnitEffects,
+    controls: Sequence[int],
 ) -> MatchingHitRate:
     """Compare the ranking by discrepancy with the effects that probing measured.
 

@@ -11,7 +11,7 @@ from typing import TypeVar
 from pdtui.core.closable import Closable
 from pdtui.core.worker_pool import StepProgress, WorkerPool
 from pdtui.policies.runtime.policy import Policy, check_policy_fit
-from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, WorldSpaces
+from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, run_rollout
@@ -35,7 +35,9 @@ def _build_pair(robot: str, policy: str, import_options: ImportOptions) -> _Pair
 
 
 def _load(policy: str | Path, world: Robot, import_options: ImportOptions) -> Policy:
-    return load_policy(policy, world.name, import_options=import_options, spaces=WorldSpaces.of_world(world))
+    return load_policy(
+        policy, world.name, import_options=import_options, spaces=ObservationActionSpaces.of_world(world)
+    )
 
 
 def _apply(work: Callable[[Robot, Policy, WorkItem], WorkResult], pair: _Pair, item: WorkItem) -> WorkResult:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from pdtui.core.errors import RobotError, SimulationDiverged
-from pdtui.core.robot_data import RobotState
+from pdtui.core.robot_links_and_state import RobotState
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.recurrent_state import PolicyState
 from pdtui.robots.robot import Robot

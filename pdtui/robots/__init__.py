@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pdtui.robots.registry import (
+from pdtui.robots.robot_registry import (
     list_robot_names,
     make_robot,
     open_robot,

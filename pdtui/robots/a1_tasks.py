@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from pdtui.robots.task import RunTrace, Task, TaskVerdict
+from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 
 _STEP = 0.016  # control step, s
 # Control steps of a run, and of it those over which turning and speed are averaged, and the late ones.
@@ -24,7 +24,7 @@ _STAND_SPEED = 0.3
 _FASTER = 1.1
 
 
-def judge_turn(trace: RunTrace, sign: float) -> TaskVerdict:
+def judge_turn(trace: TaskRunTrace, sign: float) -> TaskVerdict:
     """Judge whether it turns by 0.15 rad/s on average (left for sign 1, right for −1) while it walks."""
     yaw, walks = trace["yaw"][_WINDOW], trace.mean("speed", _WINDOW)
     rate = float(yaw[-1] - yaw[0]) / (_STEP * (len(yaw) - 1)) if len(yaw) > 1 else 0.0
@@ -36,7 +36,7 @@ def judge_turn(trace: RunTrace, sign: float) -> TaskVerdict:
     return TaskVerdict(done, score, {"yaw rate (rad/s)": rate, "speed (m/s)": walks})
 
 
-def judge_stop(trace: RunTrace) -> TaskVerdict:
+def judge_stop(trace: TaskRunTrace) -> TaskVerdict:
     """Judge whether it is slower than 0.3 m/s from 1.2 s on, on average, and on its feet for 2.4 s."""
     usual = trace.mean_before("speed", _USUAL_STEPS)
     left, up = trace.mean("speed", _LATE, usual), trace.stays_up(_STEPS)
@@ -47,7 +47,7 @@ def judge_stop(trace: RunTrace) -> TaskVerdict:
     return TaskVerdict(up and left < _STAND_SPEED, score, figures)
 
 
-def judge_speed_up(trace: RunTrace) -> TaskVerdict:
+def judge_speed_up(trace: TaskRunTrace) -> TaskVerdict:
     """Judge whether it moves along x a tenth faster than by itself."""
     speed, up = trace.mean("vx", _WINDOW), trace.stays_up(_STEPS)
     gained = speed / max(trace.mean_before("vx", _USUAL_STEPS), 1e-6)
@@ -55,7 +55,7 @@ def judge_speed_up(trace: RunTrace) -> TaskVerdict:
     return TaskVerdict(up and gained >= _FASTER, score, {"vx (m/s)": speed, "of its own speed": gained})
 
 
-def _task(name: str, key: str, says: str, wanted: str, judge: Callable[[RunTrace], TaskVerdict]) -> Task:
+def _task(name: str, key: str, says: str, wanted: str, judge: Callable[[TaskRunTrace], TaskVerdict]) -> Task:
     return Task(name, key, says, wanted, (90, 150), _STEPS, judge, start="rough")
 
 

@@ -16,7 +16,9 @@ _RAYS = np.radians(np.linspace(60.0, -60.0, 32))
 _NOSE, _SIGHT = 0.25, 5.0
 
 
-def scan_trees(position: tuple[float, float], yaw: float, trees: Floats, fan: Floats, reach: float) -> Floats:
+def measure_tree_proximity(
+    position: tuple[float, float], yaw: float, trees: Floats, fan: Floats, reach: float
+) -> Floats:
     """Return how near the next tree trunk is along each ray: 1 at the camera, 0 from `reach` on.
 
     Args:
@@ -66,4 +68,6 @@ class A1Vision(A1):
     def observe(self) -> Floats:
         (x, y, _), yaw = self._base()[0], self._attitude()[2]
         nose = (x + _NOSE * math.cos(yaw), y + _NOSE * math.sin(yaw))
-        return np.concatenate([super().observe(), scan_trees(nose, yaw, self.obstacles, _RAYS, _SIGHT)])
+        return np.concatenate(
+            [super().observe(), measure_tree_proximity(nose, yaw, self.obstacles, _RAYS, _SIGHT)]
+        )

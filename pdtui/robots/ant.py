@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Floats
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.robot import TRUNK_ATTRIBUTES, TrainingRecipe, torque_attributes
-from pdtui.robots.simulators.mujoco_robot import MujocoRobot, motor_gears, read_model_links, silence_warnings
+from pdtui.robots.simulators.mujoco_robot import (
+    MujocoRobot,
+    read_model_links,
+    read_motor_gears,
+    silence_warnings,
+)
 
 _LEGS = {"1": "front left", "2": "back left", "3": "back right", "4": "front right"}
 
@@ -37,7 +42,7 @@ class Ant(MujocoRobot, AntEnv):
         super().__init__(include_cfrc_ext_in_observation=False)
         self._forward = forward
         self.links = read_model_links(self.model)
-        gears = motor_gears(self.model)
+        gears = read_motor_gears(self.model)
         self._gears = np.array(list(gears.values()))
         names = [f"{_LEGS[joint[-1]]} {joint[:-2]}" for joint in gears]
         self.attributes = (*TRUNK_ATTRIBUTES, *torque_attributes(names, gears.values()))

@@ -14,13 +14,13 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.core.robot_data import CommandRange
+from pdtui.core.robot_links_and_state import CommandRange
 from pdtui.robots.geometry import roll_pitch_yaw, rotate_vectors
 from pdtui.robots.legged.observations_and_rewards import (
     COMMAND_SCALES,
-    LeggedMotion,
-    compute_observations,
-    compute_rewards,
+    LeggedRobotState,
+    compute_legged_observations,
+    compute_legged_rewards,
     has_fallen,
 )
 from pdtui.robots.robot import ResetResult, StepResult, TrainingRecipe
@@ -45,7 +45,7 @@ _MAX_TORQUE = 80.0  # N m
 _START_NOISE = 0.1
 
 
-def foot_sensors(model: mujoco.MjModel) -> tuple[slice, slice]:
+def foot_sensor_slices(model: mujoco.MjModel) -> tuple[slice, slice]:
     """Return which sensor values are the positions of the feet, and which their velocities."""
     first, second = (int(model.sensor(name).adr[0]) for name in ("LF", "LF_velocity"))
     return slice(first, first + 12), slice(second, second + 12)
@@ -54,10 +54,10 @@ def foot_sensors(model: mujoco.MjModel) -> tuple[slice, slice]:
 class Anymal(MujocoRobot):
     """ANYmal-C on a plane; a control step is 0.02 s.
 
-    The observation has 49 numbers, or 47 with the forward command alone; see `compute_observations`. The 12
-    actions move the targets of the joints' PD controllers by 0.5 rad each around the default. The reward is
-    that of following the commands; see `compute_rewards`. An episode ends when the trunk is on the ground or
-    on its side.
+    The observation has 49 numbers, or 47 with the forward command alone; see
+    `compute_legged_observations`. The 12 actions move the targets of the joints' PD controllers by 0.5 rad
+    each around the default. The reward is that of following the commands; see `compute_legged_rewards`. An episode
+    ends when the trunk is on the ground or on its side.
 
     Attributes:
         commands: Those of `COMMANDS` that the policy observes, m/s and rad/s.
@@ -103,7 +103,7 @@ class Anymal(MujocoRobot):
         self.links = read_model_links(self.model)
         self.action_space = spaces.Box(-_MAX_ACTION, _MAX_ACTION, (12,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (46 + len(self.commands),), np.float64)
-        self._feet, self._feet_velocity = foot_sensors(self.model)
+        self._feet, self._feet_velocity = foot_sensor_slices(self.model)
         self._command = np.array([1.0, 0.0, 0.0])
         self._stand_still()
         torque_scale = 1.0 / _MAX_TORQUE
@@ -151,7 +151,9 @@ class Anymal(MujocoRobot):
         return self.observe(), {}
 
     def observe(self) -> Floats:
-        observation: Floats = compute_observations(self._motion(), DEFAULT_ANGLES, len(self.commands))[0]
+        observation: Floats = compute_legged_observations(self._motion(), DEFAULT_ANGLES, len(self.commands))[
+            0
+        ]
         return observation
 
     def step(self, action: NDArray[np.float32]) -> StepResult:
@@ -160,12 +162,14 @@ class Anymal(MujocoRobot):
         mujoco.mj_step(self.model, self.data, SUBSTEPS)
         self._check_finite()
         motion, dt = self._motion(), self.control_dt
-        reward, self._air_time = compute_rewards(motion, self._air_time, dt, TARGET_HEIGHT, DEFAULT_ANGLES)
+        reward, self._air_time = compute_legged_rewards(
+            motion, self._air_time, dt, TARGET_HEIGHT, DEFAULT_ANGLES
+        )
         info: dict[str, Any] = {"cost": 0.0}
         fell = bool(has_fallen(motion)[0])
         if fell:
             info["reason"] = f"fell: trunk at {self.data.qpos[2]:.2f} m"
-        observation: Floats = compute_observations(motion, DEFAULT_ANGLES, len(self.commands))[0]
+        observation: Floats = compute_legged_observations(motion, DEFAULT_ANGLES, len(self.commands))[0]
         return observation, float(reward[0]), fell, False, info
 
     def read_attributes(self) -> Floats:
@@ -181,12 +185,12 @@ class Anymal(MujocoRobot):
     def _stand_still(self) -> None:
         self._action, self._last_action, self._air_time = np.zeros(12), np.zeros(12), np.zeros((1, 4))
 
-    def _motion(self) -> LeggedMotion:
+    def _motion(self) -> LeggedRobotState:
         sensors = self.data.sensordata
         feet = (sensors[part].reshape(1, 4, 3) for part in (self._feet, self._feet_velocity))
         physics = (self.data.qpos, self.data.qvel, self._action, self._last_action, self._command)
         rows = (array[None] for array in (*physics, self.data.actuator_force))
-        return LeggedMotion(*rows, *feet)
+        return LeggedRobotState(*rows, *feet)
 
     def _copy_arrays(self) -> tuple[Floats, ...]:
         return (*super()._copy_arrays(), self.data.sensordata.copy(), self.data.actuator_force.copy())

@@ -12,7 +12,7 @@ from gymnasium.envs.box2d import bipedal_walker as stock
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
-from pdtui.core.robot_data import Link
+from pdtui.core.robot_links_and_state import Link
 from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
 from pdtui.robots.robot import TrainingRecipe, torque_attributes

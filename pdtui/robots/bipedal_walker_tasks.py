@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pdtui.robots.task import RunTrace, Task, TaskVerdict
+from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 
 # Control steps of each task.
 _JUMP_STEPS, _FLIP_STEPS, _STAND_STEPS = 200, 200, 300
@@ -18,13 +18,13 @@ _WALK_SHARE, _WALK_SPEED = 0.5, 5.0
 _LAST_STEPS, _USUAL_STEPS = 60, 50
 
 
-def _walks(trace: RunTrace, usual: float, steps: int) -> tuple[bool, float]:
+def _walks(trace: TaskRunTrace, usual: float, steps: int) -> tuple[bool, float]:
     """Return whether it is up at the end and walks at half its speed, and the speed there."""
     speed = trace.mean("vx", slice(-_LAST_STEPS, None))
     return trace.stays_up(steps) and speed >= _WALK_SHARE * usual, speed
 
 
-def judge_jump(trace: RunTrace) -> TaskVerdict:
+def judge_jump(trace: TaskRunTrace) -> TaskVerdict:
     """Judge whether the hull rises by half a metre, and the robot lands and walks on."""
     rise = float(trace["height"].max()) - trace.mean_before("height", _USUAL_STEPS)
     walks, speed = _walks(trace, trace.mean_before("vx", _USUAL_STEPS), _JUMP_STEPS)
@@ -33,7 +33,7 @@ def judge_jump(trace: RunTrace) -> TaskVerdict:
     return TaskVerdict(rise >= _JUMP_HEIGHT and walks, score, figures)
 
 
-def judge_flip(trace: RunTrace) -> TaskVerdict:
+def judge_flip(trace: TaskRunTrace) -> TaskVerdict:
     """Judge whether it turns forward by 300° or more; whether it lands is a figure of its own."""
     pitch = trace["pitch"]
     turned = math.degrees(float(np.max(pitch) - pitch[0]))
@@ -44,7 +44,7 @@ def judge_flip(trace: RunTrace) -> TaskVerdict:
     return TaskVerdict(turned >= _FLIP_ANGLE, score, figures)
 
 
-def judge_stand_up(trace: RunTrace) -> TaskVerdict:
+def judge_stand_up(trace: TaskRunTrace) -> TaskVerdict:
     """Judge whether it walks again by the end."""
     walks, speed = _walks(trace, _WALK_SPEED, _STAND_STEPS)
     share = max(0.0, min(1.0, speed / (_WALK_SHARE * _WALK_SPEED)))

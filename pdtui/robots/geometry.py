@@ -10,7 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from pdtui.core.attributes import Floats
-    from pdtui.core.robot_data import Link
+    from pdtui.core.robot_links_and_state import Link
 
 
 def multiply_quaternions(a: Floats, b: Floats) -> Floats:

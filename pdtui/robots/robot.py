@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import RobotError
-from pdtui.core.robot_data import NO_OBSTACLES, CommandRange, Link, RobotState
+from pdtui.core.robot_links_and_state import NO_OBSTACLES, CommandRange, Link, RobotState
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
 from pdtui.robots.task import Task, find_task
 

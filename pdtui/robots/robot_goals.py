@@ -31,7 +31,7 @@ class BehaviorGoal:
 
 
 @dataclass(frozen=True)
-class HoldGoal:
+class HoldBehaviorGoal:
     """A behavior to look for that holds an attribute at a target, which the arrow keys set.
 
     Attributes:
@@ -64,7 +64,7 @@ class RobotGoals:
     """
 
     behaviors: tuple[BehaviorGoal, ...] = ()
-    holds: tuple[HoldGoal, ...] = ()
+    holds: tuple[HoldBehaviorGoal, ...] = ()
     primitives: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
 
@@ -88,8 +88,12 @@ WALKING_GOALS = RobotGoals(
         BehaviorGoal("spin right", "d", "turns right on the spot, or nearly", _RIGHT, 0.5),
     ),
     holds=(
-        HoldGoal("hold heading", "h", "keeps the heading that the arrow keys set", "yaw", _HEADINGS, "start"),
-        HoldGoal("hold speed", "g", "keeps the speed that the arrow keys set", "speed", (0.4, 0.7), "mean"),
+        HoldBehaviorGoal(
+            "hold heading", "h", "keeps the heading that the arrow keys set", "yaw", _HEADINGS, "start"
+        ),
+        HoldBehaviorGoal(
+            "hold speed", "g", "keeps the speed that the arrow keys set", "speed", (0.4, 0.7), "mean"
+        ),
     ),
     primitives=MappingProxyType(_PRIMITIVES),
 )

@@ -12,7 +12,7 @@ from pdtui.core.errors import MapError
 
 
 @dataclass(frozen=True)
-class RunTrace:
+class TaskRunTrace:
     """The attributes during one run of a task.
 
     Attributes:
@@ -101,7 +101,7 @@ class Task:
     wanted: str
     walk: tuple[int, int]
     steps: int
-    judge: Callable[[RunTrace], TaskVerdict]
+    judge: Callable[[TaskRunTrace], TaskVerdict]
     start: str = ""
     period: int | None = None
 

@@ -12,8 +12,13 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.robots.robot import TrainingRecipe, torque_attributes
-from pdtui.robots.simulators.mujoco_robot import MujocoRobot, motor_gears, read_model_links, silence_warnings
-from pdtui.robots.task import RunTrace, Task, TaskVerdict
+from pdtui.robots.simulators.mujoco_robot import (
+    MujocoRobot,
+    read_model_links,
+    read_motor_gears,
+    silence_warnings,
+)
+from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 
 _FEET = {"right": "foot_geom", "left": "foot_left_geom"}
 # Longest time that a foot may be off the ground in training, s.
@@ -24,7 +29,7 @@ _SLOW_SHARE, _SLOWING_STEPS, _SLOW_STEPS = 0.25, 100, 200
 _HOP_FROM, _HOP_STEPS, _HOP_SHARE, _HOP_SPEED = 50, 150, 0.8, 0.3
 
 
-def judge_slow_down(trace: RunTrace) -> TaskVerdict:
+def judge_slow_down(trace: TaskRunTrace) -> TaskVerdict:
     """Judge whether it has less than a quarter of its speed from step 100 on and stays up for 200 steps."""
     usual = trace.mean_before("vx", 100)
     steps = _SLOWING_STEPS + _SLOW_STEPS
@@ -38,7 +43,7 @@ def judge_slow_down(trace: RunTrace) -> TaskVerdict:
     return TaskVerdict(up and left < _SLOW_SHARE, score, figures)
 
 
-def judge_hop(trace: RunTrace) -> TaskVerdict:
+def judge_hop(trace: TaskRunTrace) -> TaskVerdict:
     """Judge whether one foot stays off the ground for 80 % of 150 steps in a row while it moves forward.
 
     In a row, because each foot of a fast runner is off the ground for 80 % of the time, too.
@@ -117,7 +122,7 @@ class Walker(MujocoRobot, Walker2dEnv):
         self._in_air = np.zeros(len(_FEET))
         self.links = read_model_links(self.model)
         self._feet = [self.model.geom(geom).id for geom in _FEET.values()]
-        gears = motor_gears(self.model)
+        gears = read_motor_gears(self.model)
         self._gears = np.array(list(gears.values()))
         self.attributes = (
             Attribute("vx", "m/s"),

@@ -10,14 +10,14 @@ from math import inf
 import numpy as np
 
 from pdtui.core.attributes import Floats
-from pdtui.core.intervals import bootstrap_interval
+from pdtui.core.confidence_intervals import bootstrap_interval
 from pdtui.core.units import Stimulation
 from pdtui.core.worker_pool import StepProgress
 from pdtui.probing.effect_probe import EffectProbe, PlanEffects, UnitEffects
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot_goals import BehaviorGoal
-from pdtui.search.behavior_goals import measure_goal_gains, score_plans_by_goal
-from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionSettings, SearchProblem
+from pdtui.search.goal_scores import measure_goal_gains, score_plans_by_goal
+from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionProblem, EvolutionSettings
 from pdtui.search.shared_candidates import SharedCandidates
 from pdtui.search.stimulation_sampler import StimulationSampler
 from pdtui.stimulation.stimulation_map import MeasuredEffect
@@ -128,7 +128,7 @@ class BehaviorSearch:
         quick, full = starts.search[: settings.quick_starts], starts.search[: settings.full_starts]
         # A stop has a best possible score, since nothing stops more than entirely.
         limit = 1.0 / self.goal.enough if self.goal.aim.direction == "stop" else inf
-        problem = SearchProblem(
+        problem = EvolutionProblem(
             first=self._first_plans,
             vary=StimulationSampler(self._unit_weights(), settings.bounds, self.seed).vary,
             quick=partial(self._score, starts=quick, steps=settings.quick_steps),

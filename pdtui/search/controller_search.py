@@ -12,8 +12,8 @@ from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.probing.effect_probe import EffectProbe, UnitEffects
 from pdtui.probing.start_states import StartState
-from pdtui.probing.stimulated_rollout import ControllerPlan
-from pdtui.search.plan_search import Deadline, ScoringStage, select_plans
+from pdtui.probing.stimulated_rollout import PidStimulation
+from pdtui.search.plan_search import Deadline, PlanScoringStage, select_plans
 from pdtui.search.stimulation_sampler import round_outputs, round_to_three_digits
 from pdtui.stimulation.stimulation_map import PidGains
 
@@ -131,8 +131,8 @@ class ControllerSearch:
             return None
         half = len(held_out) // 2
         stages = (
-            ScoringStage(partial(self._score, starts=search, steps=settings.steps), settings.finalists),
-            ScoringStage(partial(self._score, starts=held_out[:half], steps=settings.final_steps), 1),
+            PlanScoringStage(partial(self._score, starts=search, steps=settings.steps), settings.finalists),
+            PlanScoringStage(partial(self._score, starts=held_out[:half], steps=settings.final_steps), 1),
         )
         ((_, best),) = select_plans(candidates, stages)
         without = replace(best, units=NO_STIMULATION, base=())
@@ -149,7 +149,7 @@ class ControllerSearch:
             best.base,
         )
 
-    def _alone(self, units: Sequence[tuple[int, float]]) -> list[ControllerPlan]:
+    def _alone(self, units: Sequence[tuple[int, float]]) -> list[PidStimulation]:
         """Propose single units, whose output goes either way from 0."""
         return [
             self._candidate(Stimulation((unit,), (weight,)), (), limit, gain * limit, ki)
@@ -159,7 +159,7 @@ class ControllerSearch:
             for ki in self._integral
         ]
 
-    def _between(self, opposites: Sequence[tuple[Stimulation, Stimulation]]) -> list[ControllerPlan]:
+    def _between(self, opposites: Sequence[tuple[Stimulation, Stimulation]]) -> list[PidStimulation]:
         """Propose blends from one plan, at −1, to its opposite, at 1, and somewhat beyond."""
         found = []
         for high, low in opposites:
@@ -181,22 +181,22 @@ class ControllerSearch:
 
     def _candidate(
         self, units: Stimulation, base: tuple[float, ...], limit: float, gain: float, ki: float
-    ) -> ControllerPlan:
+    ) -> PidStimulation:
         """Scale the gains so that a gain of 1 gives an output of 1 for a typical error."""
         spread = self.goal.spread
         kp, step = round_to_three_digits(gain / spread), float(f"{spread / 4:.1g}")
         pid = PidGains(self.goal.attribute, kp, round_to_three_digits(kp * ki), 0.0, limit, step)
-        return ControllerPlan(units, pid, 0.0, self.goal.relative, base)
+        return PidStimulation(units, pid, 0.0, self.goal.relative, base)
 
     def _score(
-        self, candidates: Sequence[ControllerPlan], starts: Sequence[StartState], steps: int
+        self, candidates: Sequence[PidStimulation], starts: Sequence[StartState], steps: int
     ) -> Floats:
         errors, falls = self._measure(candidates, starts, steps)
         scores: Floats = -errors - _FALL_PENALTY * self.goal.spread * falls
         return scores
 
     def _measure(
-        self, candidates: Sequence[ControllerPlan], starts: Sequence[StartState], steps: int
+        self, candidates: Sequence[PidStimulation], starts: Sequence[StartState], steps: int
     ) -> tuple[Floats, Floats]:
         """Return mean error and share of falls of each candidate over targets and starts."""
         goal = self.goal

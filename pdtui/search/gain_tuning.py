@@ -22,8 +22,8 @@ from pdtui.core.errors import MapError
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.search.pid_gain_space import gains_from_point, point_from_gains, sample_gain_points
-from pdtui.search.plan_search import Deadline, ScoringStage, TimeBudget, select_plans
-from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveResult, TrackingDriveRunner
+from pdtui.search.plan_search import Deadline, PlanScoringStage, SharedTimeBudget, select_plans
+from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveResult, TrackingDriveRunner
 from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarise_tracking
 from pdtui.stimulation.stimulation_map import Behavior, PidGains, StimulationMap
 
@@ -114,7 +114,7 @@ def tune_gains(
     """
     if len(seeds) < 2:
         raise MapError(f"expected at least 2 seeds, half of them to judge by, found {len(seeds)}")
-    budget = TimeBudget(settings.minutes)
+    budget = SharedTimeBudget(settings.minutes)
     with TrackingDriveRunner(config, workers) as runner:
         behaviors = _find_pid_behaviors(runner.loop.map, names)
         results = []
@@ -196,13 +196,13 @@ class _GainSearch:
         ((_, best),) = select_plans(candidates, self._halving_stages(len(candidates)))
         return best
 
-    def _halving_stages(self, left: int) -> Iterator[ScoringStage[PidGains]]:
+    def _halving_stages(self, left: int) -> Iterator[PlanScoringStage[PidGains]]:
         count = min(_FIRST_SEEDS, len(self._search))
         while count < len(self._search):
             left = max(2, left // 2)
-            yield ScoringStage(partial(self._score, count=count), left)
+            yield PlanScoringStage(partial(self._score, count=count), left)
             count = min(2 * count, len(self._search))
-        yield ScoringStage(partial(self._score, count=count), 1)
+        yield PlanScoringStage(partial(self._score, count=count), 1)
 
     def _score(self, candidates: Sequence[PidGains], count: int) -> list[float]:
         return [-self._measure(pid, count) for pid in candidates]
@@ -241,7 +241,7 @@ class _GainSearch:
         return float(np.mean(self._costs[pid][:count]))
 
     def _drive(self, pid: PidGains, seeds: Sequence[int]) -> list[TrackingDriveResult]:
-        drive = partial(TrackingDrive, pid.attribute, self._behavior.name, targets=self._targets, pid=pid)
+        drive = partial(TrackingDriveJob, pid.attribute, self._behavior.name, targets=self._targets, pid=pid)
         return self._runner.run([drive(seed=seed) for seed in seeds])
 
     def _cost(self, result: TrackingDriveResult) -> float:

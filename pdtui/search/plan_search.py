@@ -14,7 +14,7 @@ from math import inf
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from pdtui.core.worker_pool import StepProgress
-from pdtui.search.stimulation_sampler import OutputBounds
+from pdtui.search.stimulation_sampler import UnitOutputBounds
 
 Plan = TypeVar("Plan")
 PlanScoring = Callable[[Sequence[Plan]], Iterable[Any]]
@@ -28,14 +28,14 @@ _ATTEMPTS = 20
 """Attempts to vary the elite into a plan that was not tried before."""
 
 
-class ScoringStage(NamedTuple, Generic[Plan]):
+class PlanScoringStage(NamedTuple, Generic[Plan]):
     """One stage of a selection: how it scores plans, and how many of the best it keeps."""
 
     score: PlanScoring[Plan]
     keep: int
 
 
-def select_plans(plans: Sequence[Plan], stages: Iterable[ScoringStage[Plan]]) -> list[tuple[Any, Plan]]:
+def select_plans(plans: Sequence[Plan], stages: Iterable[PlanScoringStage[Plan]]) -> list[tuple[Any, Plan]]:
     """Return the plans that survive all stages with their scores at the last one, the best first.
 
     Each stage scores what the one before it kept, usually more thoroughly: successive halving (Jamieson and
@@ -49,7 +49,7 @@ def select_plans(plans: Sequence[Plan], stages: Iterable[ScoringStage[Plan]]) ->
     return ranked
 
 
-class TimeBudget:
+class SharedTimeBudget:
     """Shares what is left of a time budget equally among the searches that are still to run.
 
     Args:
@@ -90,11 +90,11 @@ class EvolutionSettings:
     generations: int = 24
     patience: int = 6
     finalists: int = 6
-    bounds: OutputBounds = field(default_factory=OutputBounds)
+    bounds: UnitOutputBounds = field(default_factory=UnitOutputBounds)
 
 
 @dataclass(frozen=True)
-class SearchProblem(Generic[Plan]):
+class EvolutionProblem(Generic[Plan]):
     """What an evolutionary search is for.
 
     Attributes:
@@ -127,7 +127,7 @@ class EvolutionarySearch(Generic[Plan]):
         settings: how much to do.
     """
 
-    def __init__(self, problem: SearchProblem[Plan], settings: EvolutionSettings) -> None:
+    def __init__(self, problem: EvolutionProblem[Plan], settings: EvolutionSettings) -> None:
         self._problem, self._settings = problem, settings
         self._elite: list[tuple[float, Plan]] = []
         self._seen: set[Plan] = set()
@@ -157,7 +157,7 @@ class EvolutionarySearch(Generic[Plan]):
         if progress is not None:
             progress(total, total)
         scores = {plan: score for score, plan in self._elite[: settings.finalists]}
-        ((_, winner),) = select_plans(list(scores), [ScoringStage(problem.final, 1)])
+        ((_, winner),) = select_plans(list(scores), [PlanScoringStage(problem.final, 1)])
         return scores[winner], winner
 
     def _child(self, max_units: int) -> Plan:
@@ -174,7 +174,10 @@ class EvolutionarySearch(Generic[Plan]):
             return
         self._seen.update(fresh)
         promoted = self._settings.promoted
-        stages = (ScoringStage(self._problem.quick, promoted), ScoringStage(self._problem.full, promoted))
+        stages = (
+            PlanScoringStage(self._problem.quick, promoted),
+            PlanScoringStage(self._problem.full, promoted),
+        )
         self._elite += [(float(score), plan) for score, plan in select_plans(fresh, stages)]
         self._elite.sort(key=lambda pair: -pair[0])
         del self._elite[self._settings.elite :]

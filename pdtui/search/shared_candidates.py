@@ -11,8 +11,8 @@ from pdtui.core.worker_pool import StepProgress
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot_goals import BehaviorGoal
-from pdtui.search.behavior_goals import score_plans_by_goal
-from pdtui.search.stimulation_sampler import OutputBounds, StimulationSampler
+from pdtui.search.goal_scores import score_plans_by_goal
+from pdtui.search.stimulation_sampler import StimulationSampler, UnitOutputBounds
 
 
 class SharedCandidates:
@@ -67,7 +67,9 @@ class SharedCandidates:
         return [(high, low) for _, high, low in pairs[:count]]
 
 
-def sample_random_candidates(units: int, count: int, bounds: OutputBounds, seed: int) -> list[Stimulation]:
+def sample_random_candidates(
+    units: int, count: int, bounds: UnitOutputBounds, seed: int
+) -> list[Stimulation]:
     """Draw `count` pairs and triples of a policy's units, with random outputs."""
     sampler = StimulationSampler(np.ones(units), bounds, seed)
     most = min(3, units)

@@ -21,7 +21,7 @@ _FLIP = 0.08
 
 
 @dataclass(frozen=True)
-class OutputBounds:
+class UnitOutputBounds:
     """Limits of the outputs v.
 
     Attributes:
@@ -44,7 +44,7 @@ class StimulationSampler:
         seed: seed of every random choice, or a generator shared with other code.
     """
 
-    def __init__(self, weights: Floats, bounds: OutputBounds, seed: int | np.random.Generator) -> None:
+    def __init__(self, weights: Floats, bounds: UnitOutputBounds, seed: int | np.random.Generator) -> None:
         self._shares = weights / weights.sum()
         self._bounds = bounds
         self.rng = np.random.default_rng(seed)

@@ -12,7 +12,7 @@ from pdtui.core.errors import SimulationDiverged
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot, is_fall
-from pdtui.robots.task import RunTrace, Task, TaskVerdict
+from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def judge_stimulations(
 
 def _watch(
     robot: Robot, policy: Policy, task: Task, plan: TimedStimulation, walked: list[Floats]
-) -> RunTrace:
+) -> TaskRunTrace:
     observation, fell = robot.observe(), False
     values: list[Floats] = []
     for step in range(task.steps):
@@ -74,4 +74,4 @@ def _watch(
             fell = is_fall(terminated, info)
             break
     rows = np.array(values).reshape(-1, len(robot.attributes))
-    return RunTrace(robot.attributes, np.array(walked), unwrap_angles(rows, robot.attributes), fell)
+    return TaskRunTrace(robot.attributes, np.array(walked), unwrap_angles(rows, robot.attributes), fell)

@@ -15,7 +15,7 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.robot import Robot
 from pdtui.robots.task import Task, TaskVerdict
-from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionSettings, SearchProblem
+from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionProblem, EvolutionSettings
 from pdtui.search.stimulation_sampler import CROSSED, StimulationSampler
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
 
@@ -118,7 +118,7 @@ class TaskSearch:
         """
         settings = self._settings
         singles, weights = self._screen(progress)
-        problem = SearchProblem(
+        problem = EvolutionProblem(
             first=lambda round_: [*self._known, *singles] if round_ == 0 else [],
             vary=partial(self._vary, StimulationSampler(weights, settings.bounds, self._rng)),
             quick=partial(self._score, seeds=settings.quick_seeds),

@@ -9,7 +9,7 @@ import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle, wrap_angles
 from pdtui.core.closable import Closable
-from pdtui.core.events import DriveEvent
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.worker_pool import WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
@@ -24,7 +24,7 @@ STEPS_EACH = 100
 
 
 @dataclass(frozen=True)
-class TrackingDrive:
+class TrackingDriveJob:
     """One drive to run.
 
     Attributes:
@@ -55,7 +55,7 @@ class TrackingDriveResult:
         fell: whether the robot fell.
     """
 
-    drive: TrackingDrive
+    drive: TrackingDriveJob
     values: Floats
     errors: Floats
     responses: tuple[StepResponse, ...]
@@ -100,7 +100,7 @@ class TrackingDriveRunner(Closable):
         return self.loop.robot.attributes[self.loop.robot.attribute_index(name)]
 
     def run(
-        self, drives: Sequence[TrackingDrive], progress: Callable[[int, int], None] | None = None
+        self, drives: Sequence[TrackingDriveJob], progress: Callable[[int, int], None] | None = None
     ) -> list[TrackingDriveResult]:
         """Run all drives, and return the results in their order.
 
@@ -114,7 +114,7 @@ class TrackingDriveRunner(Closable):
         return self._pool.map(drive_through_targets, drives, progress)
 
 
-def drive_through_targets(template: ControlLoop, drive: TrackingDrive) -> TrackingDriveResult:
+def drive_through_targets(template: ControlLoop, drive: TrackingDriveJob) -> TrackingDriveResult:
     """Run one drive; of the loop given, only the state of its robot and policy changes."""
     stimulation_map = template.map
     if drive.pid is not None:
@@ -141,7 +141,7 @@ def drive_through_targets(template: ControlLoop, drive: TrackingDrive) -> Tracki
     return _summarise(drive, path, fell, template.robot.attributes[column].wraps, template.robot.control_dt)
 
 
-def _events(step: int, drive: TrackingDrive, number: int) -> list[DriveEvent]:
+def _events(step: int, drive: TrackingDriveJob, number: int) -> list[DriveEvent]:
     """Return the events before a control step, which counts from the first target."""
     if not drive.behavior or number % STEPS_EACH:
         return []
@@ -149,7 +149,9 @@ def _events(step: int, drive: TrackingDrive, number: int) -> list[DriveEvent]:
     return [DriveEvent(step, "behavior", drive.behavior), target] if number == 0 else [target]
 
 
-def _summarise(drive: TrackingDrive, path: Floats, fell: bool, wraps: bool, dt: float) -> TrackingDriveResult:
+def _summarise(
+    drive: TrackingDriveJob, path: Floats, fell: bool, wraps: bool, dt: float
+) -> TrackingDriveResult:
     smooth = np.unwrap(path) if wraps else path
     values = smooth[1:].reshape(len(drive.targets), STEPS_EACH)
     errors = np.array(drive.targets)[:, None] - values

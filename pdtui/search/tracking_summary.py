@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.core.confidence_intervals import confidence_interval
 from pdtui.core.errors import MapError
-from pdtui.core.intervals import confidence_interval
 from pdtui.search.step_response import StepResponseSummary
-from pdtui.search.tracking_drives import TrackingDrive, TrackingDriveResult, TrackingDriveRunner
+from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveResult, TrackingDriveRunner
 from pdtui.stimulation.stimulation_map import Behavior
 
 HEADINGS = (0.0, 0.4, 0.9, 1.2, 0.9, 0.4, 0.0, -0.4, -0.9, -1.2, -0.9, -0.4, 0.0)
@@ -119,7 +119,7 @@ def choose_tracking_targets(
     name = behavior.pid.attribute
     if runner.attribute(name).wraps:
         return HEADINGS
-    untouched = runner.run([TrackingDrive(name, "", seed, (0.0, 0.0)) for seed in seeds])
+    untouched = runner.run([TrackingDriveJob(name, "", seed, (0.0, 0.0)) for seed in seeds])
     natural = mean_of_finite(np.array([one.values for one in untouched]))
     if not np.isfinite(natural):
         raise MapError(

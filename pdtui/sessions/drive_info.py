@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from pdtui.core.attributes import Attribute
 from pdtui.core.errors import SessionError
-from pdtui.core.robot_data import Link
+from pdtui.core.robot_links_and_state import Link
 from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, SCHEMA, ActivationsKept
 
 

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angles
+from pdtui.core.drive_events import DriveEvent, describe_event
 from pdtui.core.errors import SessionError
-from pdtui.core.events import DriveEvent, describe_event
 from pdtui.sessions.environment_versions import version_differences
 from pdtui.sessions.session_reader import Session
 
 
 @dataclass(frozen=True)
-class AttributeDeviation:
+class ReplayDeviation:
     """How much an attribute deviates between two runs, in its unit.
 
     Attributes:
@@ -56,12 +56,12 @@ class SessionComparison:
     steps: int
     lengths: tuple[int, int]
     first_difference: int | None
-    deviations: tuple[AttributeDeviation, ...]
+    deviations: tuple[ReplayDeviation, ...]
     first_event: str
     circumstances: tuple[str, ...]
 
 
-def attribute_differences(a: Floats, b: Floats, attributes: Sequence[Attribute]) -> Floats:
+def absolute_attribute_differences(a: Floats, b: Floats, attributes: Sequence[Attribute]) -> Floats:
     """Return absolute differences of attributes; angles that wrap differ by at most π, and NaN equals NaN.
 
     The values `a` and `b` have the shape (..., J), for J attributes.
@@ -76,8 +76,8 @@ def attribute_differences(a: Floats, b: Floats, attributes: Sequence[Attribute])
 
 def summarise_deviations(
     change: Floats, attributes: Sequence[Attribute], first: int, spread: Floats
-) -> tuple[AttributeDeviation, ...]:
-    """Summarise the `attribute_differences` from step `first` on, ordered from worst to best.
+) -> tuple[ReplayDeviation, ...]:
+    """Summarise the `absolute_attribute_differences` from step `first` on, ordered from worst to best.
 
     Args:
         change: the differences, shape (n, J), n > 0; the first row belongs to step `first`.
@@ -91,11 +91,11 @@ def summarise_deviations(
     found = []
     for j in order[largest[order] > 0]:
         numbers = float(change[0, j]), float(largest[j]), float(mean[j]), first + int(worst[j])
-        found.append(AttributeDeviation(attributes[j].name, attributes[j].unit, *numbers))
+        found.append(ReplayDeviation(attributes[j].name, attributes[j].unit, *numbers))
     return tuple(found)
 
 
-def measure_spread(values: Floats) -> Floats:
+def measure_attribute_spread(values: Floats) -> Floats:
     """Return the standard deviation of each attribute, shape (J,), over a session; 1 if nearly constant."""
     if not len(values):
         return np.ones(values.shape[1])
@@ -115,11 +115,11 @@ def compare_sessions(a: Session, b: Session) -> SessionComparison:
     steps = min(a.steps, b.steps)
     differing: NDArray[np.intp] = np.flatnonzero(a.digests[:steps] != b.digests[:steps])
     first = int(differing[0]) if differing.size else None
-    found: tuple[AttributeDeviation, ...] = ()
+    found: tuple[ReplayDeviation, ...] = ()
     if first is not None:
         values_a, values_b = a.attributes[first:steps], b.attributes[first:steps]
-        change = attribute_differences(values_a, values_b, a.info.attributes)
-        found = summarise_deviations(change, a.info.attributes, first, measure_spread(a.attributes))
+        change = absolute_attribute_differences(values_a, values_b, a.info.attributes)
+        found = summarise_deviations(change, a.info.attributes, first, measure_attribute_spread(a.attributes))
     return SessionComparison(
         steps,
         (a.steps, b.steps),

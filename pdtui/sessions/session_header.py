@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import SessionError
-from pdtui.core.events import DriveEvent
-from pdtui.core.fixed_keys import EVENT_WORDINGS
+from pdtui.core.reserved_keys import EVENT_WORDINGS
 from pdtui.sessions.drive_info import DriveInfo, decode_drive_info
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents

@@ -29,7 +29,7 @@ _CHUNKS_PER_FLUSH = 64
 
 
 @dataclass(frozen=True)
-class SessionCondition:
+class SessionIntegrity:
     """How much of a session can be read.
 
     Attributes:
@@ -47,7 +47,7 @@ class SessionCondition:
     whole: bool
 
 
-def examine_session(path: Path) -> SessionCondition:
+def examine_session(path: Path) -> SessionIntegrity:
     """Report what can be read of a session.
 
     A file that is no session, or was cut off before its first control step, is a `SessionError`.
@@ -62,7 +62,7 @@ def examine_session(path: Path) -> SessionCondition:
     kept = int(gaps[0]) if gaps.size else len(steps)
     outcome = read_drive_outcome(file)
     whole = file.finished and not gaps.size and bool(outcome)
-    return SessionCondition(info, kept, outcome, file.recording_id, whole)
+    return SessionIntegrity(info, kept, outcome, file.recording_id, whole)
 
 
 def repair_session(path: Path, output: Path) -> SessionHeader:
@@ -92,7 +92,7 @@ def repair_session(path: Path, output: Path) -> SessionHeader:
     return repaired
 
 
-def _rewrite(path: Path, output: Path, condition: SessionCondition) -> None:
+def _rewrite(path: Path, output: Path, condition: SessionIntegrity) -> None:
     recording = open_recording(output, condition.info, condition.recording_id)
     try:
         for number, chunk in enumerate(_read_kept_chunks(path, condition.steps)):

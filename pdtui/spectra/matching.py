@@ -34,7 +34,7 @@ _CONSTANT = {
 
 
 @dataclass(frozen=True)
-class Discrepancies:
+class UnitDiscrepancies:
     """Discrepancies of J attributes and U units.
 
     Attributes:
@@ -68,7 +68,7 @@ def match_units(
     preset: MatchingPreset,
     *,
     block: int = BLOCK,
-) -> Discrepancies:
+) -> UnitDiscrepancies:
     """Compute ``Dis(z, s) = ‖SG_z − SG_s‖₂`` of all units z and attributes s (section 3.2).
 
     The norm is over all frequencies and windows, and its mean is taken over the episodes. Time grows linearly
@@ -109,7 +109,7 @@ def match_units(
     for unit, flaw in unit_flaws.items():
         if flaw.endswith("left out"):
             result[:, unit] = level_share[:, unit] = np.nan
-    return Discrepancies(
+    return UnitDiscrepancies(
         result, level_share, tuple(episode.seed for episode in used), skipped, attribute_flaws, unit_flaws
     )
 

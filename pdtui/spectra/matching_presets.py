@@ -103,7 +103,7 @@ PRESETS: dict[str, MatchingPreset] = {
 _RANGES = {"length": (4, 65536), "hop": (1, 65536)}
 
 
-def preset_options() -> dict[str, tuple[str, ...] | tuple[int, int]]:
+def allowed_preset_values() -> dict[str, tuple[str, ...] | tuple[int, int]]:
     """Return for each choice its possible values, or its lowest and highest number of samples."""
     hints = get_type_hints(MatchingPreset)
     named = {
@@ -114,10 +114,10 @@ def preset_options() -> dict[str, tuple[str, ...] | tuple[int, int]]:
     return {**named, **_RANGES}
 
 
-def preset_values(preset: MatchingPreset) -> dict[str, Any]:
+def list_preset_values(preset: MatchingPreset) -> dict[str, Any]:
     """Return the choices of a preset by name."""
     everything = asdict(preset)
-    return {name: everything[name] for name in everything if name in preset_options()}
+    return {name: everything[name] for name in everything if name in allowed_preset_values()}
 
 
 def find_matching_preset(name: str, settings: Sequence[str] = ()) -> MatchingPreset:
@@ -131,7 +131,7 @@ def find_matching_preset(name: str, settings: Sequence[str] = ()) -> MatchingPre
     if name not in PRESETS:
         raise PdtuiError(f"unknown preset '{name}'; available: {', '.join(PRESETS)}")
     values: dict[str, Any] = dict(_parse(setting) for setting in settings)
-    preset, usual = PRESETS[name], preset_values(PRESETS[name])
+    preset, usual = PRESETS[name], list_preset_values(PRESETS[name])
     changed = tuple(f"{key}={value}" for key, value in values.items() if value != usual[key])
     preset = replace(preset, **values, changed=changed)
     if preset.hop > preset.length:
@@ -142,22 +142,24 @@ def find_matching_preset(name: str, settings: Sequence[str] = ()) -> MatchingPre
     return preset
 
 
-def describe_preset_options() -> str:
+def describe_allowed_preset_values() -> str:
     """Return one line that lists all choices and their values."""
-    return "; ".join(f"{name}={_describe_values(name)}" for name in preset_options())
+    return "; ".join(f"{name}={_describe_values(name)}" for name in allowed_preset_values())
 
 
 def _parse(setting: str) -> tuple[str, str | int]:
     name, equals, value = (part.strip() for part in setting.partition("="))
     if not equals:
-        raise PdtuiError(f"setting '{setting}': expected NAME=VALUE, one of {describe_preset_options()}")
-    if name not in preset_options():
-        raise PdtuiError(f"unknown setting '{name}'; available: {describe_preset_options()}")
+        raise PdtuiError(
+            f"setting '{setting}': expected NAME=VALUE, one of {describe_allowed_preset_values()}"
+        )
+    if name not in allowed_preset_values():
+        raise PdtuiError(f"unknown setting '{name}'; available: {describe_allowed_preset_values()}")
     if name in _RANGES:
         low, high = _RANGES[name]
         if value.isdecimal() and low <= int(value) <= high:
             return name, int(value)
-    elif value in preset_options()[name]:
+    elif value in allowed_preset_values()[name]:
         return name, value
     raise PdtuiError(f"setting '{name}': expected {_describe_values(name)}, got '{value}'")
 
@@ -166,4 +168,4 @@ def _describe_values(name: str) -> str:
     if name in _RANGES:
         low, high = _RANGES[name]
         return f"{low}…{high} samples"
-    return "|".join(str(value) for value in preset_options()[name])
+    return "|".join(str(value) for value in allowed_preset_values()[name])

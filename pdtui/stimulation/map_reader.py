@@ -9,7 +9,7 @@ from typing import cast, get_args
 
 from pdtui.core.attributes import AimDirection, BehaviorAim
 from pdtui.core.errors import MapError
-from pdtui.core.fixed_keys import RESERVED_KEYS
+from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.core.units import ADDRESS
 from pdtui.core.untrusted_file import read_bounded_file
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions

@@ -13,7 +13,7 @@ from mujoco import rollout
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.core.robot_data import RobotState
+from pdtui.core.robot_links_and_state import RobotState
 from pdtui.robots.anymal import (
     ACTION_SCALE,
     COMMANDS,
@@ -23,7 +23,7 @@ from pdtui.robots.anymal import (
     SUBSTEPS,
     TARGET_HEIGHT,
     Anymal,
-    foot_sensors,
+    foot_sensor_slices,
 )
 from pdtui.robots.legged import observations_and_rewards as legged
 from pdtui.robots.simulators.mujoco_robot import suppress_warnings
@@ -71,7 +71,7 @@ class AnymalBatch:
         self._models = [shared[index % number] for index in range(count)]
         self._data = [mujoco.MjData(shared[0]) for _ in range(_THREADS)]
         self._dt = SUBSTEPS * float(shared[0].opt.timestep)
-        self._feet, self._feet_velocity = foot_sensors(shared[0])
+        self._feet, self._feet_velocity = foot_sensor_slices(shared[0])
         # In the order of the observation: commands and the last action are observed without noise.
         counts = [1, 3, 3, 3, self._commands, 12, 12, 12]
         self._noise = np.repeat([*_NOISE[:4], 0.0, *_NOISE[4:], 0.0], counts)
@@ -101,7 +101,7 @@ class AnymalBatch:
         angles, speeds = self._physics[:, 8 : 1 + _NQ], self._physics[:, 1 + _NQ + 6 :]
         torque = np.clip(_STIFFNESS * (targets - angles) - _DAMPING * speeds, -_MAX_TORQUE, _MAX_TORQUE)
         motion = self._motion(sensors[:, -1], torque)
-        reward, self._air_time = legged.compute_rewards(
+        reward, self._air_time = legged.compute_legged_rewards(
             motion, self._air_time, self._dt, TARGET_HEIGHT, DEFAULT_ANGLES
         )
         fell = legged.has_fallen(motion) | ~np.isfinite(self._physics).all(axis=1)
@@ -136,8 +136,8 @@ class AnymalBatch:
         self._age, self.observations = age.astype(np.int64), observations.astype(np.float32)
         self._rng.bit_generator.state = kept.rng
 
-    def _motion(self, sensors: Floats, torque: Floats) -> legged.LeggedMotion:
-        return legged.LeggedMotion(
+    def _motion(self, sensors: Floats, torque: Floats) -> legged.LeggedRobotState:
+        return legged.LeggedRobotState(
             self._physics[:, 1 : 1 + _NQ],
             self._physics[:, 1 + _NQ :],
             self._action,
@@ -148,8 +148,8 @@ class AnymalBatch:
             sensors[:, self._feet_velocity].reshape(-1, 4, 3),
         )
 
-    def _observe(self, motion: legged.LeggedMotion) -> NDArray[np.float32]:
-        clean = legged.compute_observations(motion, DEFAULT_ANGLES, self._commands)
+    def _observe(self, motion: legged.LeggedRobotState) -> NDArray[np.float32]:
+        clean = legged.compute_legged_observations(motion, DEFAULT_ANGLES, self._commands)
         noise = self._noise * self._rng.uniform(-1.0, 1.0, clean.shape)
         noisy: NDArray[np.float32] = (clean + noise).astype(np.float32)
         return noisy

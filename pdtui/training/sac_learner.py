@@ -33,7 +33,7 @@ class SacState(NamedTuple):
     average: MlpParameters
 
 
-def actor_forward(params: MlpParameters, observation: jax.Array) -> tuple[jax.Array, jax.Array]:
+def run_actor(params: MlpParameters, observation: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Return mean and log standard deviation before squashing, each (..., actions)."""
     mean, log_std = jnp.split(apply_tanh_mlp(params, observation), 2, axis=-1)
     return mean, jnp.clip(log_std, -5.0, 2.0)
@@ -55,7 +55,7 @@ _both_critics = jax.vmap(_critic_forward, in_axes=(0, None, None))
 
 def _sample(params: MlpParameters, observation: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Draw a squashed action and return it with its log probability."""
-    mean, log_std = actor_forward(params, observation)
+    mean, log_std = run_actor(params, observation)
     noise = jax.random.normal(key, mean.shape)
     raw = mean + jnp.exp(log_std) * noise
     log_prob = -0.5 * noise**2 - log_std - 0.5 * jnp.log(2 * jnp.pi)

@@ -15,7 +15,7 @@ from safetensors.numpy import save_file
 
 from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import TrainingError
-from pdtui.core.robot_data import RobotState
+from pdtui.core.robot_links_and_state import RobotState
 from pdtui.training.robot_batch import RobotBatch, RobotBatchState
 
 _KEY = "pdtui-training"

@@ -19,7 +19,7 @@ MAX_CHOICES = 200
 """More than anybody reads; a list of thousands would slow down typing."""
 
 
-class Choice(Option):
+class ListChoice(Option):
     """One choice: the text that the list shows, and the value that choosing it gives."""
 
     def __init__(self, prompt: Text, value: Any, *, disabled: bool = False) -> None:
@@ -80,7 +80,7 @@ class ChoiceList(Vertical):
         title: str,
         keys: str,
         placeholder: str,
-        find_choices: Callable[[str], Iterable[Choice]],
+        find_choices: Callable[[str], Iterable[ListChoice]],
         *,
         nothing_found: str,
         nothing_there: str = "",
@@ -116,7 +116,7 @@ class ChoiceList(Vertical):
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         event.stop()
-        assert isinstance(event.option, Choice)
+        assert isinstance(event.option, ListChoice)
         self.post_message(self.Chosen(event.option.value))
 
     def _show_choices(self, query: str) -> None:

@@ -18,8 +18,8 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from pdtui.core.errors import PdtuiError
-from pdtui.core.fixed_keys import FIXED_KEYS
-from pdtui.driving.client import DriveConnection
+from pdtui.core.reserved_keys import KEY_TABLE
+from pdtui.driving.drive_client import DriveConnection
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -42,10 +42,10 @@ _ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 # A key that changes the run goes to the drive under its original name, whatever key the user gave it.
 # Each binding has an id, so that users can remap it.
 BINDINGS: list[Binding] = [
-    *(Binding(row.key, row.action or f"run_key('{row.key}')", row.says, id=row.id) for row in FIXED_KEYS),
+    *(Binding(row.key, row.action or f"run_key('{row.key}')", row.says, id=row.id) for row in KEY_TABLE),
     Binding("ctrl+c", "leave", "ends the drive and quits, always", id="quit_always", priority=True),
 ]
-_HINTS = {row.id: row.hint for row in sorted(FIXED_KEYS, key=lambda row: row.hint_rank) if row.hint}
+_HINTS = {row.id: row.hint for row in sorted(KEY_TABLE, key=lambda row: row.hint_rank) if row.hint}
 """Words of the key line by the bindings' ids, the most useful first."""
 
 
@@ -132,7 +132,7 @@ class DriveApp(App[str]):
         self.screen_stack[0].set_class(too_small, "-too-small")
 
     def set_keymap(self, keymap: Mapping[str, str]) -> None:
-        """Bind other keys, by the bindings' ids in `pdtui.core.fixed_keys`."""
+        """Bind other keys, by the bindings' ids in `pdtui.core.reserved_keys`."""
         super().set_keymap(dict(keymap))
         if self.is_running:
             self._show_keys()

@@ -13,7 +13,7 @@ from textual.binding import Binding
 
 from pdtui.core.printable_text import make_printable
 from pdtui.tui.cell_text import fit_cells
-from pdtui.tui.choice_list import Choice, ChoiceList, has_all_words
+from pdtui.tui.choice_list import ChoiceList, ListChoice, has_all_words
 from pdtui.tui.theme import STYLES, THEME
 
 if TYPE_CHECKING:
@@ -86,9 +86,9 @@ class MapPickerApp(App[MapPickerRow]):
             nothing_there="no maps here yet: dissect a policy first",
         )
 
-    def _find_rows(self, query: str) -> list[Choice]:
+    def _find_rows(self, query: str) -> list[ListChoice]:
         return [
-            Choice(_prompt(row), row, disabled=bool(row.problem))
+            ListChoice(_prompt(row), row, disabled=bool(row.problem))
             for row in self.rows
             if has_all_words(f"{row.robot} {row.title} {row.map_path} {row.policy}", query)
         ]

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.core.attributes import Attribute
-from pdtui.core.fixed_keys import RESERVED_KEYS
-from pdtui.dissection.attribute_movers import find_attribute_movers, movable_columns
+from pdtui.core.reserved_keys import RESERVED_KEYS
+from pdtui.dissection.attribute_movers import find_attribute_movers, movable_attribute_columns
 from pdtui.dissection.dissection_config import QUICK_DISSECTION
 from pdtui.dissection.draft_map import KeyAllocator
 from pdtui.probing.effect_probe import EffectProbe
@@ -33,7 +33,7 @@ def test_the_unit_that_is_wired_to_a_motor_moves_the_body_both_ways(wired_file: 
         )
         refined = prober.measure_units(chosen, (-4.0, 0.0, 4.0), starts[2:4], steps=16)
         plan = replace(QUICK_DISSECTION, mover_steps=18, mover_singles=3, mover_pairs=3)
-        columns = movable_columns(crew.robot.attributes, episodes)
+        columns = movable_attribute_columns(crew.robot.attributes, episodes)
         found = find_attribute_movers(prober, columns, spread, screen, refined, starts[4:], plan)
         assert found
         assert WIRED_MOTOR >= 0
@@ -62,7 +62,7 @@ def test_only_what_the_body_does_and_can_do_otherwise_is_steered() -> None:
     units = {"knee": "N m", "yaw": "rad"}
     attributes = [Attribute(name, units.get(name, "m/s"), wraps=name == "yaw") for name in series]
     episode = MonitoredEpisode(0, np.zeros((200, 1), np.float32), np.stack(list(series.values()), axis=1), "")
-    assert [attributes[column].name for column in movable_columns(attributes, [episode])] == [
+    assert [attributes[column].name for column in movable_attribute_columns(attributes, [episode])] == [
         "vx",
         "yaw",
         "pitch",

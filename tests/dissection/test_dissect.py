@@ -25,11 +25,11 @@ from pdtui.probing.primitive_confirmation import rank_correlation
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
 from pdtui.robots.robot_goals import WALKING_GOALS
-from pdtui.search.behavior_goals import measure_goal_gains, score_plans_by_goal
 from pdtui.search.behavior_search import BehaviorSearchResult, SearchStartStates
 from pdtui.search.controller_search import ControllerSearchResult
-from pdtui.search.plan_search import TimeBudget
-from pdtui.spectra.matching_presets import PRESETS, find_matching_preset, preset_values
+from pdtui.search.goal_scores import measure_goal_gains, score_plans_by_goal
+from pdtui.search.plan_search import SharedTimeBudget
+from pdtui.spectra.matching_presets import PRESETS, find_matching_preset, list_preset_values
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains
 from tests.small_dissection import SMALL
@@ -63,7 +63,7 @@ def test_summary_is_json_and_names_what_was_asked(dissection: Dissection, policy
 
 def test_summary_holds_every_setting_and_the_whole_match(dissection: Dissection) -> None:
     summary = summarise_dissection(dissection)
-    assert summary["settings"] == preset_values(PRESETS["paper"])
+    assert summary["settings"] == list_preset_values(PRESETS["paper"])
     assert summary["settings_changed"] == []
     keys = {"unit", "flaw", "discrepancy", "level_share", "rho", "rho_circular", "rho_disagree"}
     for attribute in summary["attributes"]:
@@ -216,7 +216,7 @@ magnitudes = {{ "0:3" = 9.5, "1:7" = -9.5 }}
     with RolloutPool("ant", policy_file, 1) as crew:
         starts = collect_start_states(crew.robot, crew.policy, 1200, 1, at=5, survive=20)
         searches = DissectionSearches(
-            EffectProbe(crew), crew.robot, effort, 1000, TimeBudget(None), lambda _: None, (known,)
+            EffectProbe(crew), crew.robot, effort, 1000, SharedTimeBudget(None), lambda _: None, (known,)
         )
         assert known in searches.probe_shared_candidates(SearchStartStates(tuple(starts), (), ())).plans
     path = tmp_path / "mine.toml"

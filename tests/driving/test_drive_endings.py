@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import PdtuiError
-from pdtui.driving import server
+from pdtui.driving import drive_server
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import ENDING_SIGNALS, catch_ending_signals
@@ -71,11 +71,11 @@ def test_an_exception_in_the_simulation_is_told_and_recorded(
         monkeypatch.setattr(loop.robot, "step", fails)
         return loop
 
-    monkeypatch.setattr(server, "build_loop", broken)
+    monkeypatch.setattr(drive_server, "build_control_loop", broken)
     monkeypatch.setattr(signal, "signal", lambda *_: None)  # they are this process's own
     path = tmp_path / "a.rrd"
     ours, theirs = Pipe()
-    server.serve_drive(theirs, DriveConfig("ant", small_map, 0, recording=str(path)))
+    drive_server.serve_drive(theirs, DriveConfig("ant", small_map, 0, recording=str(path)))
     messages = []
     while ours.poll():
         messages.append(ours.recv())

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pdtui.core.events import DriveEvent, group_events_by_step
+from pdtui.core.drive_events import DriveEvent, group_events_by_step
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.runtime.policy import Policy

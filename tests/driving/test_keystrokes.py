@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import KeystrokeError
-from pdtui.core.events import DriveEvent
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.keystrokes import (
     format_keystrokes,

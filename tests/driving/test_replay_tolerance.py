@@ -8,8 +8,8 @@ import sys
 
 CODE = """
 import torch
-from pdtui.driving.replay import replay_session
-from pdtui.policies.runtime.action_decoders import decoder_for
+from pdtui.driving.session_replay import replay_session
+from pdtui.policies.runtime.action_decoders import make_action_decoder
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.weights_file import find_weights_file, load_network
 from pdtui.stimulation.map_library import shipped_folder
@@ -19,7 +19,7 @@ noise = torch.Generator().manual_seed(4)
 with torch.no_grad():
     for weight in network.parameters():
         weight.mul_(1 + CHANGE * torch.randn(weight.shape, generator=noise))
-policy = Policy(network, network.spec.observations, decode=decoder_for(network))
+policy = Policy(network, network.spec.observations, decode=make_action_decoder(network))
 result = replay_session(shipped_folder("sessions") / "samples" / "ant.rrd", policy=policy, force=True)
 assert result.tolerance is not None or result.identical, result.environment
 print("passed" if result.passed else "failed")

@@ -12,9 +12,9 @@ from rich.console import Console
 from scipy import stats
 
 from pdtui.core.attributes import Floats
+from pdtui.core.confidence_intervals import confidence_interval
 from pdtui.core.errors import MapError, WorkerError
-from pdtui.core.intervals import confidence_interval
-from pdtui.core.text_tables import mean_with_interval
+from pdtui.core.text_tables import format_mean_with_interval
 from pdtui.core.units import Stimulation
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
@@ -114,8 +114,8 @@ def test_one_seed_gives_a_mean_without_an_interval(config: DriveConfig) -> None:
         console.print(tracking_table(result))
     assert "inf" not in shown.get()
     assert f"{result.error:.3f}" in shown.get()
-    assert mean_with_interval(1.0, 0.5, 1.25) == "1.00 [0.50, 1.25]"
-    assert mean_with_interval(1.0, float("-inf"), float("inf"), "+.1f") == "+1.0"
+    assert format_mean_with_interval(1.0, 0.5, 1.25) == "1.00 [0.50, 1.25]"
+    assert format_mean_with_interval(1.0, float("-inf"), float("inf"), "+.1f") == "+1.0"
 
 
 def test_tracking_measures_the_wrapped_error(config: DriveConfig) -> None:

@@ -72,7 +72,7 @@ def read_session_file(path: Path) -> None:
 
     from pdtui.cli.session_tables import session_comparison_table, session_table
     from pdtui.driving.keystrokes import format_keystrokes
-    from pdtui.driving.replay import config_from_session
+    from pdtui.driving.session_replay import config_from_session
     from pdtui.sessions.session_comparison import compare_sessions
     from pdtui.sessions.session_header import read_session_header
     from pdtui.sessions.session_reader import read_activations, read_session

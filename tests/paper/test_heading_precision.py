@@ -16,7 +16,12 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.paper.heading_precision import compare_heading_precision, paired_error_ratio
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.policies.weights.policy_loading import load_any_network
-from pdtui.search.tracking_drives import STEPS_EACH, TrackingDrive, TrackingDriveResult, TrackingDriveRunner
+from pdtui.search.tracking_drives import (
+    STEPS_EACH,
+    TrackingDriveJob,
+    TrackingDriveResult,
+    TrackingDriveRunner,
+)
 from pdtui.stimulation.map_reader import load_map
 from tests.real_viewer import RealViewer, is_blank
 from tests.turning_robot import turning_loop
@@ -50,7 +55,7 @@ pid = {{attribute = "yaw", kp = 20.0, ki = 0.01, kd = 0.0, limit = 3.5, step = 0
 def _followed(seed: int, errors: list[float]) -> TrackingDriveResult:
     table = np.array([errors])
     return TrackingDriveResult(
-        TrackingDrive("yaw", "hold", seed, (0.0,)), -table, table, (), bool(np.isnan(table).any())
+        TrackingDriveJob("yaw", "hold", seed, (0.0,)), -table, table, (), bool(np.isnan(table).any())
     )
 
 
@@ -82,7 +87,7 @@ def test_a_unit_steers_the_authors_policy_as_its_command_does(tmp_path: Path) ->
 def test_a_drive_counts_until_its_fall() -> None:
     with TrackingDriveRunner(turning_loop(kp=20.0, limit=4.0)) as runner:
         fell, held = runner.run(
-            [TrackingDrive("yaw", name, 100, (0.0, 1.2, 0.0)) for name in ("hold heading", "")]
+            [TrackingDriveJob("yaw", name, 100, (0.0, 1.2, 0.0)) for name in ("hold heading", "")]
         )
     assert fell.fell
     assert not held.fell

@@ -16,8 +16,12 @@ def read_entities(path: Path) -> dict[str, dict[str, list[Any]]]:
         batch = chunk.to_record_batch()
         columns = entities.setdefault(chunk.entity_path, {})
         for name in batch.schema.names:
-            if pa.types.is_list(batch.schema.field(name).type):
-                values = [value for row in batch.column(name).to_pylist() for value in row or []]
+            kind = batch.schema.field(name).type
+            if pa.types.is_list(kind):
+                # Files come as one array each: as lists, their millions of bytes would take minutes.
+                rows = batch.column(name).flatten()
+                is_file = pa.types.is_list(kind.value_type) and pa.types.is_uint8(kind.value_type.value_type)
+                values = [row.values.to_numpy() for row in rows] if is_file else rows.to_pylist()
                 columns.setdefault(name, []).extend(values)
     return entities
 

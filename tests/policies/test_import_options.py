@@ -7,7 +7,7 @@ import pytest
 from gymnasium import spaces
 
 from pdtui.core.errors import PolicyError
-from pdtui.policies.weights.import_options import ACTIVATION_NAMES, ImportOptions, WorldSpaces
+from pdtui.policies.weights.import_options import ACTIVATION_NAMES, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.policy_network import ACTIVATIONS
 
 
@@ -25,21 +25,21 @@ def test_a_choice_is_one_of_the_known() -> None:
 
 def test_spaces_are_read_from_gymnasium_s() -> None:
     seen = spaces.Box(-np.inf, np.inf, (2, 3))
-    bounded = WorldSpaces.of(
+    bounded = ObservationActionSpaces.of(
         "w", seen, spaces.Box(np.array([-1, -2], np.float32), np.array([3, 4], np.float32))
     )
-    assert bounded == WorldSpaces("w", 6, 2, (-1.0, -2.0), (3.0, 4.0), shape=(2, 3))
-    assert WorldSpaces.of("w", seen, spaces.Box(-np.inf, np.inf, (2,))) == WorldSpaces(
-        "w", 6, 2, shape=(2, 3)
-    )
-    assert WorldSpaces.of("w", seen, spaces.Discrete(4)) == WorldSpaces(
+    assert bounded == ObservationActionSpaces("w", 6, 2, (-1.0, -2.0), (3.0, 4.0), shape=(2, 3))
+    assert ObservationActionSpaces.of(
+        "w", seen, spaces.Box(-np.inf, np.inf, (2,))
+    ) == ObservationActionSpaces("w", 6, 2, shape=(2, 3))
+    assert ObservationActionSpaces.of("w", seen, spaces.Discrete(4)) == ObservationActionSpaces(
         "w", 6, 1, discrete_actions=4, shape=(2, 3)
     )
     with pytest.raises(PolicyError, match="expected observations of one shape"):
-        WorldSpaces.of("w", spaces.Dict(a=seen), spaces.Discrete(4))
+        ObservationActionSpaces.of("w", spaces.Dict(a=seen), spaces.Discrete(4))
     with pytest.raises(
         PolicyError,
         match=r"p: expected observations of shape \(6,\) and 4 discrete actions, as w has; the policy has "
         r"observations of shape \(6,\) and actions of shape \(4,\)",
     ):
-        WorldSpaces.of("w", seen, spaces.Discrete(4)).check("p", 6, 4, 0)
+        ObservationActionSpaces.of("w", seen, spaces.Discrete(4)).check("p", 6, 4, 0)

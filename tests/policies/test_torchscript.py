@@ -16,7 +16,7 @@ from pdtui.core.errors import PolicyError
 from pdtui.core.units import Stimulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.torchscript import is_torchscript, read_torchscript
-from pdtui.policies.weights.import_options import WorldSpaces
+from pdtui.policies.weights.import_options import ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from tests.small_worlds import (
     SIDE,
@@ -84,12 +84,12 @@ def test_a_recurrent_file_remembers_as_the_network(lstm_file: Path) -> None:
 
 
 def test_a_file_is_loaded_by_its_name_for_a_world(conv_file: Path, tmp_path: Path) -> None:
-    policy = load_policy(conv_file, "dot", spaces=WorldSpaces.of_world(Dot()))
+    policy = load_policy(conv_file, "dot", spaces=ObservationActionSpaces.of_world(Dot()))
     image, _ = Dot().reset(seed=1)
     np.testing.assert_array_equal(policy.act(image).action, dot_policy().act(image).action)
     network = _script(nn.Sequential(nn.Linear(1, 4), nn.Tanh(), nn.Linear(4, 3)), tmp_path / "three.pt")
     with pytest.raises(PolicyError, match="expected 1 outputs for 'pole', the network gives 3"):
-        load_policy(network, "pole", spaces=WorldSpaces.of_world(Pole()))
+        load_policy(network, "pole", spaces=ObservationActionSpaces.of_world(Pole()))
     with pytest.raises(PolicyError, match="TorchScript does not state shapes"):
         load_policy(network)
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pdtui.api import load_policy
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import MapError
-from pdtui.core.events import DriveEvent
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.robots import make_robot
 from pdtui.robots.anymal import DEFAULT_ANGLES, Anymal, AnymalForward

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pdtui.api import load_policy
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.core.robot_data import RobotState
+from pdtui.core.robot_links_and_state import RobotState
 from pdtui.core.units import NO_STIMULATION
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import drive_headless
@@ -22,7 +22,7 @@ from pdtui.probing.start_states import collect_start_states, measure_walk_length
 from pdtui.probing.stimulated_rollout import run_rollout
 from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
 from pdtui.robots.robot import Robot
-from pdtui.robots.task import RunTrace, Task, TaskVerdict
+from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
 from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.stimulation.map_reader import parse_map
@@ -110,7 +110,7 @@ def test_a_roll_out_ends_with_the_episode(robot: Sprinter) -> None:
 
 @pytest.mark.parametrize("walk", [5, 50])
 def test_a_task_is_judged_on_what_the_episode_has(robot: Sprinter, walk: int) -> None:
-    def judge(trace: RunTrace) -> TaskVerdict:
+    def judge(trace: TaskRunTrace) -> TaskVerdict:
         return TaskVerdict(not trace.fell, float(len(trace)), {})
 
     task = Task("run", "r", "runs", "any way", (walk, walk), 50, judge)

@@ -9,10 +9,10 @@ import pytest
 
 from pdtui.search.plan_search import (
     EvolutionarySearch,
+    EvolutionProblem,
     EvolutionSettings,
-    ScoringStage,
-    SearchProblem,
-    TimeBudget,
+    PlanScoringStage,
+    SharedTimeBudget,
     select_plans,
 )
 
@@ -32,7 +32,9 @@ class _Target:
         self.rng = np.random.default_rng(7)
         self.quick: list[int] = []
         self.full: list[int] = []
-        self.problem = SearchProblem(self._first, self._vary, self._quick, self._full, self._final, **limits)
+        self.problem = EvolutionProblem(
+            self._first, self._vary, self._quick, self._full, self._final, **limits
+        )
 
     def _first(self, round_: int) -> list[int]:
         return [0, 1] if round_ == 0 else []
@@ -60,7 +62,7 @@ def test_stages_pass_on_the_best_and_of_equals_the_first() -> None:
         seen.append(list(plans))
         return [plan % 10 for plan in plans]
 
-    ranked = select_plans([11, 23, 42, 33, 1], [ScoringStage(score, 3), ScoringStage(score, 2)])
+    ranked = select_plans([11, 23, 42, 33, 1], [PlanScoringStage(score, 3), PlanScoringStage(score, 2)])
     assert ranked == [(3, 23), (3, 33)]
     assert seen == [[11, 23, 42, 33, 1], [23, 33, 42]]
     assert select_plans([5, 6], []) == [(None, 5), (None, 6)]
@@ -94,7 +96,7 @@ def test_a_search_out_of_time_returns_the_best_of_its_first_plans() -> None:
 def test_a_time_budget_is_shared_by_the_searches_to_come(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 1000.0
     monkeypatch.setattr("pdtui.search.plan_search.time.monotonic", lambda: now)
-    budget = TimeBudget(1.0)
+    budget = SharedTimeBudget(1.0)
     first = budget.share(3)
     assert not first()
     now = 1020.0
@@ -105,4 +107,4 @@ def test_a_time_budget_is_shared_by_the_searches_to_come(monkeypatch: pytest.Mon
     assert not last()
     now = 1060.0
     assert last()
-    assert not TimeBudget(None).share()()
+    assert not SharedTimeBudget(None).share()()

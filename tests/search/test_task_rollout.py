@@ -12,7 +12,7 @@ from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
 from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
-from pdtui.robots.task import RunTrace, TaskVerdict, find_task
+from pdtui.robots.task import TaskRunTrace, TaskVerdict, find_task
 from pdtui.robots.walker import WALKER_TASKS
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
 
@@ -22,11 +22,11 @@ BIPED = ("vx", "height", "pitch")
 
 def _trace(
     names: tuple[str, ...], walked: list[list[float]], values: Floats, *, fell: bool = False
-) -> RunTrace:
-    return RunTrace([Attribute(name, "") for name in names], np.array(walked), values, fell)
+) -> TaskRunTrace:
+    return TaskRunTrace([Attribute(name, "") for name in names], np.array(walked), values, fell)
 
 
-def _walker(vx: Floats, right: Floats, left: Floats, *, fell: bool = False) -> RunTrace:
+def _walker(vx: Floats, right: Floats, left: Floats, *, fell: bool = False) -> TaskRunTrace:
     return _trace(WALKER, [[4.0, 0.0, 0.0]] * 200, np.stack((vx, right, left), axis=1), fell=fell)
 
 

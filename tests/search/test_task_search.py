@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from pdtui.cli import main
 from pdtui.probing.rollout_pool import RolloutPool
-from pdtui.search.plan_search import TimeBudget
+from pdtui.search.plan_search import SharedTimeBudget
 from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearch
 from pdtui.stimulation.map_reader import load_map
 
@@ -22,7 +22,7 @@ def test_what_is_found_scores_above_the_untouched_policy_and_is_found_again() ->
     for _ in range(2):
         with RolloutPool("bipedal_walker", "bipedal_walker", workers=1) as pool:
             search = TaskSearch(pool, pool.robot.find_task("jump"), 1000, settings)
-            results.append(search.run(TimeBudget(None).share()))
+            results.append(search.run(SharedTimeBudget(None).share()))
     first, again = results
     assert first.plan == again.plan
     assert first.verdicts == again.verdicts

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import torch
 
-from pdtui.core.events import DriveEvent
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.weights.policy_loading import load_policy

@@ -10,7 +10,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from pdtui.core.attributes import Floats
-from pdtui.core.events import DriveEvent
+from pdtui.core.drive_events import DriveEvent
 from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.episode_statistics import EpisodeStatistics, EpisodeStatisticsCounter
 from pdtui.sessions.session_reader import read_session

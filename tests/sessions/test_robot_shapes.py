@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pdtui.core.robot_data import Link
+from pdtui.core.robot_links_and_state import Link
 from pdtui.sessions.viewer.robot_shapes import RobotShapes
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)

@@ -4,7 +4,12 @@ import pytest
 from scipy.signal import get_window
 
 from pdtui.core.errors import PdtuiError
-from pdtui.spectra.matching_presets import PRESETS, find_matching_preset, preset_options, preset_values
+from pdtui.spectra.matching_presets import (
+    PRESETS,
+    allowed_preset_values,
+    find_matching_preset,
+    list_preset_values,
+)
 
 
 def test_presets_are_those_of_the_paper_and_of_its_code() -> None:
@@ -19,13 +24,13 @@ def test_unknown_preset_lists_those_there_are() -> None:
 
 
 def test_every_choice_can_be_set_and_is_kept() -> None:
-    for name, values in preset_options().items():
+    for name, values in allowed_preset_values().items():
         for value in values:
             text = [f"{name}={value}"] if name != "length" else [f"length={value}", "hop=1"]
             preset = find_matching_preset("paper", text if name != "hop" else ["hop=1"])
-            assert preset_values(preset).keys() == preset_options().keys()
+            assert list_preset_values(preset).keys() == allowed_preset_values().keys()
             if name != "hop":
-                assert preset_values(preset)[name] == value
+                assert list_preset_values(preset)[name] == value
 
 
 def test_what_differs_from_the_preset_is_named() -> None:
@@ -35,7 +40,7 @@ def test_what_differs_from_the_preset_is_named() -> None:
     assert str(find_matching_preset("authors")) == "authors"
 
 
-@pytest.mark.parametrize("name", preset_options()["window"])
+@pytest.mark.parametrize("name", allowed_preset_values()["window"])
 def test_windows_are_the_periodic_ones(name: str) -> None:
     preset = find_matching_preset("authors", [f"window={name}", "length=30"])
     expected = get_window({"rectangular": "boxcar"}.get(name, name), 30)

@@ -18,7 +18,7 @@ from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.training.policy_trainer import ActorScore, PolicyTrainer
 from pdtui.training.ppo_trainer import PpoTrainer
 from pdtui.training.robot_batch import TransitionBatch
-from pdtui.training.sac_learner import SacLearner, actor_forward
+from pdtui.training.sac_learner import SacLearner, run_actor
 from pdtui.training.sac_trainer import ReplayBuffer, SacTrainer
 from pdtui.training.training_config import PpoConfig, SacConfig
 
@@ -123,7 +123,7 @@ def test_sac_solves_a_bandit() -> None:
     replay.add(TransitionBatch(observation, action, reward, np.zeros(2000, np.float32), observation))
     for _ in range(20):
         state = learner.update(state, replay.sample(rng, 100, 64))
-    mean, _ = actor_forward(state.actor, jax.numpy.asarray(observation[:50]))
+    mean, _ = run_actor(state.actor, jax.numpy.asarray(observation[:50]))
     np.testing.assert_allclose(np.tanh(np.asarray(mean)), 0.6, atol=0.12)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pdtui.core.attributes import Attribute, BehaviorAim
-from pdtui.core.robot_data import Link
+from pdtui.core.robot_links_and_state import Link
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUnit
 from pdtui.stimulation.stimulation_map import Behavior, MotorPrimitive, PidGains, StimulationMap

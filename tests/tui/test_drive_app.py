@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import PdtuiError
-from pdtui.core.events import DriveEvent
-from pdtui.core.fixed_keys import RESERVED_KEYS
+from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.snapshot_builder import SnapshotBuilder

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from pdtui.core.drive_events import DriveEvent, describe_event
 from pdtui.core.errors import MapError
-from pdtui.core.events import DriveEvent, describe_event
-from pdtui.core.fixed_keys import EVENT_WORDINGS, FIXED_KEYS, RUN_KEYS, FixedKey
+from pdtui.core.reserved_keys import EVENT_WORDINGS, KEY_TABLE, RUN_KEYS, ReservedKey
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.keystrokes import interpret_key, list_drive_keys
 from pdtui.policies.runtime.policy import Policy
@@ -29,15 +29,15 @@ def driven(policy: Policy, small_map: StimulationMap) -> ControlLoop:
     return loop
 
 
-@pytest.mark.parametrize("row", FIXED_KEYS, ids=lambda row: row.id)
-def test_a_map_may_not_use_the_key(row: FixedKey, map_text: str) -> None:
+@pytest.mark.parametrize("row", KEY_TABLE, ids=lambda row: row.id)
+def test_a_map_may_not_use_the_key(row: ReservedKey, map_text: str) -> None:
     with pytest.raises(MapError, match=f"behavior 'twitch': key '{row.key}' is taken: it {row.says}"):
         parse_map(map_text.replace('key = "t"', f'key = "{row.key}"'), "small.toml")
 
 
 @pytest.mark.parametrize("row", RUN_KEYS.values(), ids=lambda row: row.id)
 def test_a_key_that_changes_a_run_makes_its_event(
-    row: FixedKey, driven: ControlLoop, small_map: StimulationMap
+    row: ReservedKey, driven: ControlLoop, small_map: StimulationMap
 ) -> None:
     event = interpret_key(row.key, driven)
     assert isinstance(event, DriveEvent)
@@ -59,5 +59,5 @@ async def test_the_help_lists_every_key_with_its_sentence(make_app: MakeApp) -> 
         await pilot.press("question_mark")
         assert isinstance(app.screen, HelpScreen)
         lines = [strip.text for strip in app.screen._compositor.render_strips()]
-    for row in FIXED_KEYS:
+    for row in KEY_TABLE:
         assert any(f" {displayed_key_name(row.key)} " in line and row.says in line for line in lines), row.id

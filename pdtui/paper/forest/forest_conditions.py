@@ -19,7 +19,7 @@ from pdtui.driving.loop_builder import build_control_loop
 from pdtui.paper.forest.forest_episode import (
     FOREST,
     ROUGH,
-    ForestEpisode,
+    ForestEpisodeScore,
     build_operator,
     drive_forest_episode,
     drive_with_random_keys,
@@ -91,7 +91,7 @@ def evaluate_forest(
         raise SessionError(f"{present[0]}: already exists; drives are recorded into a new folder")
     total, done = len(fit_seeds) + len(configs) * len(seeds), 0
     key_models: dict[str, KeyMotionModel] = {}
-    runs: dict[ForestCondition, list[ForestEpisode]] = {}
+    runs: dict[ForestCondition, list[ForestEpisodeScore]] = {}
 
     def tell(here: int, _: int) -> None:
         if progress is not None:
@@ -154,7 +154,7 @@ def _observe_keys(loops: _LoopCache, job: tuple[DriveConfig, int, int]) -> Obser
     return drive_with_random_keys(loops.loop(config, seed), steps)
 
 
-def _run_episode(loops: _LoopCache, job: _Episode) -> ForestEpisode:
+def _run_episode(loops: _LoopCache, job: _Episode) -> ForestEpisodeScore:
     config, seed, steps, key_models, folder = job
     loop = loops.loop(config, seed)
     operator = build_operator(loop, key_models) if key_models else None

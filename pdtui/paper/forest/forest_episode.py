@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.core.atomic_file import write_file
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import SessionError
-from pdtui.core.events import DriveEvent
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import make_key_events, run_episode
 from pdtui.driving.keystrokes import format_keystrokes
@@ -28,7 +28,7 @@ _STEPS_HELD = (30, 110)
 
 
 @dataclass(frozen=True)
-class ForestEpisode:
+class ForestEpisodeScore:
     """The score of one episode.
 
     Attributes:
@@ -54,7 +54,7 @@ def drive_forest_episode(
     steps: int,
     operator: ScriptedOperator | None = None,
     recorder: SessionRecorder | None = None,
-) -> tuple[ForestEpisode, tuple[DriveEvent, ...]]:
+) -> tuple[ForestEpisodeScore, tuple[DriveEvent, ...]]:
     """Drive one episode, up to a fall, the far end of the forest, or the last step; return score and events.
 
     The drive is before its first step. Without an operator no key is pressed; the caller closes the recorder.
@@ -86,7 +86,7 @@ def drive_forest_episode(
 
 def record_forest_episode(
     loop: ControlLoop, steps: int, operator: ScriptedOperator, path: Path, activations: ActivationsKept
-) -> ForestEpisode:
+) -> ForestEpisodeScore:
     """Run `drive_forest_episode` and record it like a person's drive, with a keystroke file beside it.
 
     Raises:
@@ -100,7 +100,7 @@ def record_forest_episode(
     return run
 
 
-def read_forest_episode(path: Path, robot: str, steps: int) -> tuple[ForestEpisode, str]:
+def read_forest_episode(path: Path, robot: str, steps: int) -> tuple[ForestEpisodeScore, str]:
     """Score the first episode of a recorded drive, up to the same end, and return its policy's name, too.
 
     Raises:
@@ -143,9 +143,9 @@ def _score(
     distances: Sequence[float],
     events: Sequence[DriveEvent],
     fell: bool,
-) -> ForestEpisode:
+) -> ForestEpisodeScore:
     pressed = [event.step for event in events if event.key]
-    return ForestEpisode(
+    return ForestEpisodeScore(
         seed,
         float(np.sum(rewards)),
         distances[-1],

@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Group
 
 from pdtui.core.text_tables import format_seed_range, new_table
-from pdtui.paper.forest.forest_episode import ForestEpisode
+from pdtui.paper.forest.forest_episode import ForestEpisodeScore
 from pdtui.paper.forest.key_motion_model import KeyMotionModel
 
 
@@ -42,7 +42,7 @@ class ForestConditionSummary:
     falls: int
     crossed: int
     episodes: int
-    runs: tuple[ForestEpisode, ...]
+    runs: tuple[ForestEpisodeScore, ...]
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class ForestExperimentResult:
 
 
 def summarise_condition(
-    condition: str, policy: str, runs: Sequence[ForestEpisode], repeats: int
+    condition: str, policy: str, runs: Sequence[ForestEpisodeScore], repeats: int
 ) -> ForestConditionSummary:
     """Return the figures of one condition; consecutive runs form a repeat."""
 

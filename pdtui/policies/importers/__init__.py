@@ -24,7 +24,12 @@ from pdtui.policies.importers.tensor_files import (
     read_torch_archive,
 )
 from pdtui.policies.importers.zip_archive import ZipArchive, read_file_bytes, shorten_name_list
-from pdtui.policies.weights.import_options import NO_NORMALISER, NO_OPTIONS, ImportOptions, WorldSpaces
+from pdtui.policies.weights.import_options import (
+    NO_NORMALISER,
+    NO_OPTIONS,
+    ImportOptions,
+    ObservationActionSpaces,
+)
 from pdtui.policies.weights.policy_network import PolicyNetwork
 
 FORMATS = (
@@ -36,7 +41,7 @@ FORMATS = (
 def import_network(
     path: Path,
     import_options: ImportOptions = NO_OPTIONS,
-    spaces: WorldSpaces | None = None,
+    spaces: ObservationActionSpaces | None = None,
     *,
     normaliser: Path | None = None,
 ) -> PolicyNetwork:

@@ -6,12 +6,17 @@ import torch
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.partial_policy import PartialPolicy
-from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions, WorldSpaces
+from pdtui.policies.weights.import_options import (
+    ACTIVATION_NAMES,
+    SQUASH_NAMES,
+    ImportOptions,
+    ObservationActionSpaces,
+)
 from pdtui.policies.weights.policy_network import Head, NetworkSpec, PolicyNetwork
 
 
 def assemble_network(
-    found: PartialPolicy, import_options: ImportOptions, spaces: WorldSpaces | None, source: str
+    found: PartialPolicy, import_options: ImportOptions, spaces: ObservationActionSpaces | None, source: str
 ) -> PolicyNetwork:
     """Return the network of a policy, completed by the options and the world's spaces.
 
@@ -52,7 +57,7 @@ def assemble_network(
     return network.eval()
 
 
-def _output_kind(found: PartialPolicy, spaces: WorldSpaces | None) -> str:
+def _output_kind(found: PartialPolicy, spaces: ObservationActionSpaces | None) -> str:
     """Return what the head's outputs are; the world's spaces decide where the file does not say."""
     if found.output != "unknown pair":
         return found.output
@@ -83,7 +88,7 @@ def _choose_head(
 
 
 def _action_bounds(
-    found: PartialPolicy, squash: str, spaces: WorldSpaces | None, actions: int, source: str
+    found: PartialPolicy, squash: str, spaces: ObservationActionSpaces | None, actions: int, source: str
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     if squash == "none":
         return (), ()

@@ -11,7 +11,7 @@ import torch
 
 from pdtui.core.errors import PolicyError
 from pdtui.policies.torchscript.pickle_reader import PickledObject, Storage, read_pickle
-from pdtui.policies.torchscript.torchscript_program import ScriptedModule, TorchScriptProgram
+from pdtui.policies.torchscript.torchscript_program import InterpretedModule, TorchScriptProgram
 
 _MAX_BYTES = 1 << 30
 """Unpacked bytes of an archive."""
@@ -71,7 +71,7 @@ def read_torchscript(path: Path) -> torch.nn.Module:
         if name.startswith("code/") and name.endswith(".py")
     }
     try:
-        return ScriptedModule(root, TorchScriptProgram(texts, tuple(constants)), {})
+        return InterpretedModule(root, TorchScriptProgram(texts, tuple(constants)), {})
     except (PolicyError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise PolicyError(f"{path}: {error}") from error
 

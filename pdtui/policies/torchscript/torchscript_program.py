@@ -67,11 +67,11 @@ class TorchScriptProgram:
             self._depth -= 1
 
 
-class ScriptedModule(nn.Module):
+class InterpretedModule(nn.Module):
     """A submodule of the archive, whose methods are interpreted."""
 
     def __init__(
-        self, pickled: PickledObject, program: TorchScriptProgram, built: dict[int, ScriptedModule]
+        self, pickled: PickledObject, program: TorchScriptProgram, built: dict[int, InterpretedModule]
     ) -> None:
         super().__init__()
         built[id(pickled)] = self
@@ -81,7 +81,7 @@ class ScriptedModule(nn.Module):
         for name, value in pickled.attributes.items():
             if isinstance(value, PickledObject):
                 known = built.get(id(value))
-                self.add_module(name, known or ScriptedModule(value, program, built))
+                self.add_module(name, known or InterpretedModule(value, program, built))
             elif isinstance(value, torch.Tensor) and value.is_floating_point():
                 self.register_parameter(name, nn.Parameter(value, requires_grad=False))
             elif isinstance(value, torch.Tensor):
@@ -182,7 +182,7 @@ class _StackFrame:
                 return _Function(_dotted_name(node))
             case ast.Attribute():
                 owner = self._evaluate(node.value)
-                if isinstance(owner, ScriptedModule):
+                if isinstance(owner, InterpretedModule):
                     return owner.read(node.attr)
             case ast.Call():
                 return self._call(node)
@@ -196,7 +196,7 @@ class _StackFrame:
             return None
         arguments = [self._evaluate(one) for one in node.args]
         keywords = {one.arg: self._evaluate(one.value) for one in node.keywords if one.arg is not None}
-        if name == "getattr" and isinstance(arguments[0], ScriptedModule):
+        if name == "getattr" and isinstance(arguments[0], InterpretedModule):
             return arguments[0].read(str(arguments[1]))
         if name in _CASTS:
             return _CASTS[name](*arguments)
@@ -209,7 +209,7 @@ class _StackFrame:
             return self._program.call(held or name, arguments, keywords)
         if isinstance(node.func, ast.Attribute) and not name.startswith("ops."):
             owner = self._evaluate(node.func.value)
-            if isinstance(owner, ScriptedModule):
+            if isinstance(owner, InterpretedModule):
                 method = node.func.attr
                 # Called as a module, so that hooks see the output; forward__0 is an overload.
                 if method.partition("__")[0] == "forward" and not keywords:

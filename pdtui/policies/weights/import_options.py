@@ -47,7 +47,7 @@ NO_OPTIONS = ImportOptions()
 
 
 @dataclass(frozen=True)
-class WorldSpaces:
+class ObservationActionSpaces:
     """The observations and actions of a world.
 
     Attributes:
@@ -68,7 +68,7 @@ class WorldSpaces:
     shape: tuple[int, ...] = ()
 
     @classmethod
-    def of(cls, owner: str, observation_space: Any, action_space: Any) -> WorldSpaces:
+    def of(cls, owner: str, observation_space: Any, action_space: Any) -> ObservationActionSpaces:
         """Return the description of Gymnasium's spaces, with flattened shapes.
 
         Observations that are not an array of numbers are a `PolicyError`.
@@ -88,7 +88,7 @@ class WorldSpaces:
         return cls(owner, observations, actions, tuple(low), tuple(high), shape=shape)
 
     @classmethod
-    def of_world(cls, world: Any) -> WorldSpaces:
+    def of_world(cls, world: Any) -> ObservationActionSpaces:
         """Return the description of a robot's spaces, as `of` does."""
         return cls.of(world.name, world.observation_space, world.action_space)
 

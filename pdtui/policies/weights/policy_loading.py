@@ -19,7 +19,12 @@ from pdtui.policies.runtime.action_decoders import (
 )
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.torchscript import is_torchscript, read_torchscript
-from pdtui.policies.weights.import_options import NO_NORMALISER, NO_OPTIONS, ImportOptions, WorldSpaces
+from pdtui.policies.weights.import_options import (
+    NO_NORMALISER,
+    NO_OPTIONS,
+    ImportOptions,
+    ObservationActionSpaces,
+)
 from pdtui.policies.weights.policy_file_lookup import find_file_beside
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import (
@@ -36,7 +41,7 @@ def load_policy(
     robot: str | None = None,
     *,
     import_options: ImportOptions = NO_OPTIONS,
-    spaces: WorldSpaces | None = None,
+    spaces: ObservationActionSpaces | None = None,
     folders: Sequence[Path] = (),
 ) -> Policy:
     """Load a weights file, or a shipped policy by its name.
@@ -71,7 +76,10 @@ def load_policy(
 
 
 def load_any_network(
-    path: Path, import_options: ImportOptions, spaces: WorldSpaces | None, folders: Sequence[Path] = ()
+    path: Path,
+    import_options: ImportOptions,
+    spaces: ObservationActionSpaces | None,
+    folders: Sequence[Path] = (),
 ) -> tuple[PolicyNetwork, str]:
     """Return the network of a file that pdtui or another program wrote, and its hash.
 
@@ -117,7 +125,7 @@ def _find_statistics(path: Path, import_options: ImportOptions, folders: Sequenc
 
 
 def convert_policy(
-    path: Path, output: Path, import_options: ImportOptions, spaces: WorldSpaces | None
+    path: Path, output: Path, import_options: ImportOptions, spaces: ObservationActionSpaces | None
 ) -> NetworkSpec:
     """Write a policy of another program as a safetensors file, and return the specification that it states.
 
@@ -134,7 +142,7 @@ def convert_policy(
 
 
 def load_torchscript_policy(
-    path: Path, spaces: WorldSpaces | None, import_options: ImportOptions = NO_OPTIONS
+    path: Path, spaces: ObservationActionSpaces | None, import_options: ImportOptions = NO_OPTIONS
 ) -> Policy:
     """Load a TorchScript network, whose output is the action or the logits of discrete actions.
 

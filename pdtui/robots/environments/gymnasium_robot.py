@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
-from pdtui.core.robot_data import RobotState
+from pdtui.core.robot_links_and_state import RobotState
 from pdtui.robots.environments import gymnasium_spaces
-from pdtui.robots.environments.actions_since_reset import ActionsSinceReset
+from pdtui.robots.environments.action_log import ActionLog
 from pdtui.robots.robot import ResetResult, Robot, StepResult
 from pdtui.robots.simulators import python_state
 
@@ -82,7 +82,7 @@ class GymnasiumRobot(Robot):
         self._observation: NDArray[Any] = np.zeros(self.observation_space.shape or (0,))
         self._seed = 0
         self._start = ""
-        self._actions = ActionsSinceReset(0)
+        self._actions = ActionLog(0)
         self._repeats: bool | None = None
 
     def make_world(self) -> gymnasium.Env[Any, Any]:
@@ -120,7 +120,7 @@ class GymnasiumRobot(Robot):
             self.env.close()
             self.env = self.make_world()
         self._start = self.check_start(str((options or {}).get("start", ""))) if self.starts else ""
-        self._actions, self.reward = ActionsSinceReset(int(np.prod(self.action_space.shape or (1,)))), 0.0
+        self._actions, self.reward = ActionLog(int(np.prod(self.action_space.shape or (1,)))), 0.0
         observation, self.info = self.env.reset(seed=self._seed, options=options)
         self._see(observation)
         return self.observe(), dict(self.info)
@@ -157,7 +157,7 @@ class GymnasiumRobot(Robot):
             return RobotState(self.name, self._actions.so_far(), (mark,), self.np_random.bit_generator.state)
         info, seen = gymnasium_spaces.numeric_entries(self.info), self._observation.copy()
         mine = {"reward": self.reward, "info": info, "seen": seen}
-        memory = {"environment": python_state.copy_state(self.env), "robot": mine}
+        memory = {"environment": python_state.copy_python_state(self.env), "robot": mine}
         state, extras = self._simulator_state()
         return RobotState(self.name, state, (mark, *extras), self.np_random.bit_generator.state, memory)
 
@@ -172,7 +172,7 @@ class GymnasiumRobot(Robot):
                 self.step(action)
         else:
             self._set_simulator_state(snapshot.state, snapshot.extras[1:])
-            python_state.restore_state(self.env, snapshot.memory["environment"])
+            python_state.restore_python_state(self.env, snapshot.memory["environment"])
             mine = snapshot.memory["robot"]
             self.reward, self.info, self._observation = mine["reward"], mine["info"], mine["seen"].copy()
         self.np_random.bit_generator.state = snapshot.rng

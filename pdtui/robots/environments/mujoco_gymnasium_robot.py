@@ -66,12 +66,14 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
         posed.qpos[:], posed.mocap_pos[:] = world.data.qpos, world.data.mocap_pos
         posed.mocap_quat[:] = world.data.mocap_quat
         mujoco.mj_kinematics(world.model, posed)
-        return mujoco_robot.body_poses(posed)
+        return mujoco_robot.read_body_poses(posed)
 
     def digest(self) -> int:
         if self._repeats:
             return super().digest()
-        return mujoco_robot.digest_simulator_state(mujoco_robot.read_state(self.world.model, self.world.data))
+        return mujoco_robot.digest_simulator_state(
+            mujoco_robot.read_mujoco_state(self.world.model, self.world.data)
+        )
 
     def _restored_apart(self) -> tuple[type, ...]:
         from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
@@ -81,11 +83,11 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
     def _simulator_state(self) -> tuple[Floats, tuple[Floats, ...]]:
         data = self.world.data
         derived = np.concatenate([getattr(data, name).ravel() for name in self._derived])
-        return mujoco_robot.read_state(self.world.model, data), (derived,)
+        return mujoco_robot.read_mujoco_state(self.world.model, data), (derived,)
 
     def _set_simulator_state(self, state: Floats, extras: tuple[Floats, ...]) -> None:
         data = self.world.data
-        mujoco_robot.write_state(self.world.model, data, state, self.name)
+        mujoco_robot.write_mujoco_state(self.world.model, data, state, self.name)
         done = 0
         for name in self._derived:
             values = getattr(data, name)

@@ -35,7 +35,7 @@ _MIN_HEIGHT, _MIN_UPRIGHT = 0.28, 0.5
 
 
 @dataclass(frozen=True)
-class LeggedMotion:
+class LeggedRobotState:
     """The state of n robots, as observations and rewards need it.
 
     Attributes:
@@ -70,7 +70,7 @@ class LeggedMotion:
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
-def compute_observations(motion: LeggedMotion, default_angles: Floats, commands: int) -> Floats:
+def compute_legged_observations(motion: LeggedRobotState, default_angles: Floats, commands: int) -> Floats:
     """Return what the policy observes, shape (n, 46 + commands).
 
     In this order: height, velocity × 2, angular velocity × 0.25, direction of gravity, the first `commands`
@@ -90,14 +90,14 @@ def compute_observations(motion: LeggedMotion, default_angles: Floats, commands:
     return clipped
 
 
-def has_fallen(motion: LeggedMotion) -> NDArray[np.bool_]:
+def has_fallen(motion: LeggedRobotState) -> NDArray[np.bool_]:
     """Return whether the trunk is on the ground or lies on its side, shape (n,)."""
     down: NDArray[np.bool_] = (motion.qpos[:, 2] < _MIN_HEIGHT) | (motion.up[:, 2] < _MIN_UPRIGHT)
     return down
 
 
-def compute_rewards(
-    motion: LeggedMotion, air_time: Floats, dt: float, target_height: float, default_angles: Floats
+def compute_legged_rewards(
+    motion: LeggedRobotState, air_time: Floats, dt: float, target_height: float, default_angles: Floats
 ) -> tuple[Floats, Floats]:
     """Return the rewards of a step and how long each foot has now been in the air, shapes (n,) and (n, 4).
 

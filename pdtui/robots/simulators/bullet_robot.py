@@ -16,7 +16,7 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError
-from pdtui.core.robot_data import RobotState
+from pdtui.core.robot_links_and_state import RobotState
 from pdtui.robots.legged.terrain import CELL, RoughGround
 from pdtui.robots.robot import Robot
 from pdtui.robots.simulators.python_state import digest_values

@@ -24,14 +24,14 @@ Read = Callable[[mujoco.MjData], float]
 
 
 @dataclass(frozen=True)
-class MeasuredAttribute:
+class AttributeReader:
     """An attribute, and the function that reads it from the simulator's data."""
 
     attribute: Attribute
     read: Read
 
 
-def find_model_attributes(model: mujoco.MjModel) -> tuple[MeasuredAttribute, ...]:
+def find_model_attributes(model: mujoco.MjModel) -> tuple[AttributeReader, ...]:
     """Return everything of a model that is worth measuring.
 
     The root is the heaviest moving tree of bodies. If it has a free joint, its attributes are ``vx``, ``vy``,
@@ -59,7 +59,7 @@ def _find_root(model: mujoco.MjModel) -> int:
     return max(moving, key=lambda body: float(model.body_subtreemass[body]), default=0)
 
 
-def _free_root(model: mujoco.MjModel, own: list[int]) -> list[MeasuredAttribute]:
+def _free_root(model: mujoco.MjModel, own: list[int]) -> list[AttributeReader]:
     if not own or model.jnt_type[own[0]] != _FREE:
         return []
     q, v = int(model.jnt_qposadr[own[0]]), int(model.jnt_dofadr[own[0]])
@@ -83,13 +83,13 @@ def _free_root(model: mujoco.MjModel, own: list[int]) -> list[MeasuredAttribute]
     ]
 
 
-def _planar_root(model: mujoco.MjModel, root: int, own: list[int]) -> list[MeasuredAttribute]:
+def _planar_root(model: mujoco.MjModel, root: int, own: list[int]) -> list[AttributeReader]:
     kinds = [int(model.jnt_type[joint]) for joint in own]
     # A slide after a hinge turns with it, and of two hinges neither is an angle against the world.
     ordered = kinds == sorted(kinds) and kinds.count(_HINGE) <= 1
     if _SLIDE not in kinds or not ordered or set(kinds) - {_SLIDE, _HINGE}:
         return []
-    found: list[MeasuredAttribute] = []
+    found: list[AttributeReader] = []
     horizontal: list[Read] = []
     for joint, kind in zip(own, kinds, strict=True):
         direction = rotate_vectors(model.body_quat[root], model.jnt_axis[joint])
@@ -115,7 +115,7 @@ def _planar_root(model: mujoco.MjModel, root: int, own: list[int]) -> list[Measu
     return [*found, _speed(horizontal)] if horizontal else found
 
 
-def _joint(model: mujoco.MjModel, joint: int) -> list[MeasuredAttribute]:
+def _joint(model: mujoco.MjModel, joint: int) -> list[AttributeReader]:
     label, kind = _label(model, joint), int(model.jnt_type[joint])
     q, v = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
     if kind == _HINGE:
@@ -130,7 +130,7 @@ def _joint(model: mujoco.MjModel, joint: int) -> list[MeasuredAttribute]:
     return [_measure("m", f"{label} {name}", _position(q + axis)) for axis, name in enumerate(_AXES)]
 
 
-def _motor(model: mujoco.MjModel, index: int) -> MeasuredAttribute:
+def _motor(model: mujoco.MjModel, index: int) -> AttributeReader:
     motor = model.actuator(index)
     turns, gear, label = False, 1.0, motor.name or f"motor {index}"
     if int(model.actuator_trntype[index]) in _JOINT_MOTORS:
@@ -143,11 +143,11 @@ def _motor(model: mujoco.MjModel, index: int) -> MeasuredAttribute:
 
     name, unit = (f"{label} torque", "N m") if turns else (f"{label} force", "N")
     largest = abs(gear * float(model.actuator_gainprm[index, 0]))
-    return MeasuredAttribute(Attribute(name, unit, scale=1.0 / largest if largest > 0 else 1.0), read)
+    return AttributeReader(Attribute(name, unit, scale=1.0 / largest if largest > 0 else 1.0), read)
 
 
-def _measure(unit: str, name: str, read: Read, wraps: bool = False) -> MeasuredAttribute:
-    return MeasuredAttribute(Attribute(name, unit, wraps=wraps), read)
+def _measure(unit: str, name: str, read: Read, wraps: bool = False) -> AttributeReader:
+    return AttributeReader(Attribute(name, unit, wraps=wraps), read)
 
 
 def _position(address: int, sign: float = 1.0, start: float = 0.0) -> Read:
@@ -158,12 +158,12 @@ def _velocity(address: int, sign: float = 1.0) -> Read:
     return lambda data: sign * float(data.qvel[address])
 
 
-def _angle(name: str, address: int, sign: float, start: float, limited: bool) -> MeasuredAttribute:
+def _angle(name: str, address: int, sign: float, start: float, limited: bool) -> AttributeReader:
     turned = _position(address, sign, start)
     return _measure("rad", name, turned if limited else lambda data: wrap_angle(turned(data)), not limited)
 
 
-def _speed(velocities: Sequence[Read]) -> MeasuredAttribute:
+def _speed(velocities: Sequence[Read]) -> AttributeReader:
     return _measure("m/s", "speed", lambda data: math.hypot(*(velocity(data) for velocity in velocities)))
 
 
@@ -172,7 +172,7 @@ def _label(model: mujoco.MjModel, joint: int) -> str:
     return name.removesuffix("_joint") or f"joint {joint}"
 
 
-def _number_duplicates(found: list[MeasuredAttribute]) -> tuple[MeasuredAttribute, ...]:
+def _number_duplicates(found: list[AttributeReader]) -> tuple[AttributeReader, ...]:
     """Append a number to each name that is there already, since names are addresses."""
     seen: Counter[str] = Counter()
     unique = []
@@ -181,5 +181,5 @@ def _number_duplicates(found: list[MeasuredAttribute]) -> tuple[MeasuredAttribut
         seen[attribute.name] += 1
         if (number := seen[attribute.name]) > 1:
             attribute = replace(attribute, name=f"{attribute.name} {number}")
-        unique.append(MeasuredAttribute(attribute, measured.read))
+        unique.append(AttributeReader(attribute, measured.read))
     return tuple(unique)

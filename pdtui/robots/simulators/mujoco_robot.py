@@ -13,7 +13,7 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
-from pdtui.core.robot_data import Link, RobotState
+from pdtui.core.robot_links_and_state import Link, RobotState
 from pdtui.robots.robot import Robot
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -56,15 +56,15 @@ def read_model_links(model: mujoco.MjModel) -> tuple[Link, ...]:
     return tuple(links)
 
 
-def read_state(model: mujoco.MjModel, data: mujoco.MjData) -> Floats:
+def read_mujoco_state(model: mujoco.MjModel, data: mujoco.MjData) -> Floats:
     """Return everything that the next physics step reads, shape (S,)."""
     state = np.empty(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, state, _STATE)
     return state
 
 
-def write_state(model: mujoco.MjModel, data: mujoco.MjData, state: Floats, owner: str) -> None:
-    """Restore what `read_state` returned, bit-exactly.
+def write_mujoco_state(model: mujoco.MjModel, data: mujoco.MjData, state: Floats, owner: str) -> None:
+    """Restore what `read_mujoco_state` returned, bit-exactly.
 
     Raises:
         RobotError: The state has another size; the message names `owner`.
@@ -100,14 +100,14 @@ def silence_warnings(data: mujoco.MjData) -> None:
         data.warning[index].number = _SILENT
 
 
-def body_poses(data: mujoco.MjData) -> Floats:
+def read_body_poses(data: mujoco.MjData) -> Floats:
     """Return the poses of all bodies but the world, from up-to-date kinematics, shape (B, 7)."""
     poses: Floats = np.concatenate((data.xpos[1:], data.xquat[1:]), axis=1)
     return poses
 
 
 def digest_simulator_state(state: Floats) -> int:
-    """Return a 63-bit digest of what `read_state` returned."""
+    """Return a 63-bit digest of what `read_mujoco_state` returned."""
     return int.from_bytes(blake2b(state.data, digest_size=8).digest(), "little") >> 1
 
 
@@ -127,7 +127,7 @@ def check_state_is_finite(data: mujoco.MjData, owner: str) -> None:
             )
 
 
-def motor_gears(model: mujoco.MjModel) -> dict[str, float]:
+def read_motor_gears(model: mujoco.MjModel) -> dict[str, float]:
     """Return the gear of every motor by the name of its joint: its torque for a command of 1, N m."""
     motors = (model.actuator(index) for index in range(model.nu))
     return {str(model.joint(int(motor.trnid[0])).name): float(motor.gear[0]) for motor in motors}
@@ -151,15 +151,15 @@ class MujocoRobot(Robot):
     def read_poses(self) -> Floats:
         # After a step, MuJoCo's poses are those of the state before the last physics step.
         mujoco.mj_kinematics(self.model, self.data)
-        return body_poses(self.data)
+        return read_body_poses(self.data)
 
     def snapshot(self) -> RobotState:
-        state = read_state(self.model, self.data)
+        state = read_mujoco_state(self.model, self.data)
         return RobotState(self.name, state, self._copy_arrays(), self.np_random.bit_generator.state)
 
     def restore(self, snapshot: RobotState) -> None:
         self._check_snapshot(snapshot)
-        write_state(self.model, self.data, snapshot.state, self.name)
+        write_mujoco_state(self.model, self.data, snapshot.state, self.name)
         self._restore_arrays(snapshot.extras)
         self.np_random.bit_generator.state = snapshot.rng
 

@@ -73,14 +73,14 @@ def has_uncopyable_attributes(env: gymnasium.Env[Any, Any], ignored: tuple[type,
     return any(not isinstance(value, ignored) and not is_plain_data(value) for value in values)
 
 
-def copy_state(env: gymnasium.Env[Any, Any]) -> PythonState:
+def copy_python_state(env: gymnasium.Env[Any, Any]) -> PythonState:
     """Return a copy of every plain attribute of an environment and its wrappers."""
     # Copied together, so that copies share what two attributes share.
     layers = enumerate(wrapper_layers(env))
     return copy.deepcopy({str(number): plain_attributes(layer) for number, layer in layers})
 
 
-def restore_state(env: gymnasium.Env[Any, Any], state: PythonState) -> None:
+def restore_python_state(env: gymnasium.Env[Any, Any], state: PythonState) -> None:
     """Put copied attributes back, and delete plain ones that were added since."""
     # Copy again, or the next step would change what the snapshot holds.
     kept = copy.deepcopy(state)

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from pdtui.core.attributes import Floats
-from pdtui.core.robot_data import Link
+from pdtui.core.robot_links_and_state import Link
 from pdtui.robots.geometry import multiply_quaternions
 
 

@@ -14,8 +14,8 @@ from pdtui.core.errors import SessionError
 from pdtui.core.untrusted_file import open_regular_file
 from pdtui.sessions.rrd import message_decoder as decoder
 from pdtui.sessions.rrd import message_framing as framing
-from pdtui.sessions.rrd.message_decoder import EntityChunk, StoreInfo
-from pdtui.sessions.rrd.message_framing import RESCUE, MessageFrame
+from pdtui.sessions.rrd.message_decoder import EntityChunk, RrdStoreInfo
+from pdtui.sessions.rrd.message_framing import RESCUE, RrdMessageSpan
 from pdtui.sessions.session_schema import APP
 
 T = TypeVar("T")
@@ -39,8 +39,8 @@ class ChunkStream:
 
     def __init__(self, path: Path, needed: Callable[[str], bool] | None = None) -> None:
         self._path, self._needed = path, needed
-        self._stores: list[StoreInfo] = []
-        self.store: StoreInfo | None = None
+        self._stores: list[RrdStoreInfo] = []
+        self.store: RrdStoreInfo | None = None
         self.finished = False
         self.skipped_rows: Counter[str] = Counter()
 
@@ -61,7 +61,7 @@ class ChunkStream:
             raise SessionError(f"{self._path}: {error}") from error
         self.require_store()
 
-    def require_store(self) -> StoreInfo:
+    def require_store(self) -> RrdStoreInfo:
         """Return the store of the recording; a file that announces none is a `SessionError`."""
         if self.store is None:
             raise SessionError(f"{self._path}: contains no recording")
@@ -78,7 +78,7 @@ class ChunkStream:
             elif frame.kind == framing.CHUNK and (chunk := self._read_chunk(file, frame)) is not None:
                 yield chunk
 
-    def _read_chunk(self, file: BinaryIO, frame: MessageFrame) -> EntityChunk | None:
+    def _read_chunk(self, file: BinaryIO, frame: RrdMessageSpan) -> EntityChunk | None:
         head = None if self._needed is None else decoder.read_chunk_head(file, frame, self.store)
         if head is None or self._needed is None or (head.store == self.store and self._needed(head.entity)):
             store, chunk = _decode_message(file, frame, decoder.decode_chunk)
@@ -89,7 +89,7 @@ class ChunkStream:
             raise SessionError(f"byte {frame.start}: rows of a recording that the file does not announce")
         return chunk if store == self.store else None
 
-    def _add_store(self, store: StoreInfo) -> None:
+    def _add_store(self, store: RrdStoreInfo) -> None:
         if store in self._stores:
             return
         if len(self._stores) == _MAX_STORES:
@@ -101,7 +101,7 @@ class ChunkStream:
             self.store = store
 
 
-def _decode_message(file: BinaryIO, frame: MessageFrame, read: Callable[[memoryview], T]) -> T:
+def _decode_message(file: BinaryIO, frame: RrdMessageSpan, read: Callable[[memoryview], T]) -> T:
     if frame.length > decoder.MAX_MESSAGE:
         raise SessionError(
             f"byte {frame.start}: expected a message of at most {decoder.MAX_MESSAGE >> 20} MiB"

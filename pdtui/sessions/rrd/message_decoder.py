@@ -13,8 +13,8 @@ from typing import BinaryIO, NamedTuple
 import pyarrow as pa
 
 from pdtui.sessions.rrd.arrow_checks import read_batch_header, read_record_batch
-from pdtui.sessions.rrd.message_framing import MessageFrame
-from pdtui.sessions.rrd.protobuf_fields import Value, bytes_field, number_field, read_fields, text_field
+from pdtui.sessions.rrd.message_framing import RrdMessageSpan
+from pdtui.sessions.rrd.protobuf_reader import Value, bytes_field, number_field, read_fields, text_field
 
 MAX_MESSAGE = 256 << 20
 """Largest size of a message, bytes, compressed or not. A batch of 1000 steps of 4096 units takes 16 MB."""
@@ -33,7 +33,7 @@ _SHORTEST_MATCH = 4
 _IPC_PREFIX = struct.Struct("<II")
 
 
-class StoreInfo(NamedTuple):
+class RrdStoreInfo(NamedTuple):
     """The store, in Rerun's terms, of a message: a recording or a blueprint, and what program wrote it."""
 
     is_recording: bool
@@ -52,17 +52,17 @@ class EntityChunk(NamedTuple):
 class ChunkHead(NamedTuple):
     """What a chunk's message begins with: whose rows it holds and how many."""
 
-    store: StoreInfo
+    store: RrdStoreInfo
     entity: str
     rows: int
 
 
-def decode_store_info(payload: memoryview) -> StoreInfo:
+def decode_store_info(payload: memoryview) -> RrdStoreInfo:
     """Return the store that a message announces."""
     return _decode_store(read_fields(bytes_field(read_fields(payload), 2)), 2)
 
 
-def decode_chunk(payload: memoryview) -> tuple[StoreInfo, EntityChunk]:
+def decode_chunk(payload: memoryview) -> tuple[RrdStoreInfo, EntityChunk]:
     """Decode a message that contains rows."""
     message = read_fields(payload)
     if number_field(message, 4) != _ARROW_IPC:
@@ -75,15 +75,15 @@ def decode_chunk(payload: memoryview) -> tuple[StoreInfo, EntityChunk]:
     return _decode_store(message), EntityChunk(metadata[_ENTITY_PATH].decode(), timelines, batch)
 
 
-def _decode_store(message: dict[int, Value], field: int = 1) -> StoreInfo:
+def _decode_store(message: dict[int, Value], field: int = 1) -> RrdStoreInfo:
     return _decode_store_bytes(bytes(bytes_field(message, field)))
 
 
 @lru_cache(maxsize=32)
-def _decode_store_bytes(store: bytes) -> StoreInfo:
+def _decode_store_bytes(store: bytes) -> RrdStoreInfo:
     found = read_fields(memoryview(store))
     application = text_field(read_fields(bytes_field(found, 3)), 1)
-    return StoreInfo(number_field(found, 1) == 1, text_field(found, 2), application)
+    return RrdStoreInfo(number_field(found, 1) == 1, text_field(found, 2), application)
 
 
 def _unpack_payload(message: dict[int, Value], *, whole: bool = True) -> pa.Buffer:
@@ -100,7 +100,7 @@ def _unpack_payload(message: dict[int, Value], *, whole: bool = True) -> pa.Buff
     return pa.decompress(packed, size, codec="lz4_raw")
 
 
-def read_chunk_head(file: BinaryIO, frame: MessageFrame, own: StoreInfo | None) -> ChunkHead | None:
+def read_chunk_head(file: BinaryIO, frame: RrdMessageSpan, own: RrdStoreInfo | None) -> ChunkHead | None:
     """Read the head of a chunk; None if it cannot be told, so that the whole message has to be decoded.
 
     The chunks of stores other than `own` are given without an entity.

@@ -28,7 +28,7 @@ _SEED = 7850921  # prescribed by the format: the letters of RERUN as digits of b
 _BLOCK = 1 << 20
 
 
-class MessageFrame(NamedTuple):
+class RrdMessageSpan(NamedTuple):
     """The place of a complete message.
 
     Attributes:
@@ -57,7 +57,7 @@ def check_rrd_start(file: BinaryIO) -> None:
         raise SessionError("byte 9: cannot be read as a recording: expected messages in protobuf")
 
 
-def read_message_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
+def read_message_frames(file: BinaryIO, size: int) -> Iterator[RrdMessageSpan]:
     """Yield the messages of a file of this size in their order; its position may be changed in between.
 
     If the last message is cut off or a length is wrong, the complete messages before it are yielded first.
@@ -69,7 +69,7 @@ def read_message_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
         if len(header) < _HEADER.size:
             raise _torn_error(place, f"{len(header)} bytes of a message's header are left")
         kind, length = _HEADER.unpack(header)
-        frame = MessageFrame(kind, place + _HEADER.size, length)
+        frame = RrdMessageSpan(kind, place + _HEADER.size, length)
         if kind >= _KINDS:
             raise _torn_error(place, f"expected the header of a message, found kind {kind}")
         if frame.end > size:
@@ -82,7 +82,7 @@ def read_message_frames(file: BinaryIO, size: int) -> Iterator[MessageFrame]:
         place = frame.end
 
 
-def check_rrd_end(file: BinaryIO, last: MessageFrame) -> None:
+def check_rrd_end(file: BinaryIO, last: RrdMessageSpan) -> None:
     """Check that the last message, an index of the others, has the checksum in the trailer."""
     file.seek(last.start)
     digest, left = xxh32(seed=_SEED), last.length

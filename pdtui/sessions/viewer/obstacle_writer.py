@@ -9,7 +9,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.core.robot_data import NO_OBSTACLES
+from pdtui.core.robot_links_and_state import NO_OBSTACLES
 from pdtui.core.step_record import StepRecord
 from pdtui.sessions.session_schema import OBSTACLES, OBSTACLES_ABOVE
 from pdtui.sessions.viewer.viewer_curves import LogStatic, SendRows

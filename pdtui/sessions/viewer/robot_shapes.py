@@ -10,7 +10,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.core.robot_data import Link
+from pdtui.core.robot_links_and_state import Link
 from pdtui.robots.geometry import capsule_ends, compute_link_poses
 from pdtui.sessions.writer.arrow_columns import ComponentColumn, vector_list_column
 

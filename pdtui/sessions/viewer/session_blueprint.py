@@ -29,7 +29,7 @@ _MARGIN = 0.08
 
 
 @dataclass(frozen=True)
-class DriveContent:
+class BlueprintContent:
     """What a blueprint has to lay out.
 
     Attributes:
@@ -51,10 +51,10 @@ class DriveContent:
     begun: bool = False
 
 
-BEGUN = DriveContent(begun=True)
+BEGUN = BlueprintContent(begun=True)
 
 
-def session_blueprint(info: DriveInfo, content: DriveContent = BEGUN) -> rrb.Blueprint:
+def session_blueprint(info: DriveInfo, content: BlueprintContent = BEGUN) -> rrb.Blueprint:
     """Lay out robot, path and keys on the left, stimulation in the middle, measurements on the right."""
     columns = [
         (4, _lay_out_robot(info, content)),
@@ -69,7 +69,7 @@ def session_blueprint(info: DriveInfo, content: DriveContent = BEGUN) -> rrb.Blu
     )
 
 
-def _lay_out_robot(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
+def _lay_out_robot(info: DriveInfo, content: BlueprintContent) -> rrb.Vertical:
     keys = rrb.TextLogView(
         contents=[schema.EVENTS, schema.ENDINGS],
         name="Keys and events",
@@ -109,7 +109,7 @@ def _lay_out_robot(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
     return rrb.Vertical(robot, rrb.Horizontal(above, keys, column_shares=[3, 4]), row_shares=[3, 2])
 
 
-def _path_bounds(content: DriveContent) -> rrb.VisualBounds2D | None:
+def _path_bounds(content: BlueprintContent) -> rrb.VisualBounds2D | None:
     """Return the bounds of the whole path, so that the view does not move during playback."""
     if content.path is None:
         return None
@@ -120,7 +120,7 @@ def _path_bounds(content: DriveContent) -> rrb.VisualBounds2D | None:
     )
 
 
-def _lay_out_stimulation(content: DriveContent) -> rrb.Vertical | None:
+def _lay_out_stimulation(content: BlueprintContent) -> rrb.Vertical | None:
     rows: list[tuple[int, rrb.View]] = []
     if content.begun or content.magnitudes:
         behaviors = rrb.StateTimelineView(origin=schema.BEHAVIORS, name="Behaviors", time_view=_time_axis())
@@ -145,7 +145,7 @@ def _lay_out_stimulation(content: DriveContent) -> rrb.Vertical | None:
     return rrb.Vertical(*(view for _, view in rows), row_shares=[share for share, _ in rows])
 
 
-def _lay_out_measurements(info: DriveInfo, content: DriveContent) -> rrb.Vertical:
+def _lay_out_measurements(info: DriveInfo, content: BlueprintContent) -> rrb.Vertical:
     """Lay out one plot per physical unit, with targets beside their attributes."""
     target_attributes = BehaviorColorLegend(info).target_attributes
     plots = []

@@ -22,7 +22,7 @@ from pdtui.sessions.viewer.activation_heat_map import ActivationHeatMap
 from pdtui.sessions.viewer.behavior_legend import BehaviorColorLegend
 from pdtui.sessions.viewer.obstacle_writer import ObstacleWriter
 from pdtui.sessions.viewer.robot_shapes import RobotShapes
-from pdtui.sessions.viewer.session_blueprint import DriveContent
+from pdtui.sessions.viewer.session_blueprint import BlueprintContent
 from pdtui.sessions.viewer.viewer_curves import Color, LogStatic, SendRows, ViewerCurves
 from pdtui.sessions.writer.arrow_columns import number_list_column, polyline_column, text_column
 
@@ -136,10 +136,10 @@ class ViewerDataWriter:
             self._log_static(HEAT_MAP, rr.Tensor(picture, dim_names=("unit", "time")))
             self._heat_drawn = True
 
-    def content(self) -> DriveContent:
+    def content(self) -> BlueprintContent:
         """Return what the blueprint has to lay out so far."""
         low, high = self._bounds
-        return DriveContent(
+        return BlueprintContent(
             units=len(self._units.keys),
             units_left_out=self._left_out,
             targets=self._targets.keys,

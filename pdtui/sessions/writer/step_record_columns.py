@@ -11,7 +11,7 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
-from pdtui.core.events import DriveEvent, describe_event
+from pdtui.core.drive_events import DriveEvent, describe_event
 from pdtui.core.step_record import ActiveBehavior, StepRecord
 from pdtui.sessions.session_schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION, ActivationsKept
 from pdtui.sessions.writer.arrow_columns import (

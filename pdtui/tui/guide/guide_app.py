@@ -15,7 +15,7 @@ from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
 from pdtui.guide.guide_pages import GUIDE_FOLDER, GuidePage, search_guide
-from pdtui.tui.choice_list import Choice, ChoiceList, has_all_words
+from pdtui.tui.choice_list import ChoiceList, ListChoice, has_all_words
 from pdtui.tui.guide.guide_viewer import GuideViewer, link_to_line
 from pdtui.tui.style_sheets import WIDTHS
 from pdtui.tui.theme import STYLES, THEME
@@ -127,7 +127,7 @@ class GuideApp(App[None]):
             await self.query_one(GuideViewer).follow(f"{topics[place]}.md")
 
     @work
-    async def _choose(self, title: str, find_choices: Callable[[str], Iterable[Choice]]) -> None:
+    async def _choose(self, title: str, find_choices: Callable[[str], Iterable[ListChoice]]) -> None:
         target = await self.push_screen_wait(GuideChooser(title, find_choices))
         if target is not None:
             await self.query_one(GuideViewer).follow(target)
@@ -138,7 +138,7 @@ class GuideChooser(ModalScreen[str | None]):
 
     BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "closes the list", id="guide_close")]
 
-    def __init__(self, title: str, find_choices: Callable[[str], Iterable[Choice]]) -> None:
+    def __init__(self, title: str, find_choices: Callable[[str], Iterable[ListChoice]]) -> None:
         super().__init__()
         self._title, self._find_choices = title, find_choices
 
@@ -155,9 +155,9 @@ class GuideChooser(ModalScreen[str | None]):
         self.dismiss(event.value)
 
 
-def _choice(text: str, place: str, target: str) -> Choice:
+def _choice(text: str, place: str, target: str) -> ListChoice:
     """Return the choice of a link; the place, which may be empty, is its second line."""
     prompt = Text(text, STYLES.text, no_wrap=True, overflow="ellipsis")
     if place:
         prompt.append(f"\n  {place}", STYLES.muted)
-    return Choice(prompt, target)
+    return ListChoice(prompt, target)

@@ -9,7 +9,7 @@ from textual.reactive import reactive
 from textual.strip import Strip
 
 from pdtui.core.attributes import Floats
-from pdtui.core.robot_data import NO_OBSTACLES
+from pdtui.core.robot_links_and_state import NO_OBSTACLES
 from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.robots.geometry import capsule_ends, compute_link_poses, root_body_row, rotate_vectors
 from pdtui.tui.braille_canvas import BrailleCanvas

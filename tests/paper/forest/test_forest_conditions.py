@@ -18,7 +18,7 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import drive_headless
 from pdtui.driving.keystrokes import read_keystrokes
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.driving.replay import replay_session
+from pdtui.driving.session_replay import replay_session
 from pdtui.paper.forest.forest_conditions import PERSON, REPEATS, evaluate_forest
 from pdtui.paper.forest.forest_episode import (
     build_operator,

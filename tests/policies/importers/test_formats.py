@@ -21,11 +21,11 @@ from safetensors.torch import save_file
 from torch import nn
 
 from pdtui.core.errors import PolicyError
-from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, WorldSpaces
+from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import convert_policy, load_policy
 
 Draw = Callable[[int], NDArray[np.float32]]
-BOUNDS = WorldSpaces("world", 5, 2, (-2.0, -1.0), (2.0, 3.0))
+BOUNDS = ObservationActionSpaces("world", 5, 2, (-2.0, -1.0), (2.0, 3.0))
 TANH = ImportOptions("tanh")
 
 
@@ -105,7 +105,9 @@ def test_discrete_logits_choose(tmp_path: Path, observations: Draw) -> None:
     actor, path = mlp(5, 6, 3), tmp_path / "agent.pt"
     tensors = {f"actor.{name}": tensor for name, tensor in actor.state_dict().items()}
     torch.save(tensors | {f"critic.{name}": t for name, t in mlp(5, 6, 1).state_dict().items()}, path)
-    policy = load_policy(path, import_options=TANH, spaces=WorldSpaces("world", 5, 1, discrete_actions=3))
+    policy = load_policy(
+        path, import_options=TANH, spaces=ObservationActionSpaces("world", 5, 1, discrete_actions=3)
+    )
     agree(policy, lambda x: actor(x).argmax().reshape(1).float(), observations(5))
     rng, observation = np.random.default_rng(0), observations(5)[0]
     drawn = np.bincount([int(policy.act(observation, rng=rng).action[0]) for _ in range(4000)], minlength=3)
@@ -165,7 +167,9 @@ def test_rllib_ppo_is_a_pair_or_logits_as_the_world_says(tmp_path: Path, observa
     low, high = torch.tensor(BOUNDS.low), torch.tensor(BOUNDS.high)
     agree(pair, lambda x: torch.clamp(chain(x)[:2], low, high), observations(5))
     logits = load_policy(
-        tmp_path / "ppo.npz", import_options=TANH, spaces=WorldSpaces("world", 5, 1, discrete_actions=4)
+        tmp_path / "ppo.npz",
+        import_options=TANH,
+        spaces=ObservationActionSpaces("world", 5, 1, discrete_actions=4),
     )
     agree(logits, lambda x: chain(x).argmax().reshape(1).float(), observations(5))
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
-from pdtui.policies.weights.import_options import ImportOptions, WorldSpaces
+from pdtui.policies.weights.import_options import ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_pool import RolloutPool
@@ -22,7 +22,7 @@ from pdtui.robots.ant import Ant
 
 Reference = Callable[[str], Path]
 Draw = Callable[[int], NDArray[np.float32]]
-ANT = WorldSpaces("Ant with contact forces", 111, 8, (-1.0,) * 8, (1.0,) * 8)
+ANT = ObservationActionSpaces("Ant with contact forces", 111, 8, (-1.0,) * 8, (1.0,) * 8)
 
 
 def _forward(
@@ -89,7 +89,9 @@ def test_the_a1_is_a_plain_chain_with_statistics(reference: Reference, observati
     path, statistics = reference("quadrupedal.npz"), reference("quadrupedal_obs_normalizer.npz")
     import_options = ImportOptions("tanh", "tanh", str(statistics))
     policy = load_policy(
-        path, import_options=import_options, spaces=WorldSpaces("A1", 93, 6, (-1.0,) * 6, (1.0,) * 6)
+        path,
+        import_options=import_options,
+        spaces=ObservationActionSpaces("A1", 93, 6, (-1.0,) * 6, (1.0,) * 6),
     )
     assert (policy.shape, policy.layers) == ((93,), (256,) * 4)
     names = ["base.seq_fcs.0", "base.seq_fcs.2", *(f"seq_append_fcs.{number}" for number in (0, 2, 4))]

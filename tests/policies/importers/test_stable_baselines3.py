@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 
 from pdtui.core.errors import PolicyError
-from pdtui.policies.weights.import_options import ImportOptions, WorldSpaces
+from pdtui.policies.weights.import_options import ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.policies.weights.policy_network import PolicyNetwork
 
@@ -65,7 +65,7 @@ def test_continuous_actions_are_those_of_predict(
 
 def test_discrete_actions_are_those_of_predict(tmp_path: Path, observations: Draw) -> None:
     model, path = saved(tmp_path, "PPO", "CartPole-v1", activation_fn=torch.nn.ReLU)
-    policy = load_policy(path, spaces=WorldSpaces("CartPole-v1", 4, 1, discrete_actions=2))
+    policy = load_policy(path, spaces=ObservationActionSpaces("CartPole-v1", 4, 1, discrete_actions=2))
     chosen = []
     for observation in observations(4):
         expected, _ = model.predict(observation, deterministic=True)
@@ -197,7 +197,7 @@ def test_shapes_of_another_world_are_named(tmp_path: Path) -> None:
         match=r"expected observations of shape \(27,\) and actions of shape \(8,\), as ant has; the policy "
         r"has observations of shape \(3,\) and actions of shape \(1,\)",
     ):
-        load_policy(path, spaces=WorldSpaces("ant", 27, 8))
+        load_policy(path, spaces=ObservationActionSpaces("ant", 27, 8))
 
 
 def test_other_algorithms_say_what_they_are(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ JUMPS = ("reset", "rewind")
 
 
 @dataclass(frozen=True)
-class FixedKey:
+class ReservedKey:
     """A key with the same meaning for every map, which therefore no map may use.
 
     Attributes:
@@ -50,30 +50,30 @@ class FixedKey:
     hint_rank: int = 0
 
 
-FIXED_KEYS = (
-    FixedKey("target_up", "up", "raises the target", "target", 1),
-    FixedKey("target_down", "down", "lowers the target", "target", -1),
-    FixedKey("target_left", "left", "turns the target left", "target", 1),
-    FixedKey("target_right", "right", "turns the target right", "target", -1),
-    FixedKey(
+KEY_TABLE = (
+    ReservedKey("target_up", "up", "raises the target", "target", 1),
+    ReservedKey("target_down", "down", "lowers the target", "target", -1),
+    ReservedKey("target_left", "left", "turns the target left", "target", 1),
+    ReservedKey("target_right", "right", "turns the target right", "target", -1),
+    ReservedKey(
         "stronger", "plus", "strengthens the latched behavior", "factor", 1, hint="stronger", hint_rank=6
     ),
-    FixedKey("weaker", "minus", "weakens the latched behavior", "factor", -1, hint="weaker", hint_rank=7),
-    FixedKey("reset", "r", "starts the next episode", "reset", hint="reset", hint_rank=4),
-    FixedKey("rewind", "backspace", "rewinds by three seconds", "rewind", hint="rewind", hint_rank=5),
-    FixedKey("pause", "p", "pauses or resumes", action="pace('pause')", hint="pause", hint_rank=2),
-    FixedKey("step", "n", "runs a single control step", action="pace('step')", hint="step", hint_rank=8),
-    FixedKey("slower", "comma", "halves the speed", action="pace('slower')", hint="slower", hint_rank=9),
-    FixedKey(
+    ReservedKey("weaker", "minus", "weakens the latched behavior", "factor", -1, hint="weaker", hint_rank=7),
+    ReservedKey("reset", "r", "starts the next episode", "reset", hint="reset", hint_rank=4),
+    ReservedKey("rewind", "backspace", "rewinds by three seconds", "rewind", hint="rewind", hint_rank=5),
+    ReservedKey("pause", "p", "pauses or resumes", action="pace('pause')", hint="pause", hint_rank=2),
+    ReservedKey("step", "n", "runs a single control step", action="pace('step')", hint="step", hint_rank=8),
+    ReservedKey("slower", "comma", "halves the speed", action="pace('slower')", hint="slower", hint_rank=9),
+    ReservedKey(
         "faster", "full_stop", "doubles the speed", action="pace('faster')", hint="faster", hint_rank=10
     ),
-    FixedKey(
+    ReservedKey(
         "view", "v", "switches between side view and top view", action="toggle_view", hint="view", hint_rank=3
     ),
-    FixedKey("help", "question_mark", "shows all keys", action="help", hint="help", hint_rank=0),
-    FixedKey("quit", "q", "ends the drive and quits", action="leave", hint="quit", hint_rank=1),
+    ReservedKey("help", "question_mark", "shows all keys", action="help", hint="help", hint_rank=0),
+    ReservedKey("quit", "q", "ends the drive and quits", action="leave", hint="quit", hint_rank=1),
 )
-RUN_KEYS = {row.key: row for row in FIXED_KEYS if row.event is not None}
+RUN_KEYS = {row.key: row for row in KEY_TABLE if row.event is not None}
 """Keys that change a run, by Textual's name."""
-RESERVED_KEYS = {row.key: row.says for row in FIXED_KEYS}
+RESERVED_KEYS = {row.key: row.says for row in KEY_TABLE}
 """What each key that no map may use does, by Textual's name."""

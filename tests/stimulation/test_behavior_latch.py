@@ -10,7 +10,7 @@ import pytest
 from pdtui.core.attributes import Attribute
 from pdtui.core.errors import KeystrokeError, RobotError
 from pdtui.core.units import Stimulation
-from pdtui.stimulation.latch import Latch
+from pdtui.stimulation.behavior_latch import BehaviorLatch
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.pid_magnitude import PidMagnitude
 from pdtui.stimulation.stimulation_map import PidGains, StimulationMap
@@ -20,15 +20,15 @@ AT_REST = np.zeros(2)
 
 
 @pytest.fixture
-def latch(small_map: StimulationMap) -> Latch:
-    return Latch(small_map, (16, 16), ATTRIBUTES, 0.05)
+def latch(small_map: StimulationMap) -> BehaviorLatch:
+    return BehaviorLatch(small_map, (16, 16), ATTRIBUTES, 0.05)
 
 
-def _names(latch: Latch) -> list[str]:
+def _names(latch: BehaviorLatch) -> list[str]:
     return [view.name for view in latch.active]
 
 
-def test_a_latched_behavior_overwrites_until_the_default_key(latch: Latch) -> None:
+def test_a_latched_behavior_overwrites_until_the_default_key(latch: BehaviorLatch) -> None:
     assert latch.stimulate(AT_REST).units == ()
     latch.latch_behavior("push", AT_REST)
     for _ in range(100):
@@ -39,13 +39,13 @@ def test_a_latched_behavior_overwrites_until_the_default_key(latch: Latch) -> No
     assert latch.stimulate(AT_REST).units == ()
 
 
-def test_another_key_ends_a_behavior(latch: Latch) -> None:
+def test_another_key_ends_a_behavior(latch: BehaviorLatch) -> None:
     latch.latch_behavior("push", AT_REST)
     latch.latch_behavior("hold heading", AT_REST)
     assert _names(latch) == ["hold heading"]
 
 
-def test_behaviors_that_the_map_allows_run_together(latch: Latch) -> None:
+def test_behaviors_that_the_map_allows_run_together(latch: BehaviorLatch) -> None:
     latch.latch_behavior("push", AT_REST)
     latch.latch_behavior("twitch", AT_REST)
     assert _names(latch) == ["push", "twitch"]
@@ -54,7 +54,7 @@ def test_behaviors_that_the_map_allows_run_together(latch: Latch) -> None:
     assert _names(latch) == ["twitch", "push"]
 
 
-def test_a_period_ends_a_behavior(latch: Latch) -> None:
+def test_a_period_ends_a_behavior(latch: BehaviorLatch) -> None:
     latch.latch_behavior("twitch", AT_REST)
     seen = []
     while latch.active:
@@ -64,7 +64,7 @@ def test_a_period_ends_a_behavior(latch: Latch) -> None:
     assert seen == list(range(10, 0, -1))
 
 
-def test_the_factor_scales_the_outputs(latch: Latch) -> None:
+def test_the_factor_scales_the_outputs(latch: BehaviorLatch) -> None:
     latch.latch_behavior("push", AT_REST)
     latch.set_factor("push", 0.5)
     assert latch.stimulate(AT_REST).values == (-1.0, 1.0)
@@ -72,7 +72,7 @@ def test_the_factor_scales_the_outputs(latch: Latch) -> None:
         latch.set_factor("twitch", 2.0)
 
 
-def test_a_target_starts_at_the_present_value_and_moves(latch: Latch) -> None:
+def test_a_target_starts_at_the_present_value_and_moves(latch: BehaviorLatch) -> None:
     latch.latch_behavior("hold heading", np.array([0.0, 0.7]))
     view = latch.active[0]
     assert view.target == 0.7
@@ -82,7 +82,7 @@ def test_a_target_starts_at_the_present_value_and_moves(latch: Latch) -> None:
     assert latch.active == ()
 
 
-def test_errors_name_what_there_is(latch: Latch) -> None:
+def test_errors_name_what_there_is(latch: BehaviorLatch) -> None:
     with pytest.raises(KeystrokeError, match="no behavior 'fly'; available: push, twitch, hold heading"):
         latch.latch_behavior("fly", AT_REST)
     latch.latch_behavior("push", AT_REST)
@@ -92,10 +92,10 @@ def test_errors_name_what_there_is(latch: Latch) -> None:
 
 def test_an_attribute_that_the_robot_lacks_is_named_at_once(small_map: StimulationMap) -> None:
     with pytest.raises(RobotError, match=r"behavior 'hold heading': no attribute 'yaw'; available: vy"):
-        Latch(small_map, (16, 16), ATTRIBUTES[:1], 0.05)
+        BehaviorLatch(small_map, (16, 16), ATTRIBUTES[:1], 0.05)
 
 
-def test_a_saved_state_repeats_itself(latch: Latch) -> None:
+def test_a_saved_state_repeats_itself(latch: BehaviorLatch) -> None:
     values = np.column_stack([np.zeros(30), np.linspace(0.0, 0.5, 30)])
     latch.latch_behavior("hold heading", AT_REST)
     latch.set_target("hold heading", 1.0)
@@ -124,7 +124,7 @@ def test_pid_is_that_of_the_textbook() -> None:
 
 def test_a_controllers_output_is_added_to_its_base(map_text: str) -> None:
     text = map_text.replace('mode = "pid"', 'mode = "pid"\nbase = { "0:5" = 0.5, "1:1" = -2.0 }')
-    latch = Latch(parse_map(text, "m"), (16, 16), ATTRIBUTES, 0.05)
+    latch = BehaviorLatch(parse_map(text, "m"), (16, 16), ATTRIBUTES, 0.05)
     latch.latch_behavior("hold heading", AT_REST)
     assert latch.stimulate(AT_REST) == Stimulation((5, 17), (0.5, -2.0))
     latch.set_target("hold heading", 0.2)

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from pdtui.core.errors import PdtuiError, SessionError
-from pdtui.driving.client import DriveClient
+from pdtui.driving.drive_client import DriveClient
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
-from pdtui.driving.replay import replay_session
+from pdtui.driving.session_replay import replay_session
 from pdtui.policies.weights.weights_file import hash_file
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_repair import examine_session

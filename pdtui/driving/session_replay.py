@@ -10,8 +10,8 @@ import numpy as np
 from torch import nn
 
 from pdtui.core.attributes import Floats
+from pdtui.core.drive_events import group_events_by_step
 from pdtui.core.errors import PdtuiError, SessionError
-from pdtui.core.events import group_events_by_step
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
@@ -20,9 +20,9 @@ from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
 from pdtui.sessions.environment_versions import collect_versions, list_version_differences
 from pdtui.sessions.session_comparison import (
-    AttributeDeviation,
-    attribute_differences,
-    measure_spread,
+    ReplayDeviation,
+    absolute_attribute_differences,
+    measure_attribute_spread,
     summarise_deviations,
 )
 from pdtui.sessions.session_reader import Session, read_session
@@ -69,7 +69,7 @@ class ReplayResult:
     environment: tuple[str, ...]
     total: int = 0
     dt: float = 0.0
-    deviations: tuple[AttributeDeviation, ...] = ()
+    deviations: tuple[ReplayDeviation, ...] = ()
     agreed: int = 0
     tolerance: float | None = None
     judged: int = 0
@@ -165,7 +165,7 @@ def replay_session(
         first, changes, stopped = _compare_steps(session, loop, progress)
     here = collect_versions()
     elsewhere = bool(list_version_differences(session.versions, here, numeric=True)) and not strict
-    spread = measure_spread(session.attributes)
+    spread = measure_attribute_spread(session.attributes)
     outside = np.flatnonzero((changes > tolerance * spread).any(axis=1))
     agreed = (first or 0) + (int(outside[0]) if outside.size else len(changes))
     deviations = (
@@ -208,7 +208,9 @@ def _compare_steps(
             first = step
         if first is not None:
             changes.append(
-                attribute_differences(record.attributes, session.attributes[step], session.info.attributes)
+                absolute_attribute_differences(
+                    record.attributes, session.attributes[step], session.info.attributes
+                )
             )
         if progress is not None:
             progress(step + 1, session.steps)
@@ -220,7 +222,7 @@ def _compare_steps(
     return first, np.array(changes).reshape(-1, len(session.info.attributes)), stopped
 
 
-def _detail(deviations: tuple[AttributeDeviation, ...]) -> str:
+def _detail(deviations: tuple[ReplayDeviation, ...]) -> str:
     if not deviations:
         return "the simulator's state differs, but no attribute does"
     worst = deviations[0]

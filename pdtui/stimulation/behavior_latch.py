@@ -28,7 +28,7 @@ class _LatchedBehavior:
         return replace(self, controller=deepcopy(self.controller))
 
 
-class Latch:
+class BehaviorLatch:
     """The state machine that turns latched behaviors into stimulations.
 
     Args:

@@ -43,9 +43,9 @@ class DriveConnection(Protocol):
 def _simulate(connection: Connection, config: DriveConfig) -> None:
     # The recording library would print over the screen when the disk is full or a viewer has gone.
     os.environ.setdefault("RUST_LOG", "off")
-    from pdtui.driving import server  # loads torch and the simulator, which the screen does without
+    from pdtui.driving import drive_server  # loads torch and the simulator, which the screen does without
 
-    server.serve_drive(connection, config)
+    drive_server.serve_drive(connection, config)
 
 
 class DriveClient(DriveConnection):

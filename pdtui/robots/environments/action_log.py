@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from pdtui.core.attributes import Floats
 
 
-class ActionsSinceReset:
+class ActionLog:
     """An append-only array of actions, so that what `so_far` returned never changes and shares its memory."""
 
     def __init__(self, width: int) -> None:

@@ -85,7 +85,7 @@ def test_a_module_that_the_user_named_is_imported(tmp_path: Path) -> None:
 
 def test_a_module_that_is_imported_already_is_looked_up(tmp_path: Path) -> None:
     (tmp_path / "things.py").write_text(MODULE)
-    code = "import things; from pdtui.robots import check_robot; print(check_robot('things:Thing-v0'))"
+    code = "import things; from pdtui.robots import resolve_robot_name as r; print(r('things:Thing-v0'))"
     assert run_python(code, tmp_path).stdout == "things:Thing-v0\n"
 
 
@@ -158,7 +158,7 @@ import gymnasium
 import numpy as np
 
 from pdtui.core.attributes import Attribute, BehaviorAim
-from pdtui.core.robot_data import Link, RobotState
+from pdtui.core.robot_links_and_state import Link, RobotState
 from pdtui.robots.robot import Robot
 from pdtui.robots.robot_goals import BehaviorGoal, RobotGoals
 from pdtui.robots.task import Task, TaskVerdict
@@ -221,8 +221,8 @@ USES = """
 import sys
 from pathlib import Path
 {prepare}
-from pdtui.robots import check_robot, make_robot, robot_names
-assert check_robot("iron-cart") in robot_names()
+from pdtui.robots import resolve_robot_name, make_robot, robot_names
+assert resolve_robot_name("iron-cart") in robot_names()
 assert not {{"gymnasium", "mujoco"}} & set(sys.modules)
 import numpy as np
 from pdtui.core.units import NO_STIMULATION
@@ -230,7 +230,7 @@ from pdtui.dissection.dissect import dissect
 from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import drive_headless
-from pdtui.driving.loop_builder import build_loop
+from pdtui.driving.loop_builder import build_control_loop
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
 from pdtui.stimulation.map_library import bare_map
@@ -239,7 +239,7 @@ from tests.small_dissection import SMALL
 robot, policy = make_robot("iron-cart"), load_policy(weights, "iron-cart")
 assert robot.training_recipe.settings["total_steps"] == 64
 assert policy.layers == (4, 4)
-loop = build_loop(DriveConfig("iron-cart", bare_map("iron-cart", str(weights)), 3, start="moving"))
+loop = build_control_loop(DriveConfig("iron-cart", bare_map("iron-cart", str(weights)), 3, start="moving"))
 assert drive_headless(loop, {{}}, 40, None).steps == 40
 (verdict,) = judge_stimulations(robot, policy, robot.find_task("run"), [TimedStimulation()], 0)
 assert list(verdict.figures) == ["way (m)"]

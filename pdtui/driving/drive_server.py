@@ -13,8 +13,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from pdtui.core.drive_events import DriveEvent, group_events_by_step
 from pdtui.core.errors import PdtuiError, SessionError, format_error_in_one_line
-from pdtui.core.events import DriveEvent, group_events_by_step
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig

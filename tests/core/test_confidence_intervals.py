@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pdtui.core.intervals import bootstrap_interval
+from pdtui.core.confidence_intervals import bootstrap_interval
 
 
 def test_bootstrap_interval() -> None:

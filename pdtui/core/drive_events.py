@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pdtui.core.fixed_keys import EVENT_WORDINGS, JUMPS, EventKind
+from pdtui.core.reserved_keys import EVENT_WORDINGS, JUMPS, EventKind
 
 
 @dataclass(frozen=True)
