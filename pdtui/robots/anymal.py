@@ -56,8 +56,8 @@ class Anymal(MujocoRobot):
 
     The observation has 49 numbers, or 47 with the forward command alone; see
     `compute_legged_observations`. The 12 actions move the targets of the joints' PD controllers by 0.5 rad
-    each around the default. The reward is that of following the commands; see `compute_legged_rewards`. An episode
-    ends when the trunk is on the ground or on its side.
+    each around the default. The reward is that of following the commands; see `compute_legged_rewards`. An
+    episode ends when the trunk is on the ground or on its side.
 
     Attributes:
         commands: Those of `COMMANDS` that the policy observes, m/s and rad/s.

@@ -107,8 +107,8 @@ assert values["torque"] == 1.5, values
 observed = robot.observe()
 assert np.allclose([np.cos(values["angle"]), np.sin(values["angle"])], observed[:2], atol=1e-6), values
 assert np.isclose(values["angular velocity"], observed[2]), values
-from pdtui.robots.geometry import capsule_ends, place_links
-tip = capsule_ends(robot.links, place_links(robot.links, robot.read_poses()))[0, 1]
+from pdtui.robots.geometry import capsule_ends, compute_link_poses
+tip = capsule_ends(robot.links, compute_link_poses(robot.links, robot.read_poses()))[0, 1]
 assert np.allclose(tip, [np.sin(values["angle"]), 0, 1.2 + np.cos(values["angle"])]), tip
 snapshot = robot.snapshot()
 ahead = [robot.step(np.array([-1.0], np.float32))[1] for _ in range(20)]
@@ -221,8 +221,8 @@ USES = """
 import sys
 from pathlib import Path
 {prepare}
-from pdtui.robots import resolve_robot_name, make_robot, robot_names
-assert resolve_robot_name("iron-cart") in robot_names()
+from pdtui.robots import resolve_robot_name, make_robot, list_robot_names
+assert resolve_robot_name("iron-cart") in list_robot_names()
 assert not {{"gymnasium", "mujoco"}} & set(sys.modules)
 import numpy as np
 from pdtui.core.units import NO_STIMULATION
@@ -233,19 +233,18 @@ from pdtui.driving.headless_drive import drive_headless
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
-from pdtui.stimulation.map_library import bare_map
+from pdtui.stimulation.map_library import map_without_behaviors
 from tests.small_dissection import SMALL
 {train}
 robot, policy = make_robot("iron-cart"), load_policy(weights, "iron-cart")
 assert robot.training_recipe.settings["total_steps"] == 64
 assert policy.layers == (4, 4)
-loop = build_control_loop(DriveConfig("iron-cart", bare_map("iron-cart", str(weights)), 3, start="moving"))
-assert drive_headless(loop, {{}}, 40, None).steps == 40
-(verdict,) = judge_stimulations(robot, policy, robot.find_task("run"), [TimedStimulation()], 0)
-assert list(verdict.figures) == ["way (m)"]
-found = dissect(DissectionConfig(robot, policy, episodes=1, settings=SMALL, budget_minutes=0.0))
-assert [one.goal.name for one in found.behaviors] == ["rush"] and not found.controllers
-print("whole")
+loop = build_control_loop(DriveConfig("iron-cart", map_without_behaviors("iron-cart", str(weights)), 3,
+start="moving")) assert drive_headless(loop, {{}}, 40, None).steps == 40 (verdict,) =
+judge_stimulations(robot, policy, robot.find_task("run"), [TimedStimulation()], 0) assert
+list(verdict.figures) == ["way (m)"] found = dissect(DissectionConfig(robot, policy, episodes=1,
+settings=SMALL, budget_minutes=0.0)) assert [one.goal.name for one in found.behaviors] == ["rush"] and not
+found.controllers print("whole")
 """
 
 
