@@ -18,27 +18,27 @@ OPTIONAL_ROOMS = ("pdtui.benchmarks", "pdtui.paper", "pdtui.training")
 class LazyCommandGroup(click.Group):
     """Imports a command's module when the command is used, and prints expected errors as one line.
 
-    `lazy_commands` gives for each command where it is ("package.module:attribute") and its summary.
+    `summaries` gives the summary of each command NAME, which is `NAME_command` in `pdtui.cli.NAME_command`.
     """
 
-    def __init__(self, *, lazy_commands: Mapping[str, tuple[str, str]], **arguments: Any) -> None:
+    def __init__(self, *, summaries: Mapping[str, str], **arguments: Any) -> None:
         super().__init__(**arguments)
-        self._lazy_commands = lazy_commands
+        self._summaries = summaries
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
-        return list(self._lazy_commands)
+        return list(self._summaries)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
-        if cmd_name not in self._lazy_commands:
+        if cmd_name not in self._summaries:
             return None
-        command = resolve_name(self._lazy_commands[cmd_name][0])
+        command = resolve_name(f"pdtui.cli.{cmd_name}_command:{cmd_name}_command")
         assert isinstance(command, click.Command)
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List names and summaries without importing the commands."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, summary) for name, (_, summary) in self._lazy_commands.items()])
+            formatter.write_dl(list(self._summaries.items()))
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; a `PdtuiError` becomes one line and exit code 1, a traceback means a bug."""

@@ -11,13 +11,7 @@ from typing import Any
 import click
 
 from pdtui.cli.replay_command import replay_options
-from pdtui.cli.shared_options import (
-    FILE_PATH,
-    json_option,
-    overwrite_option,
-    print_result,
-    progress_bar,
-)
+from pdtui.cli.shared_options import FILE_PATH, json_option, overwrite_option, print_result, progress_bar
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.printable_text import make_printable, to_json
@@ -166,9 +160,7 @@ def repair_command(file: Path, output: Path | None, in_place: bool) -> None:
 @sessions_command.command()
 @_file_argument
 @click.option(
-    "--stream",
-    metavar="NAME",
-    help="Stream to export. Without --stream and --keys, the streams are listed.",
+    "--stream", metavar="NAME", help="Stream to export. Without --stream and --keys, the streams are listed."
 )
 @click.option(
     "-o", "--output", type=FILE_PATH, metavar="FILE.parquet|.csv", help="File to write the stream into."

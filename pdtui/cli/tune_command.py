@@ -74,12 +74,7 @@ def tune_command(
     config = build_drive_config(str(path), None, policy, import_options, force=force)
     with progress_bar("tuning", quiet=as_json) as advance:
         results = tune_gains(
-            config,
-            behaviors,
-            seeds,
-            settings=TuningSettings(**settings),
-            workers=workers,
-            progress=advance,
+            config, behaviors, seeds, settings=TuningSettings(**settings), workers=workers, progress=advance
         )
     better = {one.behavior: one.new for one in results if one.better}
     if better and not dry_run:

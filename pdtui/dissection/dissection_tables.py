@@ -152,7 +152,7 @@ def dissection_remarks(summary: dict[str, Any]) -> list[str]:
     confirmed = sum(bool(one["first_match"] and one["first_match"]["confirmed"]) for one in attributes)
     lines = [
         f"The first match is a hit for {hits} of {len(attributes)} attributes, and probing confirms it for "
-        f"{confirmed}. The dissection took {summary['rollouts']} roll-outs and {summary['minutes']:.1f} min.",
+        f"{confirmed}. The dissection took {summary['rollouts']} roll-outs and {summary['minutes']:.1f} min."
     ]
     if summary["shortened"]:
         lines.append(summary["shortened"])

@@ -1,7 +1,5 @@
 """Robots by name. Importing this room loads no simulator."""
 
-from __future__ import annotations
-
 from pdtui.robots.robot_registry import (
     list_robot_names,
     make_robot,

@@ -2,16 +2,7 @@
 
 from __future__ import annotations
 
-BEHAVIOR_COLORS = (
-    "#f0a45d",
-    "#58c4dc",
-    "#b6e36b",
-    "#e879c6",
-    "#ffe07a",
-    "#8ea8ff",
-    "#5ee0b0",
-    "#ff8a80",
-)
+BEHAVIOR_COLORS = ("#f0a45d", "#58c4dc", "#b6e36b", "#e879c6", "#ffe07a", "#8ea8ff", "#5ee0b0", "#ff8a80")
 """By row in the map, modulo their number; they differ in lightness as well as in hue."""
 
 

@@ -1,7 +1,5 @@
 """The style sheets, which lay out the screens by the size of the terminal."""
 
-from __future__ import annotations
-
 # The screen has a class from this many columns or lines on.
 WIDTHS = [(0, "-narrow"), (110, "-wide"), (150, "-full")]
 HEIGHTS = [(0, "-low"), (36, "-tall")]

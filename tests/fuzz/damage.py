@@ -105,12 +105,7 @@ def _damaged_inside(draw: DrawFn, payload: bytes) -> bytes:
     except (ValueError, OSError, pa.ArrowException):
         return draw(damaged(Content(payload)))
     changed = draw(damaged(Content(plain)))
-    parts = [
-        _field(1, bytes_field(found, 1)),
-        b"\x10\x01",
-        b"\x20\x01",
-        _field(5, memoryview(changed)),
-    ]
+    parts = [_field(1, bytes_field(found, 1)), b"\x10\x01", b"\x20\x01", _field(5, memoryview(changed))]
     return b"".join(parts)
 
 

@@ -49,10 +49,7 @@ def reader(map_path: Path) -> Iterator[Reader]:
 
 @pytest.mark.parametrize(
     ("kind", "count"),
-    [
-        *SUITE.items(),
-        *(pytest.param(kind, count, marks=pytest.mark.slow) for kind, count in LONG.items()),
-    ],
+    [*SUITE.items(), *(pytest.param(kind, count, marks=pytest.mark.slow) for kind, count in LONG.items())],
 )
 def test_damaged_files_are_read_or_refused(
     kind: str,

@@ -239,12 +239,14 @@ from tests.small_dissection import SMALL
 robot, policy = make_robot("iron-cart"), load_policy(weights, "iron-cart")
 assert robot.training_recipe.settings["total_steps"] == 64
 assert policy.layers == (4, 4)
-loop = build_control_loop(DriveConfig("iron-cart", map_without_behaviors("iron-cart", str(weights)), 3,
-start="moving")) assert drive_headless(loop, {{}}, 40, None).steps == 40 (verdict,) =
-judge_stimulations(robot, policy, robot.find_task("run"), [TimedStimulation()], 0) assert
-list(verdict.figures) == ["way (m)"] found = dissect(DissectionConfig(robot, policy, episodes=1,
-settings=SMALL, budget_minutes=0.0)) assert [one.goal.name for one in found.behaviors] == ["rush"] and not
-found.controllers print("whole")
+alone = map_without_behaviors("iron-cart", str(weights))
+loop = build_control_loop(DriveConfig("iron-cart", alone, 3, start="moving"))
+assert drive_headless(loop, {{}}, 40, None).steps == 40
+(verdict,) = judge_stimulations(robot, policy, robot.find_task("run"), [TimedStimulation()], 0)
+assert list(verdict.figures) == ["way (m)"]
+found = dissect(DissectionConfig(robot, policy, episodes=1, settings=SMALL, budget_minutes=0.0))
+assert [one.goal.name for one in found.behaviors] == ["rush"] and not found.controllers
+print("whole")
 """
 
 

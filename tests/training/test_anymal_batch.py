@@ -30,10 +30,7 @@ def test_a_world_moves_as_a_robot_alone_does() -> None:
 
 
 def test_a_restored_state_goes_on_the_same() -> None:
-    worlds, other = (
-        AnymalBatch(AnymalForward(), 6, 0, 40),
-        AnymalBatch(AnymalForward(), 6, 9, 40),
-    )
+    worlds, other = (AnymalBatch(AnymalForward(), 6, 0, 40), AnymalBatch(AnymalForward(), 6, 9, 40))
     for actions in _actions(15, 6):
         worlds.step(actions)
     other.restore(worlds.state())

@@ -15,8 +15,7 @@ def text_of(canvas: BrailleCanvas) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("x", "y", "character"),
-    [(0, 0, "⠁"), (1, 0, "⠈"), (0, 1, "⠂"), (1, 2, "⠠"), (0, 3, "⡀"), (1, 3, "⢀")],
+    ("x", "y", "character"), [(0, 0, "⠁"), (1, 0, "⠈"), (0, 1, "⠂"), (1, 2, "⠠"), (0, 3, "⡀"), (1, 3, "⢀")]
 )
 def test_each_dot_of_a_cell(x: int, y: int, character: str) -> None:
     canvas = BrailleCanvas(1, 1)

@@ -69,10 +69,7 @@ def a1_map(tmp_path_factory: pytest.TempPathFactory) -> Path:
     network = PolicyNetwork(spec)
     network.load_tensors(
         {name: tensor * 0 for name, tensor in network.state_dict().items()}
-        | {
-            "head.weight": network.head.weight.detach() * 0.02,
-            "normaliser.std": network.normaliser.std,
-        }
+        | {"head.weight": network.head.weight.detach() * 0.02, "normaliser.std": network.normaliser.std}
     )
     weights = folder / "stands.safetensors"
     save_network(weights, network)

@@ -272,9 +272,7 @@ FILES: dict[str, tuple[Callable[[], bytes], str]] = {
         r"found convolutions: conv\.weight \(2, 3, 4, 4\); export such a network as TorchScript",
     ),
     "two chains": (
-        lambda: npz(
-            **{f"{n}.{i}.weight": np.zeros(s) for n in "ab" for i, s in ((0, (4, 3)), (2, (2, 4)))},
-        ),
+        lambda: npz(**{f"{n}.{i}.weight": np.zeros(s) for n in "ab" for i, s in ((0, (4, 3)), (2, (2, 4)))}),
         r"expected one chain of linear layers, found 2: a\.0 … a\.2; b\.0 … b\.2",
     ),
     "no layers": (lambda: npz(x=np.zeros(3)), r"expected layers 'NAME\.weight'.* found x \(3,\)"),
