@@ -15,13 +15,8 @@ from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.legged.terrain import RoughGround, draw_rough_ground, scatter_trees
 from pdtui.robots.robot import TRUNK_ATTRIBUTES, ResetResult, StepResult, TrainingRecipe, torque_attributes
-from pdtui.robots.simulators.bullet_robot import (
-    BulletRobot,
-    add_ground_plane,
-    add_rough_ground,
-    add_trees,
-    bullet_data_folder,
-)
+from pdtui.robots.simulators import bullet_robot
+from pdtui.robots.simulators.bullet_robot import BulletRobot
 from pdtui.robots.simulators.urdf_links import read_urdf_links
 from pdtui.robots.task import Task
 
@@ -112,7 +107,7 @@ class A1(BulletRobot):
         self._top_speed = top_speed
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93,), np.float64)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (6,), np.float32)
-        self._urdf = bullet_data_folder() / "a1" / "a1.urdf"
+        self._urdf = bullet_robot.bullet_data_folder() / "a1" / "a1.urdf"
         self.links = read_urdf_links(self._urdf, ("trunk", *_JOINTS))
         self.rebuild_world(0, terrain)
         limits = [self.bullet.getJointInfo(self.robot_id, joint)[10] for joint in self._joints]
@@ -132,13 +127,13 @@ class A1(BulletRobot):
         self.ground: RoughGround | None = None
         self.obstacles = np.empty((0, 3))
         if start == "plane":
-            add_ground_plane(bullet, _FRICTION)
+            bullet_robot.add_ground_plane(bullet, _FRICTION)
         else:
             self.ground = draw_rough_ground(rng, self._roughness)
-            add_rough_ground(bullet, self.ground, _FRICTION)
+            bullet_robot.add_rough_ground(bullet, self.ground, _FRICTION)
         if start == "forest":
             self.obstacles = scatter_trees(rng, self._density)
-        self._trees = add_trees(bullet, self.obstacles)
+        self._trees = bullet_robot.add_trees(bullet, self.obstacles)
         flags = bullet.URDF_IGNORE_VISUAL_SHAPES
         robot: int = bullet.loadURDF(str(self._urdf), [0, 0, _START_HEIGHT], flags=flags)
         names = {bullet.getJointInfo(robot, j)[12].decode(): j for j in range(bullet.getNumJoints(robot))}
@@ -202,8 +197,7 @@ class A1(BulletRobot):
         return self.observe(), reward, bool(reason), False, info
 
     def observe(self) -> Floats:
-        parts = (self._displacements, self._attitudes, self._targets, self._angles)
-        return np.concatenate(parts, axis=None)
+        return np.concatenate((self._displacements, self._attitudes, self._targets, self._angles), axis=None)
 
     def read_attributes(self) -> Floats:
         x, y, z = self._base()[0]
