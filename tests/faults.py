@@ -20,7 +20,7 @@ from pdtui.driving.drive_client import DriveClient
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_server import PACED_ROWS_PER_WRITE
 from pdtui.driving.drive_snapshot import DriveSnapshot
-from pdtui.driving.headless_drive import make_key_events
+from pdtui.driving.headless_drive import events_of_pressed_keys
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.session_replay import replay_session
 from pdtui.sessions.session_repair import examine_session, repair_session
@@ -98,7 +98,7 @@ def _record(path: Path, map_path: Path, *, seed: int, steps: int, drawn: random.
     sizes = [recorder.bytes]
     for _ in range(steps):
         keys = [drawn.choice(KEYS[:4])] if drawn.random() < 0.1 else []
-        recorder.write(loop.advance(make_key_events(keys, loop)))
+        recorder.write(loop.advance(events_of_pressed_keys(keys, loop)))
         sizes.append(recorder.bytes)
     recorder.close("finished")
     return sizes

@@ -59,7 +59,7 @@ class DissectionBenchmarkSettings:
 
 
 @dataclass(frozen=True)
-class ScalingCurve:
+class MatchingTimeCurve:
     """How the time of matching grows with one size.
 
     Attributes:
@@ -93,7 +93,7 @@ class DissectionBenchmark:
 
     recorded: str
     compared: tuple[MatchingSpeedup, ...]
-    curves: tuple[ScalingCurve, ...]
+    curves: tuple[MatchingTimeCurve, ...]
     memory_units: int
     memory_data_gb: float
     memory_peak_gb: float
@@ -186,7 +186,7 @@ def record_episodes(
                 f"{pool.robot.name}: expected {settings.steps} steps, but the episode of seed {episode.seed} "
                 f"ended after {episode.steps}: {episode.ended}"
             )
-    episodes = [repeat_episode_columns(episode, settings.units, settings.attributes) for episode in walks]
+    episodes = [widen_episode_columns(episode, settings.units, settings.attributes) for episode in walks]
     known = pool.robot.attributes
     attributes = tuple(
         replace(known[column % len(known)], name=f"{known[column % len(known)].name} {column}")
@@ -195,7 +195,7 @@ def record_episodes(
     return episodes, attributes
 
 
-def repeat_episode_columns(episode: MonitoredEpisode, units: int, attributes: int) -> MonitoredEpisode:
+def widen_episode_columns(episode: MonitoredEpisode, units: int, attributes: int) -> MonitoredEpisode:
     """Return the episode with other widths; columns beyond the recorded ones repeat them, shifted in time."""
     return replace(
         episode,
@@ -215,13 +215,12 @@ def measure_matching_growth(
     attributes: Sequence[Attribute],
     preset: MatchingPreset,
     settings: DissectionBenchmarkSettings,
-) -> tuple[ScalingCurve, ...]:
+) -> tuple[MatchingTimeCurve, ...]:
     """Time matching while one size grows and the others stay the same."""
 
     def sized(units: int, columns: int, count: int) -> Callable[[], UnitDiscrepancies]:
         data = [
-            repeat_episode_columns(episodes[number % len(episodes)], units, columns)
-            for number in range(count)
+            widen_episode_columns(episodes[number % len(episodes)], units, columns) for number in range(count)
         ]
         chosen = [attributes[column % len(attributes)] for column in range(columns)]
         return lambda: match_units(data, chosen, preset)
@@ -236,5 +235,5 @@ def measure_matching_growth(
         each, fixed = np.polyfit(sizes, times, 1, w=1 / times).tolist()
         line = fixed + each * np.array(sizes)
         deviation = float(np.max(np.abs(times / line - 1)))
-        curves.append(ScalingCurve(grows, tuple(sizes), tuple(times.tolist()), fixed, each, deviation))
+        curves.append(MatchingTimeCurve(grows, tuple(sizes), tuple(times.tolist()), fixed, each, deviation))
     return tuple(curves)

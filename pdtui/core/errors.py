@@ -32,7 +32,7 @@ class KeystrokeError(PdtuiError):
     """A keystroke file or an event cannot be applied."""
 
 
-class DriveEnded(PdtuiError):  # noqa: N818 - it names an event
+class DriveEndedFromOutside(PdtuiError):  # noqa: N818 - it names an event
     """A drive was ended from outside; its recording is complete."""
 
 

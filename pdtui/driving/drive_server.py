@@ -25,7 +25,6 @@ from pdtui.driving.pacer import Pacer
 from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
-SendMessage = Callable[[object], Future[None]]
 _IDLE = 0.05  # longest wait for a request while the drive is paused or over, s
 PACED_ROWS_PER_WRITE = 4  # control steps; a drive at its pace is written often, so that a kill loses little
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import (
-    DriveEnded,
+    DriveEndedFromOutside,
     KeystrokeError,
     PdtuiError,
     SimulationDiverged,
@@ -45,7 +45,7 @@ class DriveSummary:
     mean: dict[str, float]
 
 
-def make_key_events(keys: Sequence[str], loop: ControlLoop) -> list[DriveEvent]:
+def events_of_pressed_keys(keys: Sequence[str], loop: ControlLoop) -> list[DriveEvent]:
     """Return the events of keys that are pressed before the loop's next step.
 
     A key that means nothing in the present state raises a `KeystrokeError`.
@@ -68,7 +68,7 @@ def drive_from_keystrokes(
         SimulationDiverged: the simulation cannot go on; the record of the step that says so comes first.
     """
     for _ in range(steps):
-        record = loop.advance(make_key_events(presses.get(loop.step, ()), loop))
+        record = loop.advance(events_of_pressed_keys(presses.get(loop.step, ()), loop))
         yield record
         if record.diverged:
             raise SimulationDiverged(f"step {record.step}: {record.ended}")
@@ -154,7 +154,7 @@ def drive_headless(
             total += record.attributes
             if reason := ended():
                 where = "" if recorder is None else f", recorded in {recorder.path}"
-                raise DriveEnded(f"{reason}: {done} steps{where}")
+                raise DriveEndedFromOutside(f"{reason}: {done} steps{where}")
     means = {
         attribute.name: float(value / max(done, 1))
         for attribute, value in zip(loop.robot.attributes, total, strict=True)

@@ -21,9 +21,9 @@ def run_tracking_experiment(request: ExperimentRequest) -> ExperimentReport:
         PdtuiError: as `compare_heading_precision`, or a picture cannot be written.
     """
     from pdtui.paper.heading_precision import compare_heading_precision
-    from pdtui.pictures.heading_figures import check_heading_pictures, draw_heading_pictures
+    from pdtui.pictures.heading_figures import check_heading_picture_paths, draw_heading_pictures
 
-    check_heading_pictures(request.pictures, request.overwrite)
+    check_heading_picture_paths(request.pictures, request.overwrite)
     result = compare_heading_precision(
         request.configs, request.seeds, workers=request.workers, progress=request.progress
     )

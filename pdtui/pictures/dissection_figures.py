@@ -13,7 +13,12 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.pictures.attribute_plots import draw_effect_key, draw_effects, draw_ranking, draw_spectrograms
+from pdtui.pictures.dissection_attribute_plots import (
+    draw_effect_key,
+    draw_effects,
+    draw_ranking,
+    draw_spectrograms,
+)
 from pdtui.pictures.dissection_chart_data import side_effect_matrix
 from pdtui.pictures.matplotlib_page import format_policy_title, open_figure_page
 from pdtui.pictures.plot_colors import GREEN, GREY, VERMILLION, color_to_hex, diverging_colors

@@ -20,7 +20,7 @@ from pdtui.core.errors import PictureError
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.dissection.dissection_tables import dissection_remarks, dissection_tables
-from pdtui.pictures.attribute_plots import draw_attribute_page
+from pdtui.pictures.dissection_attribute_plots import draw_attribute_page
 from pdtui.pictures.dissection_chart_data import (
     compute_effect_curves,
     matched_spectrograms,
@@ -34,7 +34,7 @@ from pdtui.pictures.dissection_figures import (
     existing_figures,
 )
 from pdtui.pictures.plot_colors import ORANGE, SKY, RgbColor
-from pdtui.pictures.report_file import TIME, open_report_file, rows_to_markdown, table_to_markdown
+from pdtui.pictures.rerun_report_file import TIME, open_report_file, rows_to_markdown, table_to_markdown
 from pdtui.sessions.environment_versions import collect_versions
 
 APP = "pdtui-dissection"

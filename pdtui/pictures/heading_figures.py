@@ -19,7 +19,7 @@ from pdtui.core.errors import PictureError
 from pdtui.core.printable_text import to_json
 from pdtui.pictures.matplotlib_page import open_figure_page
 from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, color_to_hex
-from pdtui.pictures.report_file import TIME, open_report_file, table_to_markdown
+from pdtui.pictures.rerun_report_file import TIME, open_report_file, table_to_markdown
 
 APP = "pdtui-tracking"
 PROPERTY = "tracking"
@@ -78,7 +78,7 @@ class HeadingFigure:
         return len(self.behaviors[0].values)
 
 
-def check_heading_pictures(paths: Sequence[Path], overwrite: bool) -> None:
+def check_heading_picture_paths(paths: Sequence[Path], overwrite: bool) -> None:
     """Find out before minutes of work whether the pictures can be written.
 
     Raises:

@@ -18,7 +18,7 @@ from pdtui.stimulation.stimulation_map import PidGains
 
 
 @dataclass(frozen=True)
-class PidStimulation:
+class PidStimulationPlan:
     """A stimulation whose strength a controller sets at each control step.
 
     Attributes:
@@ -36,7 +36,7 @@ class PidStimulation:
     base: tuple[float, ...] = ()
 
 
-RolloutPlan = Stimulation | PidStimulation
+RolloutPlan = Stimulation | PidStimulationPlan
 RolloutJob = tuple[RolloutPlan, int]
 """A plan and the index of its start."""
 
@@ -72,7 +72,7 @@ def run_rollout(
     angles = np.array([attribute.wraps for attribute in robot.attributes])
     turned = np.zeros(len(angles))
     total, counted, errors, steps_survived, fell = np.zeros(len(angles)), 0, 0.0, 0, False
-    controller = _Controller(plan, robot, before) if isinstance(plan, PidStimulation) else None
+    controller = _Controller(plan, robot, before) if isinstance(plan, PidStimulationPlan) else None
     values = before
     for step in range(steps):
         stimulation = plan if isinstance(plan, Stimulation) else NO_STIMULATION
@@ -101,7 +101,7 @@ def run_rollout(
 
 
 class _Controller:
-    def __init__(self, plan: PidStimulation, robot: Robot, values: Floats) -> None:
+    def __init__(self, plan: PidStimulationPlan, robot: Robot, values: Floats) -> None:
         self._column = robot.attribute_index(plan.pid.attribute)
         self._wraps = robot.attributes[self._column].wraps
         self._units = plan.units

@@ -16,7 +16,7 @@ _RAYS = np.radians(np.linspace(60.0, -60.0, 32))
 _NOSE, _SIGHT = 0.25, 5.0
 
 
-def measure_tree_proximity(
+def observe_trees_along_rays(
     position: tuple[float, float], yaw: float, trees: Floats, fan: Floats, reach: float
 ) -> Floats:
     """Return how near the next tree trunk is along each ray: 1 at the camera, 0 from `reach` on.
@@ -69,5 +69,5 @@ class A1Vision(A1):
         (x, y, _), yaw = self._base()[0], self._attitude()[2]
         nose = (x + _NOSE * math.cos(yaw), y + _NOSE * math.sin(yaw))
         return np.concatenate(
-            [super().observe(), measure_tree_proximity(nose, yaw, self.obstacles, _RAYS, _SIGHT)]
+            [super().observe(), observe_trees_along_rays(nose, yaw, self.obstacles, _RAYS, _SIGHT)]
         )

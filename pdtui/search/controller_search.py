@@ -12,7 +12,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.probing.effect_probe import EffectProbe, UnitEffects
 from pdtui.probing.start_states import StartState
-from pdtui.probing.stimulated_rollout import PidStimulation
+from pdtui.probing.stimulated_rollout import PidStimulationPlan
 from pdtui.search.plan_search import Deadline, PlanScoringStage, select_plans
 from pdtui.search.stimulation_sampler import round_outputs, round_to_three_digits
 from pdtui.stimulation.stimulation_map import PidGains
@@ -149,7 +149,7 @@ class ControllerSearch:
             best.base,
         )
 
-    def _alone(self, units: Sequence[tuple[int, float]]) -> list[PidStimulation]:
+    def _alone(self, units: Sequence[tuple[int, float]]) -> list[PidStimulationPlan]:
         """Propose single units, whose output goes either way from 0."""
         return [
             self._candidate(Stimulation((unit,), (weight,)), (), limit, gain * limit, ki)
@@ -159,7 +159,7 @@ class ControllerSearch:
             for ki in self._integral
         ]
 
-    def _between(self, opposites: Sequence[tuple[Stimulation, Stimulation]]) -> list[PidStimulation]:
+    def _between(self, opposites: Sequence[tuple[Stimulation, Stimulation]]) -> list[PidStimulationPlan]:
         """Propose blends from one plan, at −1, to its opposite, at 1, and somewhat beyond."""
         found = []
         for high, low in opposites:
@@ -181,22 +181,22 @@ class ControllerSearch:
 
     def _candidate(
         self, units: Stimulation, base: tuple[float, ...], limit: float, gain: float, ki: float
-    ) -> PidStimulation:
+    ) -> PidStimulationPlan:
         """Scale the gains so that a gain of 1 gives an output of 1 for a typical error."""
         spread = self.goal.spread
         kp, step = round_to_three_digits(gain / spread), float(f"{spread / 4:.1g}")
         pid = PidGains(self.goal.attribute, kp, round_to_three_digits(kp * ki), 0.0, limit, step)
-        return PidStimulation(units, pid, 0.0, self.goal.relative, base)
+        return PidStimulationPlan(units, pid, 0.0, self.goal.relative, base)
 
     def _score(
-        self, candidates: Sequence[PidStimulation], starts: Sequence[StartState], steps: int
+        self, candidates: Sequence[PidStimulationPlan], starts: Sequence[StartState], steps: int
     ) -> Floats:
         errors, falls = self._measure(candidates, starts, steps)
         scores: Floats = -errors - _FALL_PENALTY * self.goal.spread * falls
         return scores
 
     def _measure(
-        self, candidates: Sequence[PidStimulation], starts: Sequence[StartState], steps: int
+        self, candidates: Sequence[PidStimulationPlan], starts: Sequence[StartState], steps: int
     ) -> tuple[Floats, Floats]:
         """Return mean error and share of falls of each candidate over targets and starts."""
         goal = self.goal

@@ -32,9 +32,6 @@ REWARD_COST_ACTION, DIGEST_EPISODE = "reward_cost_action", "digest_episode"
 ACTIVE_FIELDS = ("remaining", "factor", "target", "value", "error", "magnitude")
 """Fields in the column ``active``: those of an `ActiveBehavior` except its name, with NaN for None."""
 
-OVERWRITE_FIELDS = ("unit", "overwritten", "natural")
-"""Fields in the column ``stimulation``."""
-
 ActivationsKept = Literal["all", "half", "off"]
 """How activations are recorded: as float32, as float16, or not at all."""
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from pdtui.benchmarks.dissection_benchmark import (
     DissectionBenchmarkSettings,
     record_episodes,
-    repeat_episode_columns,
+    widen_episode_columns,
 )
 from pdtui.benchmarks.matching_benchmark import load_librosa, match_by_loop, same_ranking
 from pdtui.cli import main
@@ -90,7 +90,7 @@ def test_columns_beyond_the_recorded_ones_are_other_series(weights: Path) -> Non
     assert len({attribute.name for attribute in attributes}) == 20
     np.testing.assert_array_equal(episodes[0].activations[:, :32], alone.activations)
     assert np.abs(episodes[0].activations[:, 32] - alone.activations[:, 0]).max() > 0
-    assert repeat_episode_columns(alone, 7, 3).activations.shape == (80, 7)
+    assert widen_episode_columns(alone, 7, 3).activations.shape == (80, 7)
 
 
 def test_without_librosa_there_is_a_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:

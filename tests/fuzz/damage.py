@@ -8,7 +8,7 @@ import pyarrow as pa
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from pdtui.sessions.rrd.protobuf_reader import bytes_field, number_field, read_fields
+from pdtui.sessions.rrd.protobuf_reader import protobuf_bytes_field, protobuf_number_field, read_fields
 
 _LENGTHS = (0, 1, 7, 16, 255, 2**16, 2**31 - 1, 2**31, 2**32, 2**48, 2**62, 2**63, 2**64 - 1)
 _WORDS = (
@@ -100,12 +100,17 @@ def _damaged_inside(draw: DrawFn, payload: bytes) -> bytes:
     """The message with rows that are damaged beneath their compression."""
     try:
         found = read_fields(memoryview(payload))
-        packed, size = bytes_field(found, 5), number_field(found, 3)
+        packed, size = protobuf_bytes_field(found, 5), protobuf_number_field(found, 3)
         plain = pa.decompress(packed, size, codec="lz4_raw")
     except (ValueError, OSError, pa.ArrowException):
         return draw(damaged(Content(payload)))
     changed = draw(damaged(Content(plain)))
-    parts = [_field(1, bytes_field(found, 1)), b"\x10\x01", b"\x20\x01", _field(5, memoryview(changed))]
+    parts = [
+        _field(1, protobuf_bytes_field(found, 1)),
+        b"\x10\x01",
+        b"\x20\x01",
+        _field(5, memoryview(changed)),
+    ]
     return b"".join(parts)
 
 

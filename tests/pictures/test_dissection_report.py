@@ -18,7 +18,7 @@ from pdtui.core.errors import PictureError, SessionError
 from pdtui.core.units import format_unit, parse_unit
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.pictures.attribute_plots import draw_ranking, draw_spectrograms
+from pdtui.pictures.dissection_attribute_plots import draw_ranking, draw_spectrograms
 from pdtui.pictures.dissection_report import write_dissection_report
 from pdtui.sessions.session_reader import read_session
 from tests.pictures.report_contents import read_entities, read_origins

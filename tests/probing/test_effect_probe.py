@@ -10,7 +10,7 @@ from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import StartState, collect_start_states
-from pdtui.probing.stimulated_rollout import PidStimulation
+from pdtui.probing.stimulated_rollout import PidStimulationPlan
 from pdtui.stimulation.stimulation_map import PidGains
 from tests.wired_policy import WIRED_MOTOR, WIRED_UNIT
 
@@ -110,7 +110,7 @@ def test_a_controller_brings_a_torque_to_its_target(wired_file: Path) -> None:
         name = pool.robot.attributes[FIRST_TORQUE + WIRED_MOTOR].name
         pid = PidGains(name, kp=0.002, ki=0.2, kd=0.0, limit=5.0, step=1.0)
         wired = Stimulation((pool.policy.layers[0] + WIRED_UNIT,), (1.0,))
-        plans = [PidStimulation(units, pid, 40.0, relative=False) for units in (wired, NO_STIMULATION)]
+        plans = [PidStimulationPlan(units, pid, 40.0, relative=False) for units in (wired, NO_STIMULATION)]
         result = EffectProbe(pool).measure_plans(plans, starts, steps=40, measure_from=30)
     assert (result.errors[0] < 1.0).all()
     assert (result.errors[1] > 20.0).all()

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("pybullet", reason="PyBullet is not installed (it has no wheels for this Python)")
 
 from pdtui.robots import make_robot
-from pdtui.robots.a1_vision import A1Vision, measure_tree_proximity
+from pdtui.robots.a1_vision import A1Vision, observe_trees_along_rays
 
 FAN = np.radians(np.linspace(60.0, -60.0, 32))
 
@@ -25,7 +25,7 @@ def test_it_sees_what_the_simulators_rays_hit() -> None:
         ends = [[x + 5.0 * math.cos(yaw + a), y + 5.0 * math.sin(yaw + a), 0.6] for a in FAN]
         hits = robot.bullet.rayTestBatch([[x, y, 0.6]] * len(FAN), ends)
         expected = 1.0 - np.array([hit[2] for hit in hits])
-        found = measure_tree_proximity((x, y), yaw, robot.obstacles, FAN, 5.0)
+        found = observe_trees_along_rays((x, y), yaw, robot.obstacles, FAN, 5.0)
         # Bullet's cylinders have a margin, and a ray along an edge may go either way.
         assert np.quantile(np.abs(found - expected), 0.9) < 0.01
         nonzero += int((found > 0).sum())
@@ -33,8 +33,8 @@ def test_it_sees_what_the_simulators_rays_hit() -> None:
 
 
 def test_nothing_is_seen_where_nothing_is() -> None:
-    assert not measure_tree_proximity((0.0, 0.0), 0.0, np.empty((0, 3)), FAN, 5.0).any()
+    assert not observe_trees_along_rays((0.0, 0.0), 0.0, np.empty((0, 3)), FAN, 5.0).any()
     behind = np.array([[-2.0, 0.0, 0.2]])
-    assert not measure_tree_proximity((0.0, 0.0), 0.0, behind, FAN, 5.0).any()
-    ahead = measure_tree_proximity((0.0, 0.0), math.pi, behind, np.zeros(1), 5.0)
+    assert not observe_trees_along_rays((0.0, 0.0), 0.0, behind, FAN, 5.0).any()
+    ahead = observe_trees_along_rays((0.0, 0.0), math.pi, behind, np.zeros(1), 5.0)
     assert ahead[0] == pytest.approx(1.0 - 1.8 / 5.0)

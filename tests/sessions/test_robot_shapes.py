@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pdtui.core.robot_links_and_state import Link
-from pdtui.sessions.viewer.robot_shapes import RobotShapes
+from pdtui.sessions.viewer.viewer_link_shapes import ViewerLinkShapes
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 ON_ITS_SIDE = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
@@ -22,7 +22,7 @@ def drawn(links: tuple[Link, ...], poses: np.ndarray[Any, Any]) -> dict[str, np.
     """What the columns say, as arrays (steps, shapes, numbers) by component."""
     return {
         column.component_descriptor().component: np.array(column.as_arrow_array().to_pylist())
-        for column in RobotShapes(links).columns(poses)
+        for column in ViewerLinkShapes(links).columns(poses)
     }
 
 
@@ -42,7 +42,7 @@ def test_shapes_follow_their_bodies() -> None:
 
 def test_a_robot_without_boxes_has_no_boxes() -> None:
     assert {name.partition(":")[0] for name in drawn(LINKS[:2], np.ones((1, 2, 7)))} == {"Capsules3D"}
-    assert len(RobotShapes(LINKS[:2]).static()) == 1
-    assert len(RobotShapes(LINKS).static()) == 2
-    assert RobotShapes(()).static() == []
-    assert RobotShapes(()).columns(np.ones((1, 2, 7))) == []
+    assert len(ViewerLinkShapes(LINKS[:2]).static()) == 1
+    assert len(ViewerLinkShapes(LINKS).static()) == 2
+    assert ViewerLinkShapes(()).static() == []
+    assert ViewerLinkShapes(()).columns(np.ones((1, 2, 7))) == []

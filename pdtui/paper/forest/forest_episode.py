@@ -12,7 +12,7 @@ from pdtui.core.atomic_file import write_file
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import SessionError
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.driving.headless_drive import make_key_events, run_episode
+from pdtui.driving.headless_drive import events_of_pressed_keys, run_episode
 from pdtui.driving.keystrokes import format_keystrokes
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
 from pdtui.paper.forest.scripted_operator import DEFAULT, ScriptedOperator, operator_keys
@@ -68,7 +68,7 @@ def drive_forest_episode(
             return []
         x, y = loop.robot.read_poses()[0, :2].tolist()
         name = operator.choose_key(x, y, float(loop.attributes[yaw]))
-        return make_key_events([keys[name]] if name else [], loop)
+        return events_of_pressed_keys([keys[name]] if name else [], loop)
 
     rewards, costs, distances = [], [], []
     events: list[DriveEvent] = []
@@ -175,7 +175,7 @@ def drive_with_random_keys(loop: ControlLoop, steps: int) -> ObservedDrive:
             upcoming = upcoming or [int(one) for one in rng.permutation(len(keys)) if one != latched]
             latched = upcoming.pop(0)
             until = step + int(rng.integers(*_STEPS_HELD))
-        record = loop.advance(make_key_events([keys[latched]] if pressed else [], loop))
+        record = loop.advance(events_of_pressed_keys([keys[latched]] if pressed else [], loop))
         places.append(read_place())
         choices.append(latched)
         if record.ended:

@@ -63,7 +63,7 @@ class ScriptedOperator:
     """Decides which key to press from what it saw `REACTION_TIME` ago and its own presses since then.
 
     It predicts where the robot is now and where each of a few hundred key schedules would lead
-    (`KeyPlanner`). A robot that is stuck at a tree is turned away first (`TreeContactRecovery`). Nothing is
+    (`KeyPlanner`). A robot that is stuck at a tree is turned away first (`StuckAtTreeSteering`). Nothing is
     random: the same observations give the same key presses.
 
     Args:
@@ -81,7 +81,7 @@ class ScriptedOperator:
         periods: Mapping[str, int] | None = None,
     ) -> None:
         self._names, self._key_models = tuple(key_models), tuple(key_models.values())
-        self._planner, self._recovery = KeyPlanner(self._key_models, trees), TreeContactRecovery(trees, dt)
+        self._planner, self._recovery = KeyPlanner(self._key_models, trees), StuckAtTreeSteering(trees, dt)
         self._dt, self._periods = dt, dict(periods or {})
         self._delay = math.ceil(REACTION_TIME / dt - 1e-9)
         self._second = math.ceil(1.0 / dt - 1e-9)
@@ -133,7 +133,7 @@ class ScriptedOperator:
         return 0 if over else latched
 
 
-class TreeContactRecovery:
+class StuckAtTreeSteering:
     """Decides which way to turn while the robot is stuck at a tree, until the tree is beside it.
 
     A robot that cannot sense trees keeps walking against one, and a prediction without contacts expects it to

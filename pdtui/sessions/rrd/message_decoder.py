@@ -14,7 +14,13 @@ import pyarrow as pa
 
 from pdtui.sessions.rrd.arrow_checks import read_batch_header, read_record_batch
 from pdtui.sessions.rrd.message_framing import RrdMessageSpan
-from pdtui.sessions.rrd.protobuf_reader import Value, bytes_field, number_field, read_fields, text_field
+from pdtui.sessions.rrd.protobuf_reader import (
+    Value,
+    protobuf_bytes_field,
+    protobuf_number_field,
+    protobuf_text_field,
+    read_fields,
+)
 
 MAX_MESSAGE = 256 << 20
 """Largest size of a message, bytes, compressed or not. A batch of 1000 steps of 4096 units takes 16 MB."""
@@ -59,13 +65,13 @@ class ChunkHead(NamedTuple):
 
 def decode_store_info(payload: memoryview) -> RrdStoreInfo:
     """Return the store that a message announces."""
-    return _decode_store(read_fields(bytes_field(read_fields(payload), 2)), 2)
+    return _decode_store(read_fields(protobuf_bytes_field(read_fields(payload), 2)), 2)
 
 
 def decode_chunk(payload: memoryview) -> tuple[RrdStoreInfo, EntityChunk]:
     """Decode a message that contains rows."""
     message = read_fields(payload)
-    if number_field(message, 4) != _ARROW_IPC:
+    if protobuf_number_field(message, 4) != _ARROW_IPC:
         raise ValueError("expected rows in Arrow's format")
     batch = read_record_batch(_unpack_payload(message))
     metadata = batch.schema.metadata or {}
@@ -76,19 +82,23 @@ def decode_chunk(payload: memoryview) -> tuple[RrdStoreInfo, EntityChunk]:
 
 
 def _decode_store(message: dict[int, Value], field: int = 1) -> RrdStoreInfo:
-    return _decode_store_bytes(bytes(bytes_field(message, field)))
+    return _decode_store_bytes(bytes(protobuf_bytes_field(message, field)))
 
 
 @lru_cache(maxsize=32)
 def _decode_store_bytes(store: bytes) -> RrdStoreInfo:
     found = read_fields(memoryview(store))
-    application = text_field(read_fields(bytes_field(found, 3)), 1)
-    return RrdStoreInfo(number_field(found, 1) == 1, text_field(found, 2), application)
+    application = protobuf_text_field(read_fields(protobuf_bytes_field(found, 3)), 1)
+    return RrdStoreInfo(protobuf_number_field(found, 1) == 1, protobuf_text_field(found, 2), application)
 
 
 def _unpack_payload(message: dict[int, Value], *, whole: bool = True) -> pa.Buffer:
     """Return the rows of a chunk's message, or only what precedes them, as an Arrow IPC stream."""
-    packed, compression, size = bytes_field(message, 5), number_field(message, 2), number_field(message, 3)
+    packed, compression, size = (
+        protobuf_bytes_field(message, 5),
+        protobuf_number_field(message, 2),
+        protobuf_number_field(message, 3),
+    )
     if compression in _PLAIN:
         return pa.py_buffer(bytes(packed))
     if compression != _LZ4:

@@ -34,7 +34,7 @@ def read_fields(message: memoryview, *, cut: bool = False) -> dict[int, Value]:
     return found
 
 
-def number_field(found: dict[int, Value], field: int) -> int:
+def protobuf_number_field(found: dict[int, Value], field: int) -> int:
     """Return a numeric field; 0 if it is missing, which is the default of the format."""
     value = found.get(field, 0)
     if not isinstance(value, int):
@@ -42,7 +42,7 @@ def number_field(found: dict[int, Value], field: int) -> int:
     return value
 
 
-def bytes_field(found: dict[int, Value], field: int) -> memoryview:
+def protobuf_bytes_field(found: dict[int, Value], field: int) -> memoryview:
     """Return the bytes of a field that is a text, a message or bytes; empty if it is missing."""
     value = found.get(field, memoryview(b""))
     if isinstance(value, int):
@@ -50,9 +50,9 @@ def bytes_field(found: dict[int, Value], field: int) -> memoryview:
     return value
 
 
-def text_field(found: dict[int, Value], field: int) -> str:
+def protobuf_text_field(found: dict[int, Value], field: int) -> str:
     """Return a text field; empty if it is missing."""
-    return str(bytes_field(found, field), "utf-8")
+    return str(protobuf_bytes_field(found, field), "utf-8")
 
 
 def _read_varint(message: memoryview, place: int) -> tuple[int, int]:

@@ -21,9 +21,9 @@ from pdtui.sessions.session_schema import BEHAVIORS, HEAT_MAP, MAGNITUDES, PATH,
 from pdtui.sessions.viewer.activation_heat_map import ActivationHeatMap
 from pdtui.sessions.viewer.behavior_legend import BehaviorColorLegend
 from pdtui.sessions.viewer.obstacle_writer import ObstacleWriter
-from pdtui.sessions.viewer.robot_shapes import RobotShapes
 from pdtui.sessions.viewer.session_blueprint import BlueprintContent
 from pdtui.sessions.viewer.viewer_curves import Color, LogStatic, SendRows, ViewerCurves
+from pdtui.sessions.viewer.viewer_link_shapes import ViewerLinkShapes
 from pdtui.sessions.writer.arrow_columns import number_list_column, polyline_column, text_column
 
 _UNITS_DRAWN = 4
@@ -38,7 +38,7 @@ class ViewerDataWriter:
 
     def __init__(self, info: DriveInfo, send: SendRows, log_static: LogStatic) -> None:
         self._send, self._log_static = send, log_static
-        self._shapes = RobotShapes(info.links)
+        self._shapes = ViewerLinkShapes(info.links)
         self._draw_every = max(1, round(_DRAWN_APART / info.dt))
         for part in self._shapes.static():
             log_static(ROBOT, part)

@@ -16,7 +16,7 @@ from textual.widgets.option_list import Option
 
 from pdtui.guide.guide_pages import GUIDE_FOLDER, GuidePage, search_guide
 from pdtui.tui.choice_list import ChoiceList, ListChoice, has_all_words
-from pdtui.tui.guide.guide_viewer import GuideViewer, link_to_line
+from pdtui.tui.guide.guide_viewer import GuideViewer, guide_line_link
 from pdtui.tui.style_sheets import WIDTHS
 from pdtui.tui.theme import STYLES, THEME
 
@@ -91,7 +91,7 @@ class GuideApp(App[None]):
         self._choose(
             "search the guide",
             lambda query: (
-                _choice(hit.text, f"{self._pages[hit.topic].title} › {hit.heading}", link_to_line(hit))
+                _choice(hit.text, f"{self._pages[hit.topic].title} › {hit.heading}", guide_line_link(hit))
                 for hit in search_guide(self._pages, query)
             ),
         )
@@ -104,7 +104,7 @@ class GuideApp(App[None]):
     def action_contents(self) -> None:
         """Choose a page or a heading."""
         headings = [
-            ("  " * (passage.level - 1) + passage.text, "", link_to_line(passage))
+            ("  " * (passage.level - 1) + passage.text, "", guide_line_link(passage))
             for page in self._pages.values()
             for passage in page.passages()
             if passage.level

@@ -12,7 +12,7 @@ from pdtui.guide.guide_pages import GuidePassage
 _LINE = re.compile(r"(.*)#line-(\d+)")
 
 
-def link_to_line(passage: GuidePassage) -> str:
+def guide_line_link(passage: GuidePassage) -> str:
     """Return the link to one line of a page, which `GuideViewer.follow` understands."""
     return f"{passage.topic}.md#line-{passage.line}"
 

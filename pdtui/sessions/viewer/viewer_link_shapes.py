@@ -18,7 +18,7 @@ _COLOR = (214, 137, 76)
 _TORSO = (90, 122, 158)
 
 
-class RobotShapes:
+class ViewerLinkShapes:
     """The links of a robot as capsules, spheres and boxes."""
 
     def __init__(self, links: Sequence[Link]) -> None:
