@@ -5,6 +5,8 @@ Commands, and the heavy libraries that they need, are loaded only when they are 
 
 from __future__ import annotations
 
+import os
+
 import click
 
 from pdtui import __version__
@@ -35,6 +37,8 @@ def main(ctx: click.Context) -> None:
 
     Without a command, choose a robot and a map and drive.
     """
+    # A policy computes with one thread; PyTorch, which is not loaded yet, then need not switch in every step.
+    os.environ.setdefault("MKL_NUM_THREADS", "1")
     if ctx.invoked_subcommand is None:
         from pdtui.cli.drive_command import pick_and_drive
 

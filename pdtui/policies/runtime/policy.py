@@ -25,15 +25,8 @@ from pdtui.policies.runtime.unit_layers import UnitHooks, find_hidden_modules, n
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Let PyTorch compute with one thread inside the block, then with as many as before.
-
-    For networks of the size of a policy, more threads only cost time, and they change the order of sums, so
-    that runs would not repeat bit for bit.
-    """
+    """Let PyTorch compute with one thread: more would only cost time, and change the order of sums."""
     threads = torch.get_num_threads()
-    if threads == 1:
-        yield
-        return
     torch.set_num_threads(1)
     try:
         yield
@@ -200,14 +193,16 @@ class Policy:
             raise PolicyError(
                 f"{self.name}: expected an observation of shape {self.shape}, got {observation.shape}"
             )
-        with _one_thread():
-            if self._fast_mlp is not None:
-                output, activations, found = self._fast_mlp.run(observation, stimulation)
-            else:
-                self._hooks.begin(stimulation)
-                output = self._run_network(observation)
-                activations, found = np.concatenate(self._hooks.outputs), self._hooks.natural
-            action = self._decode(output, rng)
+        if torch.get_num_threads() != 1:
+            with _one_thread():
+                return self.act(observation, stimulation, rng)
+        if self._fast_mlp is not None:
+            output, activations, found = self._fast_mlp.run(observation, stimulation)
+        else:
+            self._hooks.begin(stimulation)
+            output = self._run_network(observation)
+            activations, found = np.concatenate(self._hooks.outputs), self._hooks.natural
+        action = self._decode(output, rng)
         try:
             natural = tuple([found[unit] for unit in stimulation.units])
         except KeyError as error:
