@@ -8,7 +8,7 @@ import pyarrow as pa
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from pdtui.sessions.rrd.protobuf_reader import protobuf_bytes_field, protobuf_number_field, read_fields
+from pdtui.sessions.rrd.protobuf_wire import protobuf_bytes_field, protobuf_number_field, read_fields
 
 _LENGTHS = (0, 1, 7, 16, 255, 2**16, 2**31 - 1, 2**31, 2**32, 2**48, 2**62, 2**63, 2**64 - 1)
 _WORDS = (

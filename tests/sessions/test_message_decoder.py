@@ -15,7 +15,7 @@ from pdtui.core.errors import SessionError
 from pdtui.sessions.rrd.arrow_checks import MAX_ROWS, read_record_batch
 from pdtui.sessions.rrd.message_decoder import MAX_MESSAGE, decode_chunk
 from pdtui.sessions.rrd.message_framing import CHUNK, read_message_frames
-from pdtui.sessions.rrd.protobuf_reader import read_fields
+from pdtui.sessions.rrd.protobuf_wire import read_fields
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_reader import read_session
 from tests.sessions.conftest import Recorded

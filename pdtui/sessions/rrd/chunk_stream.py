@@ -6,21 +6,18 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import BinaryIO, TypeVar
-
-import pyarrow as pa
+from typing import BinaryIO
 
 from pdtui.core.errors import SessionError
 from pdtui.core.untrusted_file import open_regular_file
-from pdtui.sessions.rrd import message_decoder as decoder
 from pdtui.sessions.rrd import message_framing as framing
-from pdtui.sessions.rrd.message_decoder import EntityChunk, RrdStoreInfo
-from pdtui.sessions.rrd.message_framing import RESCUE, RrdMessageSpan
+from pdtui.sessions.rrd.message_decoder import MAX_MESSAGE, EntityChunk, RrdStoreInfo, read_chunk_head
+from pdtui.sessions.rrd.message_framing import RrdMessageSpan
+from pdtui.sessions.rrd.message_reader import DamagedSpan, MessageReader, RrdMessage, decode_message
 from pdtui.sessions.session_schema import APP
 
-T = TypeVar("T")
+RESCUE = "`pdtui sessions repair` rescues what is whole"
 _MAX_STORES = 16
-_DAMAGED = (ValueError, OverflowError, EOFError, OSError, MemoryError, pa.ArrowException)
 
 
 class ChunkStream:
@@ -28,21 +25,31 @@ class ChunkStream:
 
     Args:
         path: the file.
-        needed: tells by its entity whether a chunk is decoded; of the others only the heads are read. By
-            default every message is decoded and checked.
+        needed: tells by its entity whether a chunk is decoded; of the others only the heads are read, and
+            no checksum is. By default every message is checked and decoded.
+        damage: a list to which damage is added instead of raising an error; what is whole behind it is read.
 
     Attributes:
-        store: the store of the recording, once the message that announces it was read.
+        store: the store of the recording, once a message has named it.
         finished: whether the index at the end of the file was read, too.
         skipped_rows: number of rows by entity in the chunks that were not decoded.
+        sealed: whether the messages have checksums; False if only heads are read.
+        size: size of the file, bytes.
     """
 
-    def __init__(self, path: Path, needed: Callable[[str], bool] | None = None) -> None:
-        self._path, self._needed = path, needed
+    def __init__(
+        self,
+        path: Path,
+        needed: Callable[[str], bool] | None = None,
+        *,
+        damage: list[DamagedSpan] | None = None,
+    ) -> None:
+        self._path, self._needed, self._damage = path, needed, damage
         self._stores: list[RrdStoreInfo] = []
         self.store: RrdStoreInfo | None = None
-        self.finished = False
+        self.finished = self.sealed = False
         self.skipped_rows: Counter[str] = Counter()
+        self.size = 0
 
     def __iter__(self) -> Iterator[EntityChunk]:
         """Read the file from its beginning; the chunks before any damage are yielded first.
@@ -52,13 +59,15 @@ class ChunkStream:
         """
         try:
             with open_regular_file(self._path) as file:
+                self.size = os.fstat(file.fileno()).st_size
                 yield from self._chunks(file)
         except FileNotFoundError:
             raise SessionError(f"{self._path}: no such file") from None
         except OSError as error:
             raise SessionError(f"{self._path}: cannot be read: {error.strerror}") from error
         except SessionError as error:
-            raise SessionError(f"{self._path}: {error}") from error
+            hint = f"; {RESCUE}" if self.store is not None and "byte " in str(error) else ""
+            raise SessionError(f"{self._path}: {error}{hint}") from error
         self.require_store()
 
     def require_store(self) -> RrdStoreInfo:
@@ -68,26 +77,68 @@ class ChunkStream:
         return self.store
 
     def _chunks(self, file: BinaryIO) -> Iterator[EntityChunk]:
-        framing.check_rrd_start(file)
-        for frame in framing.read_message_frames(file, os.fstat(file.fileno()).st_size):
-            if frame.kind == framing.LAST:
-                framing.check_rrd_end(file, frame)
+        self._check_start(file)
+        if self._needed is not None:
+            yield from self._chunks_by_head(file, self._needed)
+            return
+        reader = MessageReader(file, self.size, self._damage)
+        self.sealed = reader.sealed
+        for message in reader:
+            chunk = self._decode(message)
+            if chunk is not None:
+                yield chunk
+        self.finished = reader.finished
+
+    def _check_start(self, file: BinaryIO) -> None:
+        try:
+            framing.check_rrd_start(file)
+        except SessionError as error:
+            if self._damage is None:
+                raise
+            self._damage.append(DamagedSpan(0, framing.START_BYTES, str(error)))
+
+    def _chunks_by_head(self, file: BinaryIO, needed: Callable[[str], bool]) -> Iterator[EntityChunk]:
+        for span in framing.read_message_spans(file, self.size):
+            if span.kind == framing.LAST:
+                framing.check_rrd_end(file, span)
                 self.finished = True
-            elif frame.kind == framing.STORE:
-                self._add_store(_decode_message(file, frame, decoder.decode_store_info))
-            elif frame.kind == framing.CHUNK and (chunk := self._read_chunk(file, frame)) is not None:
+                continue
+            head = read_chunk_head(file, span, self.store) if span.kind == framing.CHUNK else None
+            if head is not None and not (head.store == self.store and needed(head.entity)):
+                self._check_announced(head.store, span)
+                self.skipped_rows[head.entity] += head.rows
+                continue
+            if span.length > MAX_MESSAGE:
+                raise SessionError(f"byte {span.begin}: expected at most {MAX_MESSAGE >> 20} MiB")
+            file.seek(span.start)
+            chunk = self._decode(RrdMessage(span, memoryview(file.read(span.length))))
+            if chunk is not None:
                 yield chunk
 
-    def _read_chunk(self, file: BinaryIO, frame: RrdMessageSpan) -> EntityChunk | None:
-        head = None if self._needed is None else decoder.read_chunk_head(file, frame, self.store)
-        if head is None or self._needed is None or (head.store == self.store and self._needed(head.entity)):
-            store, chunk = _decode_message(file, frame, decoder.decode_chunk)
-        else:
-            store, chunk = head.store, None
-            self.skipped_rows[head.entity] += head.rows
-        if store not in self._stores:
-            raise SessionError(f"byte {frame.start}: rows of a recording that the file does not announce")
-        return chunk if store == self.store else None
+    def _decode(self, message: RrdMessage) -> EntityChunk | None:
+        try:
+            decoded = decode_message(*message)
+            if decoded is None:
+                return None
+            store, chunk = decoded
+            if chunk is None:
+                self._add_store(store)
+            else:
+                self._check_announced(store, message.span)
+            return chunk if store == self.store else None
+        except SessionError as error:
+            if self._damage is None:
+                raise
+            span = message.span
+            self._damage.append(DamagedSpan(span.begin, span.end, str(error)))
+            return None
+
+    def _check_announced(self, store: RrdStoreInfo, span: RrdMessageSpan) -> None:
+        if store in self._stores:
+            return
+        if self._damage is None:
+            raise SessionError(f"byte {span.start}: rows of a recording that the file does not announce")
+        self._add_store(store)  # the message that announced it may be the one that is damaged
 
     def _add_store(self, store: RrdStoreInfo) -> None:
         if store in self._stores:
@@ -99,19 +150,3 @@ class ChunkStream:
         self._stores.append(store)
         if self.store is None and store.is_recording:
             self.store = store
-
-
-def _decode_message(file: BinaryIO, frame: RrdMessageSpan, read: Callable[[memoryview], T]) -> T:
-    if frame.length > decoder.MAX_MESSAGE:
-        raise SessionError(
-            f"byte {frame.start}: expected a message of at most {decoder.MAX_MESSAGE >> 20} MiB"
-        )
-    file.seek(frame.start)
-    payload = file.read(frame.length)
-    if len(payload) < frame.length:
-        raise SessionError("the file was shortened while it was read")
-    try:
-        return read(memoryview(payload))
-    except _DAMAGED as error:
-        why = " ".join(str(error).split())[:200]
-        raise SessionError(f"byte {frame.start}: a message is damaged: {why}; {RESCUE}") from error

@@ -14,7 +14,7 @@ import pyarrow as pa
 
 from pdtui.sessions.rrd.arrow_checks import read_batch_header, read_record_batch
 from pdtui.sessions.rrd.message_framing import RrdMessageSpan
-from pdtui.sessions.rrd.protobuf_reader import (
+from pdtui.sessions.rrd.protobuf_wire import (
     Value,
     protobuf_bytes_field,
     protobuf_number_field,

@@ -1,10 +1,9 @@
-"""Open, flush and abandon Rerun recordings that go into a file, with errors that name the file."""
+"""A Rerun recording that is written into a session's file, with errors that name the file."""
 
 from __future__ import annotations
 
 import atexit
-import threading
-import time
+import errno
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,56 +17,101 @@ from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_schema import APP
 from pdtui.sessions.viewer.session_blueprint import session_blueprint
-from pdtui.sessions.writer.disk_space import is_disk_full
-
-_FLUSH_SECONDS, _PATIENCE_SECONDS = 1.0, 30.0
-"""How long to wait for a flush before checking whether the disk is full, and how long at most; s."""
+from pdtui.sessions.writer.message_pipe import MessagePipe
+from pdtui.sessions.writer.session_file import SessionFile
 
 _ARROW_TYPES = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.utf8()}
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
-def open_recording(path: Path, info: DriveInfo, recording_id: str | None = None) -> rr.RecordingStream:
-    """Open a recording that is written to a file, with a blueprint; an existing file is overwritten."""
-    with name_file_in_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        recording = rr.RecordingStream(APP, recording_id=recording_id)
-        if not is_enabled(recording):
+class RerunRecording:
+    """A Rerun recording that is written into a file, with a blueprint.
+
+    Args:
+        file: the file.
+        info: the drive, for the blueprint.
+        recording_id: identifier by which the viewer knows the recording; a new one by default.
+
+    Attributes:
+        stream: Rerun's recording.
+
+    Raises:
+        SessionError: recording is disabled.
+    """
+
+    def __init__(self, file: SessionFile, info: DriveInfo, recording_id: str | None = None) -> None:
+        self.stream = rr.RecordingStream(APP, recording_id=recording_id)
+        if not is_enabled(self.stream):
             why = "recording is disabled by the environment variable RERUN=off"
-            raise SessionError(f"{path}: cannot be written: {why}")
-        recording.set_sinks(rr.FileSink(path), default_blueprint=session_blueprint(info))
-    return recording
+            raise SessionError(f"{file.path}: cannot be written: {why}")
+        self._pipe, self._closed = MessagePipe(file), False
+        self.stream.set_sinks(rr.FileSink(self._pipe.sink), default_blueprint=session_blueprint(info))
+        self._pipe.start()
+        # A program that ends without closing its recording leaves all that was recorded.
+        atexit.register(self.close)
+
+    @property
+    def path(self) -> Path:
+        """Where the file is, or will be."""
+        return self._pipe.file.path
+
+    @property
+    def size(self) -> int:
+        """Number of bytes written so far."""
+        return self._pipe.file.size
+
+    @property
+    def created(self) -> bool:
+        """Whether the file was created."""
+        return self._pipe.file.created
+
+    def create_file(self) -> None:
+        """Create the file, if that was not done yet; what was sent before is then written into it."""
+        with self.errors_named():
+            self._pipe.create_file()
+
+    def follow_file(self) -> str:
+        """Find out whether the file was deleted or renamed, as `SessionFile.follow` does."""
+        with self.errors_named():
+            return self._pipe.follow_file()
+
+    def flush(self, *, wait: bool = True) -> None:
+        """Hand everything to the operating system, so that it outlives this process; or only begin to."""
+        if not wait:
+            self.stream.flush(timeout_sec=0.0)
+            return
+        with self.errors_named():
+            self.stream.flush()
+            self._pipe.drain()
+
+    def close(self, end_index: dict[str, Any] | None = None) -> None:
+        """Write the rest, and the index at the end of the file; a second call does nothing.
+
+        Without an `end_index`, the file is readable but not whole.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        atexit.unregister(self.close)
+        self._pipe.end_index = end_index
+        with self.errors_named():
+            self.stream.disconnect()
+            self._pipe.close()
+
+    @contextmanager
+    def errors_named(self) -> Iterator[None]:
+        """Turn errors of the operating system and the library into a `SessionError` that names the file."""
+        with name_file_in_errors(self.path):
+            yield
 
 
-def send_property_group(recording: rr.RecordingStream, name: str, values: Mapping[str, Any]) -> None:
+def send_property_group(stream: rr.RecordingStream, name: str, values: Mapping[str, Any]) -> None:
     """Send a group of properties: plain values or non-empty lists of them."""
     arrays = {}
     for key, value in values.items():
         items = value if isinstance(value, list) else [value]
         arrays[key] = pa.array(items, _ARROW_TYPES[type(items[0])])
-    recording.send_property(name, rr.AnyValues(**arrays))
-
-
-def flush_recording(recording: rr.RecordingStream, path: Path) -> None:
-    """Wait until everything was handed to the operating system; a `RuntimeError` says that it cannot be."""
-    # If the writing thread ends during a flush, the flush never returns.
-    deadline = time.monotonic() + _PATIENCE_SECONDS
-    while True:
-        try:
-            recording.flush(timeout_sec=_FLUSH_SECONDS)
-        except RuntimeError:
-            if is_disk_full(path) or time.monotonic() > deadline:
-                raise
-        else:
-            return
-
-
-def abandon_recording(recording: rr.RecordingStream) -> None:
-    """Close a recording that cannot be written, without waiting for the library if its thread has died."""
-    closing = threading.Thread(target=recording.disconnect, daemon=True)
-    closing.start()
-    closing.join(_FLUSH_SECONDS)
-    if closing.is_alive():
-        atexit.unregister(rr.rerun_shutdown)  # it would wait for the same thread, for ever
+    stream.send_property(name, rr.AnyValues(**arrays))
 
 
 @contextmanager
@@ -76,8 +120,7 @@ def name_file_in_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise SessionError(f"{path}: cannot be written: {error.strerror}") from error
-    except RuntimeError as error:
-        # The library reports only that its thread has ended.
-        why = f"the disk is full ({error})" if is_disk_full(path) else str(error)
+        why = "the disk is full" if error.errno in _FULL else error.strerror or str(error)
         raise SessionError(f"{path}: cannot be written: {why}") from error
+    except (RuntimeError, ValueError) as error:
+        raise SessionError(f"{path}: cannot be written: {error}") from error

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, cast
 
 import rerun as rr
 
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import RecordingEnded, SessionError
 from pdtui.core.step_record import StepRecord
 from pdtui.sessions.drive_info import DriveInfo, encode_drive_info
 from pdtui.sessions.environment_versions import collect_versions
-from pdtui.sessions.rrd.message_framing import undamaged_length
+from pdtui.sessions.session_index import encode_session_index
 from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
 from pdtui.sessions.viewer.live_viewer import LiveViewer
 from pdtui.sessions.viewer.session_blueprint import session_blueprint
@@ -24,13 +23,8 @@ from pdtui.sessions.viewer.viewer_address import ViewerAddress
 from pdtui.sessions.viewer.viewer_data_writer import ViewerDataWriter
 from pdtui.sessions.writer.arrow_columns import ComponentColumn, time_columns
 from pdtui.sessions.writer.disk_space import DiskReserve
-from pdtui.sessions.writer.rerun_recording import (
-    abandon_recording,
-    flush_recording,
-    name_file_in_errors,
-    open_recording,
-    send_property_group,
-)
+from pdtui.sessions.writer.rerun_recording import RerunRecording, send_property_group
+from pdtui.sessions.writer.session_file import ExistingFile, SessionFile, SyncMode
 from pdtui.sessions.writer.step_record_columns import episode_end_columns, event_columns, step_record_columns
 
 _VIEW_ROWS, _LIVE_ROWS = 128, 8
@@ -40,10 +34,14 @@ _SAFE_ROWS = 16
 _BATCHES_ON_THEIR_WAY = 8
 """Number of larger batches that are not waited for; a slow disk must not fill the memory."""
 
+_DESCRIBED_AGAIN = 50
+"""After so many control steps, the description of the drive is written a second time."""
+
 
 class SessionRecorder:
     """Writes control steps to a Rerun recording, in batches.
 
+    The file is created with the first control step, so that a drive which ends while it starts leaves none.
     Steps with events and steps that end an episode are written at once, with all steps before them. With
     small batches, `write` returns when the batch was handed to the operating system: SIGKILL loses at most
     the last `rows_per_write` − 1 steps, and the file can be read without its end. With large batches, which
@@ -51,18 +49,20 @@ class SessionRecorder:
 
     The space on the disk is checked before each batch. Once only the end of the recording still fits, the
     recording is closed properly and `RecordingEnded` is raised. If a write fails nevertheless, as on a disk
-    that others fill, the file is truncated after its last complete message, so that it can be read up to
-    there.
+    that others fill, the file ends after its last complete message, so that it can be read up to there.
 
     Args:
-        path: the file; its folder is created, and an existing file is overwritten.
+        path: the file; its folder is created.
         info: the drive.
         rows_per_write: control steps per batch. Small batches lose less in a crash; large ones cost less.
         view_rows: control steps per batch of data that only the viewer draws.
         viewer: address of a viewer that shows the drive live; None for none.
+        existing: what to do if a file of this name exists. With ``replace``, the recording is written beside it,
+            and replaces it once it is closed whole.
+        sync: when data are forced to the disk.
 
     Raises:
-        SessionError: the file cannot be written, or the disk is full.
+        SessionError: the file exists or cannot be written, or the disk is full.
     """
 
     def __init__(
@@ -73,25 +73,49 @@ class SessionRecorder:
         rows_per_write: int = 128,
         view_rows: int = _VIEW_ROWS,
         viewer: ViewerAddress | None = None,
+        existing: ExistingFile = "refuse",
+        sync: SyncMode = "batch",
     ) -> None:
-        self.path, self.info = Path(path), info
-        self._errors_named = partial(name_file_in_errors, self.path)
+        self.info = info
+        self._created = datetime.now(UTC).isoformat(timespec="seconds")
+        self._versions = collect_versions()
         self._rows_per_write = max(1, rows_per_write)
         self._rows: list[StepRecord] = []
         self._viewer_rows = max(view_rows if viewer is None else _LIVE_ROWS, 2 * self._rows_per_write)
         self._waits_for_batches = self._rows_per_write <= _SAFE_ROWS
-        self._events = self._steps = self._batches = self._chunks = 0
+        self._steps = self._batches = self._chunks = 0
+        self._events: list[DriveEvent] = []
+        self._endings: dict[int, str] = {}
         self._closed = self._failed = False
+        self.notice = ""
         batches = 1 if self._waits_for_batches else _BATCHES_ON_THEIR_WAY
-        rows = self._viewer_rows + batches * self._rows_per_write
-        self._reserve = DiskReserve(self.path, sum(info.layers), rows)
-        self._reserve.require_space_to_begin()
-        self._recording = open_recording(self.path, info)
-        recording_id = self._recording.get_recording_id() or ""
+        file = SessionFile(Path(path), existing, sync)
+        self._reserve = DiskReserve(sum(info.layers), self._viewer_rows + batches * self._rows_per_write)
+        self._reserve.require_space_to_begin(file.path)
+        self._recording = RerunRecording(file, info)
+        recording_id = self._recording.stream.get_recording_id() or ""
         self._live = None if viewer is None else LiveViewer(viewer, info, recording_id)
-        self._write_start()
+        with self._recording.errors_named():
+            name = f"{info.robot}, policy {info.policy}, seed {info.seed}"
+            self._recording.stream.send_recording_name(name)
+        self._describe_drive()
         self._viewer_data = ViewerDataWriter(info, self._send, self._log_static)
         self._flush_rows()
+
+    @property
+    def path(self) -> Path:
+        """Where the file is, or will be once the first control step is written."""
+        return self._recording.path
+
+    @property
+    def bytes(self) -> int:
+        """The size of the file so far, bytes."""
+        return self._recording.size
+
+    @property
+    def created(self) -> bool:
+        """Whether there is a file: not before the first control step."""
+        return self._recording.created
 
     def write(self, record: StepRecord) -> None:
         """Record one control step. The recorder keeps its arrays, which must not be changed.
@@ -118,11 +142,6 @@ class SessionRecorder:
         self._write_rows()
         self._flush_rows()
 
-    @property
-    def bytes(self) -> int:
-        """The size of the file so far, bytes."""
-        return self.path.stat().st_size
-
     def close(self, outcome: str) -> None:
         """Write the rest, the outcome and the index at the end of the file. A second call does nothing.
 
@@ -131,20 +150,17 @@ class SessionRecorder:
         if self._closed:
             return
         self._closed = True
+        whole = False
         try:
-            if not self._failed:
+            if not self._failed and self._steps:
                 self.flush()
                 self._viewer_data.finish()
                 self._property(OUTCOME, {"outcome": outcome})
                 self._flush_rows()
                 self._send_blueprint()
+                whole = True
         finally:
-            if self._failed:
-                abandon_recording(self._recording)
-                with self._errors_named():
-                    os.truncate(self.path, undamaged_length(self.path))
-            else:
-                self._recording.disconnect()
+            self._recording.close(self._end_index(outcome) if whole else None)
             if self._live is not None:
                 self._live.close()
 
@@ -163,15 +179,22 @@ class SessionRecorder:
     ) -> None:
         self.close(f"stopped by {kind.__name__}: {error}".removesuffix(": ") if kind else "ended")
 
-    def _write_start(self) -> None:
-        info = self.info
-        with self._errors_named():
-            self._recording.send_recording_name(f"{info.robot}, policy {info.policy}, seed {info.seed}")
-        self._property(INFO, encode_drive_info(info, datetime.now(UTC).isoformat(timespec="seconds")))
-        self._property(VERSIONS, collect_versions())
+    def _describe_drive(self) -> None:
+        self._property(INFO, encode_drive_info(self.info, self._created))
+        self._property(VERSIONS, self._versions)
+
+    def _end_index(self, outcome: str) -> dict[str, Any]:
+        return encode_session_index(
+            encode_drive_info(self.info, self._created),
+            self._versions,
+            steps=self._steps,
+            events=self._events,
+            endings=self._endings,
+            outcome=outcome,
+        )
 
     def _require_space(self) -> None:
-        if self._reserve.is_short(self._steps, self._chunks):
+        if self._reserve.is_short(self.path.parent, self.bytes, self._steps, self._chunks):
             self.close(f"the disk is full: {self._steps} steps were recorded")
             closed = f"{self.path} was closed in time and is complete"
             raise RecordingEnded(f"the disk is full; {closed}: {self._steps} steps")
@@ -180,6 +203,7 @@ class SessionRecorder:
         records, self._rows = self._rows, []
         if not records:
             return
+        self._follow_file()
         self._write_events(records)
         steps = [record.step for record in records]
         self._send(DRIVE, steps, step_record_columns(records, self.info.activations))
@@ -187,29 +211,40 @@ class SessionRecorder:
         self._viewer_data.write_changes()
         if self._viewer_data.pending >= self._viewer_rows:
             self._viewer_data.write()
+        if steps[0] < _DESCRIBED_AGAIN <= steps[-1] + 1:
+            self._describe_drive()  # a second copy, in case the first is damaged
+
+    def _follow_file(self) -> None:
+        """Create the file with the first steps; later, find out whether it is still there."""
+        if self._recording.created:
+            self.notice = self._recording.follow_file() or self.notice
+        else:
+            self._recording.create_file()
 
     def _write_events(self, records: Sequence[StepRecord]) -> None:
         events = [event for record in records for event in record.events]
         if events:
-            self._send(EVENTS, [event.step for event in events], event_columns(events, self._events))
-            self._events += len(events)
+            first = len(self._events)
+            self._send(EVENTS, [event.step for event in events], event_columns(events, first))
+            self._events += events
         ended = [record for record in records if record.ended]
         if ended:
             self._send(ENDINGS, [record.step for record in ended], episode_end_columns(ended))
+            self._endings |= {record.step: record.ended for record in ended}
 
     def _send(self, entity: str, steps: Sequence[int], columns: list[ComponentColumn]) -> None:
         self._chunks += 1
         times, ready = time_columns(steps, self.info.dt), cast("list[rr.ComponentColumn]", columns)
         self._write(
             lambda recording: rr.send_columns(
-                entity, times, ready, recording=recording, strict=recording is self._recording
+                entity, times, ready, recording=recording, strict=recording is self._recording.stream
             )
         )
 
     def _log_static(self, entity: str, archetype: Any) -> None:
         self._write(
             lambda recording: rr.log(
-                entity, archetype, static=True, recording=recording, strict=recording is self._recording
+                entity, archetype, static=True, recording=recording, strict=recording is self._recording.stream
             )
         )
 
@@ -218,19 +253,14 @@ class SessionRecorder:
 
     def _write(self, write: Callable[[rr.RecordingStream], object]) -> None:
         """Write to the recording, and to that of a viewer, whose errors are not the session's."""
-        with self._errors_named():
-            write(self._recording)
+        with self._recording.errors_named():
+            write(self._recording.stream)
         if self._live is not None:
             self._live.send(write)
 
     def _flush_rows(self, *, wait: bool = True) -> None:
-        """Hand everything to the operating system, so that it outlives this process."""
         try:
-            with self._errors_named():
-                if wait:
-                    flush_recording(self._recording, self.path)
-                else:
-                    self._recording.flush(timeout_sec=0.0)
+            self._recording.flush(wait=wait)
         except SessionError:
             self._failed = True
             raise

@@ -1,6 +1,8 @@
-"""Read Protobuf's wire format, as far as an .rrd file needs it; a `ValueError` says what is damaged."""
+"""Read and write Protobuf's wire format, as far as an .rrd file needs it; a `ValueError` says what is damaged."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 _VARINT, _EIGHT, _BYTES, _FOUR = 0, 1, 2, 5
 _VARINT_BYTES = 10
@@ -13,13 +15,18 @@ def read_fields(message: memoryview, *, cut: bool = False) -> dict[int, Value]:
     Numbers are decoded; every other field is returned as its bytes. If only the start of the message is there
     (`cut`), the last field may be incomplete.
     """
-    found: dict[int, Value] = {}
+    return dict(iterate_fields(message, cut=cut))
+
+
+def iterate_fields(message: memoryview, *, cut: bool = False) -> Iterator[tuple[int, Value]]:
+    """Yield number and content of the fields of a message in their order, as `read_fields` returns them."""
     place = 0
     while place < len(message):
         tag, place = _read_varint(message, place)
         kind = tag & 7
         if kind == _VARINT:
-            found[tag >> 3], place = _read_varint(message, place)
+            value, place = _read_varint(message, place)
+            yield tag >> 3, value
             continue
         if kind == _BYTES:
             length, place = _read_varint(message, place)
@@ -29,9 +36,8 @@ def read_fields(message: memoryview, *, cut: bool = False) -> dict[int, Value]:
             raise ValueError(f"unknown wire type {kind}")
         if place + length > len(message) and not cut:
             raise ValueError(f"a field of {length} bytes, {len(message) - place} are left")
-        found[tag >> 3] = message[place : place + length]
+        yield tag >> 3, message[place : place + length]
         place += length
-    return found
 
 
 def protobuf_number_field(found: dict[int, Value], field: int) -> int:
@@ -66,3 +72,27 @@ def _read_varint(message: memoryview, place: int) -> tuple[int, int]:
         if byte < 0x80:
             return value, place
     raise ValueError("a number is too long")
+
+
+def encode_varint(value: int) -> bytes:
+    """Encode a number that is not negative."""
+    encoded = bytearray()
+    while value > 0x7F:
+        encoded.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*encoded, value])
+
+
+def encode_tag(field: int, length: int) -> bytes:
+    """Encode what precedes the content of a field of `length` bytes."""
+    return encode_varint(field << 3 | _BYTES) + encode_varint(length)
+
+
+def encode_bytes_field(field: int, content: bytes | memoryview) -> bytes:
+    """Encode a field that is a text, a message or bytes."""
+    return encode_tag(field, len(content)) + bytes(content)
+
+
+def encode_number_field(field: int, value: int) -> bytes:
+    """Encode a numeric field."""
+    return encode_varint(field << 3 | _VARINT) + encode_varint(value)
