@@ -23,7 +23,8 @@ from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.driving.headless_drive import events_of_pressed_keys
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.session_replay import replay_session
-from pdtui.sessions.session_repair import examine_session, repair_session
+from pdtui.sessions.session_integrity import examine_session
+from pdtui.sessions.session_repair import repair_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_reader import load_map
 

@@ -19,7 +19,7 @@ from pdtui.driving.drive_server import PACED_ROWS_PER_WRITE
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.session_replay import replay_session
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.session_repair import examine_session
+from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 

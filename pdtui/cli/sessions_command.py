@@ -94,36 +94,44 @@ def show_command(file: Path, as_json: bool) -> None:
 
 @sessions_command.command()
 @click.argument("files", type=FILE_PATH, nargs=-1, required=True)
+@click.option("--no-replay", is_flag=True, help="Only compare the checksums, which needs no policy.")
 @replay_options
 @json_option
-def verify_command(files: tuple[Path, ...], options: dict[str, Any], as_json: bool) -> None:
-    """Check that FILES are whole and that their drives repeat.
+def verify_command(files: tuple[Path, ...], no_replay: bool, options: dict[str, Any], as_json: bool) -> None:
+    """Check that FILES are whole, by their checksums, and that their drives repeat.
 
     Exit codes: 0 if all pass; 1 if a file is broken, incomplete or cannot be replayed; 3 if a drive does not
     repeat.
     """
-    found = [_verify_file(file, options, as_json) for file in files]
+    found = [_verify_file(file, None if no_replay else options, as_json) for file in files]
     if as_json:
         click.echo(to_json({"sessions": found}))
     if any(row["repeats"] is False for row in found):
         sys.exit(DIFFERS)
-    if not all(row["whole"] and row["repeats"] for row in found):
+    if not all(row["whole"] and (row["repeats"] or no_replay) for row in found):
         sys.exit(BROKEN)
 
 
-def _verify_file(file: Path, options: dict[str, Any], as_json: bool) -> dict[str, Any]:
-    from pdtui.driving.session_replay import replay_session
-    from pdtui.sessions.session_repair import examine_session
+def _verify_file(file: Path, options: dict[str, Any] | None, as_json: bool) -> dict[str, Any]:
+    """Verify a session, with a replay if there are options for it, and print or return what was found."""
+    from pdtui.sessions.session_integrity import examine_session
 
-    row: dict[str, Any] = {"path": str(file), "whole": False, "repeats": None}
+    row: dict[str, Any] = {"path": str(file), "whole": False, "checksums": None, "repeats": None}
     try:
-        row["whole"] = examine_session(file).whole
-        with progress_bar("replaying", quiet=as_json) as advance:
-            result = replay_session(file, progress=advance, **options)
-        row |= {"repeats": result.passed, "identical": result.identical, **asdict(result)}
-        lines = [result.verdict if row["whole"] else f"not whole: `pdtui sessions repair`; {result.verdict}"]
-        if not result.identical:
-            lines += [f"  {line}" for line in (*map(str, result.deviations[:5]), *result.environment)]
+        found = examine_session(file)
+        row |= {"whole": found.whole, "checksums": found.sealed}
+        row["damage"] = [damaged._asdict() for damaged in found.damage]
+        row["missing"] = found.describe_losses()
+        lines = [found.verdict, *(f"  {line}" for line in row["missing"])]
+        if options is not None:
+            from pdtui.driving.session_replay import replay_session
+
+            with progress_bar("replaying", quiet=as_json) as advance:
+                result = replay_session(file, progress=advance, **options)
+            row |= {"repeats": result.passed, "identical": result.identical, **asdict(result)}
+            lines[0] += f"; {result.verdict}"
+            if not result.identical:
+                lines += [f"  {line}" for line in (*map(str, result.deviations[:5]), *result.environment)]
     except PdtuiError as error:
         row["broken"] = str(error).removeprefix(f"{file}: ")
         lines = [f"broken: {row['broken']}"]
@@ -141,8 +149,9 @@ def _verify_file(file: Path, options: dict[str, Any], as_json: bool) -> dict[str
 )
 @click.option("--in-place", is_flag=True, help="Replace FILE itself.")
 def repair_command(file: Path, output: Path | None, in_place: bool) -> None:
-    """Cut off the damaged end of FILE, so that the rest can be opened and replayed."""
-    from pdtui.sessions.session_repair import examine_session, repair_session
+    """Write everything that is whole in FILE as a session that can be opened and replayed."""
+    from pdtui.sessions.session_integrity import examine_session
+    from pdtui.sessions.session_repair import repair_session
 
     if in_place and output is not None:
         raise SessionError("--in-place and -o are mutually exclusive")
@@ -153,8 +162,11 @@ def repair_command(file: Path, output: Path | None, in_place: bool) -> None:
     if target.exists() and not in_place:
         raise SessionError(f"{target}: already exists; a repaired session is a new file")
     repaired = repair_session(file, target)
-    length = f"{repaired.steps} steps ({repaired.seconds:g} s), {repaired.keys} keys"
-    click.echo(make_printable(f"wrote {target}: {length}, outcome '{repaired.outcome}'"))
+    header = repaired.header
+    length = f"{header.steps - header.missing} steps ({header.seconds:g} s), {header.keys} keys"
+    click.echo(make_printable(f"wrote {target}: {length}, outcome '{header.outcome}'"))
+    for line in repaired.describe_losses():
+        click.echo(f"  {line}")
 
 
 @sessions_command.command()

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import SessionError
-from pdtui.core.reserved_keys import EVENT_WORDINGS
 from pdtui.sessions.drive_info import DriveInfo, decode_drive_info
+from pdtui.sessions.rrd.end_index import read_end_index
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
+from pdtui.sessions.session_index import decode_event, decode_gaps, decode_session_index
+from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, REPAIR, VERSIONS
 
 
 @dataclass(frozen=True)
@@ -26,9 +30,11 @@ class SessionHeader:
         versions: versions of the machine and the libraries that ran the drive.
         created: date and time at which the drive began, ISO 8601.
         events: the events, in the order in which they were applied.
-        steps: number of control steps.
+        steps: number of control steps, including those that are missing.
         endings: why episodes ended by themselves, by the control step that ended each.
         outcome: how the drive ended; empty if the recording was cut off.
+        gaps: ranges of control steps that a repair could not rescue, each without its end; the events of a
+            session with gaps may be incomplete.
     """
 
     path: Path
@@ -39,6 +45,12 @@ class SessionHeader:
     steps: int
     endings: dict[int, str] = field(repr=False)
     outcome: str = ""
+    gaps: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def missing(self) -> int:
+        """The number of control steps that a repair could not rescue."""
+        return count_missing(self.gaps)
 
     @property
     def seconds(self) -> float:
@@ -52,13 +64,19 @@ class SessionHeader:
 
 
 def read_session_header(path: Path | str) -> SessionHeader:
-    """Read the header of a session without decoding, or even reading, the data of its control steps.
+    """Read the header of a session from the index at its end, or without decoding the data of its steps.
 
     Raises:
         SessionError: the file does not exist, is no session, or is cut off or damaged; the message names the
-            file. Damage within the data of control steps is not noticed.
+            file. Damage within the data of control steps is not noticed, and none is in a file with an index.
     """
     path = Path(path)
+    index = read_end_index(path)
+    if index is not None:
+        try:
+            return SessionHeader(path, **decode_session_index(index))
+        except SessionError:
+            pass  # the file itself says the same, or what is wrong
     file = RrdContents(path, entities=(EVENTS, ENDINGS))
     try:
         return decode_header(file, path, file.skipped_rows[DRIVE])
@@ -66,42 +84,74 @@ def read_session_header(path: Path | str) -> SessionHeader:
         raise SessionError(f"{path}: {error}") from error
 
 
-def decode_header(file: RrdContents, path: Path, steps: int) -> SessionHeader:
-    """Return the header of a session of which properties, events and endings were read."""
+def decode_header(file: RrdContents, path: Path, rows: int) -> SessionHeader:
+    """Return the header of a session of which properties, events and endings were read.
+
+    `rows` is the number of control steps that are there.
+    """
     info, created = decode_drive_info(file.properties(INFO))
     versions = {name: str(values[0]) for name, values in file.properties(VERSIONS).items() if values}
-    events, endings = _read_events(file.table(EVENTS)), _read_endings(file.table(ENDINGS))
-    return SessionHeader(path, info, versions, created, events, steps, endings, read_drive_outcome(file))
+    gaps = read_gaps(file)
+    events = read_events(file.table(EVENTS), complete=not file.properties(REPAIR))
+    endings, outcome = read_endings(file.table(ENDINGS)), read_drive_outcome(file)
+    steps = rows + count_missing(gaps)
+    return SessionHeader(path, info, versions, created, events, steps, endings, outcome, gaps)
 
 
-def count_control_steps(drive: EntityTable) -> int:
-    """Count control steps; one that is missing is a `SessionError`."""
+def count_missing(gaps: Sequence[tuple[int, int]]) -> int:
+    """Return the number of control steps in gaps."""
+    return sum(end - first for first, end in gaps)
+
+
+def find_gaps(steps: NDArray[np.int64]) -> tuple[tuple[int, int], ...]:
+    """Return the ranges of control steps that are missing before and between these, which are in order."""
+    before = np.concatenate([[-1], steps])[: len(steps)]
+    places = np.flatnonzero(steps - before > 1)
+    return tuple((int(before[place]) + 1, int(steps[place])) for place in places)
+
+
+def count_control_steps(drive: EntityTable, gaps: Sequence[tuple[int, int]] = ()) -> int:
+    """Count the control steps that are there; one that is missing, except in gaps, is a `SessionError`."""
     steps = drive.steps
-    wrong = np.flatnonzero(steps != np.arange(len(steps)))
+    expected = np.arange(len(steps) + count_missing(gaps))
+    for first, end in reversed(gaps):
+        expected = np.delete(expected, slice(first, end))
+    expected = expected[: len(steps)]
+    wrong = np.flatnonzero(steps[: len(expected)] != expected)
     if wrong.size:
-        raise SessionError(f"expected control step {wrong[0]}, found step {steps[wrong[0]]}")
+        raise SessionError(f"expected control step {expected[wrong[0]]}, found step {steps[wrong[0]]}")
     return len(steps)
 
 
-def _read_events(table: EntityTable) -> tuple[DriveEvent, ...]:
+def read_gaps(file: RrdContents) -> tuple[tuple[int, int], ...]:
+    """Return the ranges of control steps that a repair could not rescue."""
+    text = file.properties(REPAIR).get("gaps", ["[]"])
+    try:
+        return decode_gaps(json.loads(text[0]))
+    except (ValueError, TypeError, IndexError, RecursionError) as error:
+        raise SessionError(f"property 'gaps': invalid: {error!r}") from error
+
+
+def read_events(table: EntityTable, *, complete: bool = True) -> tuple[DriveEvent, ...]:
+    """Return the events in their order; a missing one is a `SessionError` if they have to be `complete`."""
     if not len(table.steps):
         return ()
     numbers = table.read_numbers("number", np.int64)
     order = np.argsort(numbers, kind="stable")
-    if not np.array_equal(numbers[order], np.arange(len(order))):
+    if complete and not np.array_equal(numbers[order], np.arange(len(order))):
         raise SessionError("an event is missing")
     kinds, names, keys = table.read_texts("kind"), table.read_texts("name"), table.read_texts("key")
     values = table.read_numbers("value", np.float64)
-    events = []
-    for row in order:
-        kind = kinds[row]
-        if kind not in EVENT_WORDINGS:
-            raise SessionError(f"unknown event '{kind[:40]}'; available: {', '.join(EVENT_WORDINGS)}")
-        events.append(DriveEvent(int(table.steps[row]), kind, names[row], float(values[row]), keys[row]))
-    return tuple(events)
+    try:
+        return tuple(
+            decode_event(int(table.steps[row]), kinds[row], names[row], float(values[row]), keys[row])
+            for row in order
+        )
+    except ValueError as error:
+        raise SessionError(f"an event is damaged: {error}") from error
 
 
-def _read_endings(table: EntityTable) -> dict[int, str]:
+def read_endings(table: EntityTable) -> dict[int, str]:
     if not len(table.steps):
         return {}
     return dict(zip(table.steps.tolist(), table.read_texts("TextLog:text"), strict=True))

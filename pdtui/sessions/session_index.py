@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple
 from typing import Any
 
 from pdtui.core.drive_events import DriveEvent
+from pdtui.core.errors import SessionError
+from pdtui.core.reserved_keys import EVENT_WORDINGS
+from pdtui.sessions.drive_info import decode_drive_info
+
+_MAX_STEPS = 1 << 40
 
 
 def encode_session_index(
@@ -28,7 +34,7 @@ def encode_session_index(
         events: the events, in the order in which they were applied.
         endings: why episodes ended by themselves, by the control step that ended each.
         outcome: how the drive ended.
-        gaps: ranges of control steps that a repair could not rescue, without their ends.
+        gaps: ranges of control steps that a repair could not rescue, each without its end.
     """
     return {
         "drive": dict(drive),
@@ -39,3 +45,61 @@ def encode_session_index(
         "outcome": outcome,
         "gaps": [list(gap) for gap in gaps],
     }
+
+
+def decode_session_index(index: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a `SessionHeader`, except its path, trusting nothing in the index.
+
+    An index that is not as expected is a `SessionError`.
+    """
+    try:
+        drive = {
+            name: value if isinstance(value, list) else [value] for name, value in index["drive"].items()
+        }
+        info, created = decode_drive_info(drive)
+        versions = {str(name): str(value) for name, value in index["versions"].items()}
+        return {
+            "info": info,
+            "created": created,
+            "versions": versions,
+            "steps": _check_step(index["steps"]),
+            "events": tuple(decode_event(*event) for event in index["events"]),
+            "endings": {_check_step(step): _check_text(reason) for step, reason in index["endings"]},
+            "outcome": _check_text(index["outcome"]),
+            "gaps": decode_gaps(index["gaps"]),
+        }
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise SessionError(f"the file's index is not as expected: {error!r}") from error
+
+
+def decode_event(step: Any, kind: Any, name: Any, value: Any, key: Any) -> DriveEvent:
+    """Return an event; one that is not as expected is a `SessionError` or a `ValueError`."""
+    if kind not in EVENT_WORDINGS:
+        raise SessionError(f"unknown event '{str(kind)[:40]}'; available: {', '.join(EVENT_WORDINGS)}")
+    if type(value) not in (int, float):
+        raise ValueError(f"the value of an event is no number: {str(value)[:40]}")
+    return DriveEvent(_check_step(step), kind, _check_text(name), float(value), _check_text(key))
+
+
+def decode_gaps(gaps: Any) -> tuple[tuple[int, int], ...]:
+    """Return ranges of missing control steps; those that are not in order are a `ValueError`."""
+    found = tuple((_check_step(first), _check_step(end)) for first, end in gaps)
+    before = -math.inf
+    for first, end in found:
+        if not before < first < end:
+            raise ValueError("the gaps are not in order")
+        before = end
+    return found
+
+
+def _check_step(value: Any) -> int:
+    if type(value) is not int or not 0 <= value < _MAX_STEPS:
+        raise ValueError(f"expected the number of a control step, found {str(value)[:40]}")
+    return value
+
+
+def _check_text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"expected text, found {str(value)[:40]}")
+    value.encode()  # fails for lone surrogates
+    return value

@@ -17,7 +17,7 @@ from pdtui.core.units import Stimulation
 from pdtui.sessions.drive_info import decode_drive_info
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_header import SessionHeader, count_control_steps, decode_header
+from pdtui.sessions.session_header import SessionHeader, count_control_steps, decode_header, read_gaps
 from pdtui.sessions.session_schema import ACTIVE_FIELDS, DIGEST_EPISODE, DRIVE, INFO, REWARD_COST_ACTION
 
 
@@ -63,7 +63,7 @@ def read_session(path: Path | str) -> Session:
     file = RrdContents(path, skip=("activations",))
     try:
         drive = file.table(DRIVE)
-        header = decode_header(file, path, count_control_steps(drive))
+        header = decode_header(file, path, count_control_steps(drive, read_gaps(file)))
         info = header.info
         gains = drive.read_matrix(REWARD_COST_ACTION, np.float64)
         if header.steps and gains.shape[1] < 2:
@@ -100,7 +100,7 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
     try:
         info, _ = decode_drive_info(file.properties(INFO))
         drive = file.table(DRIVE)
-        count_control_steps(drive)
+        count_control_steps(drive, read_gaps(file))
         if info.activations == "off":
             how = "(--record-activations off); a replay computes them"
             raise SessionError(f"the activations were not recorded {how}")

@@ -1,120 +1,122 @@
-"""Repair a session whose end is missing or damaged: rescue what can be read."""
+"""Repair a session that is damaged or cut off: everything in it that is whole is rescued."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+import rerun as rr
 import rerun.chunk
 
 from pdtui.core.atomic_file import replace_file
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import SessionError
-from pdtui.sessions.drive_info import DriveInfo, decode_drive_info
+from pdtui.sessions.drive_info import encode_drive_info
 from pdtui.sessions.rrd.chunk_stream import ChunkStream
-from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_header import (
-    SessionHeader,
-    count_control_steps,
-    decode_header,
-    read_drive_outcome,
-)
-from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, INFO, OUTCOME, STEP
-from pdtui.sessions.writer.rerun_recording import name_file_in_errors, open_recording, send_property_group
+from pdtui.sessions.rrd.rrd_contents import PROPERTIES
+from pdtui.sessions.session_index import encode_session_index
+from pdtui.sessions.session_integrity import SessionIntegrity, examine_messages, examine_session
+from pdtui.sessions.session_schema import EVENTS, INFO, OUTCOME, REPAIR, STEP, VERSIONS
+from pdtui.sessions.writer.arrow_columns import time_columns
+from pdtui.sessions.writer.rerun_recording import RerunRecording, name_file_in_errors, send_property_group
+from pdtui.sessions.writer.session_file import SessionFile, is_being_recorded
+from pdtui.sessions.writer.step_record_columns import event_columns
 
 _CHUNKS_PER_FLUSH = 64
 
 
-@dataclass(frozen=True)
-class SessionIntegrity:
-    """How much of a session can be read.
+def repair_session(path: Path, output: Path) -> SessionIntegrity:
+    """Write everything that is whole in a session as a new session, with a few chunks in memory at a time.
 
-    Attributes:
-        info: what was known before the first control step.
-        steps: number of control steps before the first gap or the first damaged chunk.
-        outcome: how the drive ended; empty if the file does not say.
-        recording_id: identifier by which the viewer knows the recording.
-        whole: whether every chunk, every control step, the outcome and the index at the end are there.
-    """
-
-    info: DriveInfo
-    steps: int
-    outcome: str
-    recording_id: str
-    whole: bool
-
-
-def examine_session(path: Path) -> SessionIntegrity:
-    """Report what can be read of a session.
-
-    A file that is no session, or was cut off before its first control step, is a `SessionError`.
-    """
-    file = RrdContents(path, only=(DIGEST_EPISODE,), torn=True)
-    try:
-        info, _ = decode_drive_info(file.properties(INFO))
-        steps = file.table(DRIVE).steps
-    except SessionError as error:
-        raise SessionError(f"{path}: nothing can be rescued: {error}") from error
-    gaps = np.flatnonzero(steps != np.arange(len(steps)))
-    kept = int(gaps[0]) if gaps.size else len(steps)
-    outcome = read_drive_outcome(file)
-    whole = file.finished and not gaps.size and bool(outcome)
-    return SessionIntegrity(info, kept, outcome, file.recording_id, whole)
-
-
-def repair_session(path: Path, output: Path) -> SessionHeader:
-    """Write what can be read of a session as a complete session, with only a few chunks in memory at a time.
-
-    Everything from the first missing step on is left out. The outcome becomes ``repaired: cut at step N``
-    unless the file still says how the drive ended. The output appears only once it is complete.
+    Control steps that cannot be rescued are reported as gaps, behind which the rest is kept. The description
+    of the drive, of which a session has several copies, and its layout are written anew. The outcome becomes
+    ``repaired: cut at step N`` unless the file still says how the drive ended. The output appears only once
+    it is complete.
 
     Args:
         path: the session.
         output: the repaired session; may be `path`, which is then replaced.
 
+    Returns:
+        What was found in `path`, and was written.
+
     Raises:
         SessionError: nothing can be rescued, or the output cannot be written.
     """
-    condition = examine_session(path)
+    found = examine_messages(path)
     if not output.parent.is_dir():
         raise SessionError(f"{output}: cannot be written: the folder does not exist")
+    if output.exists() and is_being_recorded(output):
+        raise SessionError(f"{output}: cannot be written: it is being recorded")
     with name_file_in_errors(output), replace_file(output, SessionError) as partial:
-        _rewrite(path, partial, condition)
-        contents = RrdContents(partial, only=(DIGEST_EPISODE,))
-        repaired = decode_header(contents, output, count_control_steps(contents.table(DRIVE)))
-        if repaired.steps != condition.steps:
-            found = f"found {repaired.steps} in the repaired session"
-            raise SessionError(f"{path}: expected {condition.steps} steps, {found}")
+        partial.unlink()
+        outcome = found.outcome or f"repaired: cut at step {found.steps}"
+        written = replace(found, header=replace(found.header, path=output, outcome=outcome))
+        _rewrite(path, partial, written)
+        again = examine_session(partial)
+        if not again.whole or again.steps != found.steps:
+            raise SessionError(f"{path}: cannot be repaired: {found.steps} steps were to be rescued")
         partial.chmod(path.stat().st_mode & 0o777)
-    return repaired
+    return written
 
 
-def _rewrite(path: Path, output: Path, condition: SessionIntegrity) -> None:
-    recording = open_recording(output, condition.info, condition.recording_id)
+def _rewrite(path: Path, output: Path, found: SessionIntegrity) -> None:
+    header = found.header
+    drive = encode_drive_info(header.info, header.created)
+    recording = RerunRecording(SessionFile(output), header.info, found.recording_id)
+    stream = recording.stream
     try:
-        for number, chunk in enumerate(_read_kept_chunks(path, condition.steps)):
-            recording.send_chunks(chunk)
+        recording.create_file()
+        for name, values in (
+            (INFO, drive),
+            (VERSIONS, header.versions),
+            (OUTCOME, {"outcome": header.outcome}),
+        ):
+            if values:
+                send_property_group(stream, name, values)
+        if found.describe_losses():
+            gaps = json.dumps(header.gaps)
+            send_property_group(stream, REPAIR, {"gaps": gaps, "lost_events": found.lost_events})
+        _send_events(stream, header.events, header.info.dt)
+        for number, chunk in enumerate(_read_kept_chunks(path, header.steps)):
+            stream.send_chunks(chunk)
             if number % _CHUNKS_PER_FLUSH == 0:
                 recording.flush()
-        if not condition.outcome:
-            send_property_group(recording, OUTCOME, {"outcome": f"repaired: cut at step {condition.steps}"})
         recording.flush()
-    finally:
-        recording.disconnect()
+        index = encode_session_index(
+            drive,
+            header.versions,
+            steps=header.steps,
+            events=header.events,
+            endings=header.endings,
+            outcome=header.outcome,
+            gaps=header.gaps,
+        )
+    except BaseException:
+        recording.close()
+        raise
+    recording.close(index)
+
+
+def _send_events(stream: rr.RecordingStream, events: Sequence[DriveEvent], dt: float) -> None:
+    if events:
+        times = time_columns([event.step for event in events], dt)
+        columns: Any = event_columns(events, 0)
+        rr.send_columns(EVENTS, times, columns, recording=stream, strict=True)
 
 
 def _read_kept_chunks(path: Path, steps: int) -> Iterator[rerun.chunk.Chunk]:
-    """Yield the chunks without rows of later steps, whose events may have been written before their data."""
-    stream = iter(ChunkStream(path))
-    while True:
-        try:
-            chunk = next(stream)
-        except (SessionError, StopIteration):  # what follows damage is left out
-            return
+    """Yield the chunks that are not written anew, without rows of later steps than the last that is there."""
+    anew = {EVENTS, *(f"{PROPERTIES}{name}" for name in (INFO, VERSIONS, OUTCOME, REPAIR))}
+    for chunk in ChunkStream(path, damage=[]):
         batch = chunk.batch
+        if chunk.entity in anew:
+            continue
         if STEP in chunk.timelines:
             batch = batch.filter(pc.less(batch.column(STEP), steps))
         if batch.num_rows:

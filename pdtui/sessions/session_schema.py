@@ -25,7 +25,7 @@ TARGETS = "/view/targets"
 MAGNITUDES = "/view/magnitudes"
 HEAT_MAP = "/view/activations"
 
-INFO, VERSIONS, OUTCOME = "drive", "versions", "outcome"
+INFO, VERSIONS, OUTCOME, REPAIR = "drive", "versions", "outcome", "repair"
 
 REWARD_COST_ACTION, DIGEST_EPISODE = "reward_cost_action", "digest_episode"
 

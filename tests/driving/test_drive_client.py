@@ -19,8 +19,8 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.session_replay import replay_session
 from pdtui.policies.weights.weights_file import hash_file
+from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session
-from pdtui.sessions.session_repair import examine_session
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
 from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.real_viewer import free_port, real_viewer

@@ -18,8 +18,8 @@ from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import ENDING_SIGNALS, catch_ending_signals
 from pdtui.driving.loop_builder import build_control_loop
+from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session
-from pdtui.sessions.session_repair import examine_session
 from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.test_terminal import PATIENCE
 

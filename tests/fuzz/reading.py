@@ -75,8 +75,9 @@ def read_session_file(path: Path) -> None:
     from pdtui.driving.session_replay import config_from_session
     from pdtui.sessions.session_comparison import compare_sessions
     from pdtui.sessions.session_header import read_session_header
+    from pdtui.sessions.session_integrity import examine_session
     from pdtui.sessions.session_reader import read_activations, read_session
-    from pdtui.sessions.session_repair import examine_session, repair_session
+    from pdtui.sessions.session_repair import repair_session
     from pdtui.sessions.session_summary import summarise_session
 
     with suppress(PdtuiError):

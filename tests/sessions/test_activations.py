@@ -11,8 +11,9 @@ import pytest
 from pdtui.core.errors import SessionError
 from pdtui.sessions.session_comparison import compare_sessions
 from pdtui.sessions.session_export import export_stream
+from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_activations, read_session
-from pdtui.sessions.session_repair import examine_session, repair_session
+from pdtui.sessions.session_repair import repair_session
 from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded
@@ -52,7 +53,7 @@ def test_everything_else_is_there(kept: ActivationsKept, recorded: Recorded, tmp
     assert (result.first_difference, result.steps, result.circumstances) == (None, len(recorded[2]), ())
     torn = tmp_path / "torn.rrd"
     torn.write_bytes(path.read_bytes()[: path.stat().st_size * 3 // 4])
-    assert repair_session(torn, torn).info.activations == kept
+    assert repair_session(torn, torn).header.info.activations == kept
     assert examine_session(torn).whole
 
 

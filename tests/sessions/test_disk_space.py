@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import SessionError
+from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session
-from pdtui.sessions.session_repair import examine_session
-from pdtui.sessions.writer.disk_space import free_space, is_disk_full
+from pdtui.sessions.writer.disk_space import free_space
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded
 
@@ -95,15 +95,12 @@ def test_no_recording_begins_on_a_full_disk(weights: Path, tmp_path: Path) -> No
 
 
 def test_room_is_what_the_disk_and_the_limit_leave(tmp_path: Path) -> None:
-    path = tmp_path / "a"
-    path.write_bytes(b"x" * 1000)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    assert free_space(path) > 0
-    assert not is_disk_full(path)
+    assert free_space(tmp_path, 1000) > 500
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (1500, before[1]))
-        assert free_space(path) == 500
-        assert is_disk_full(path)
+        assert free_space(tmp_path, 1000) == 500
+        assert free_space(tmp_path, 2000) == 0
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 

@@ -9,10 +9,9 @@ import pytest
 
 from pdtui.core.errors import SessionError
 from pdtui.sessions.rrd.message_decoder import decompress_start
-from pdtui.sessions.rrd.message_framing import CHUNK, read_message_frames
+from pdtui.sessions.rrd.message_framing import CHUNK, read_message_spans
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_reader import read_session
-from tests.sessions.conftest import Recorded
 
 SAMPLES = Path(__file__).parents[2] / "sessions" / "samples"
 
@@ -31,7 +30,7 @@ def test_the_data_of_the_steps_is_not_read_for_the_header(tmp_path: Path) -> Non
     data = bytearray(sample.read_bytes())
     blanked = 0
     with sample.open("rb") as file:
-        for frame in read_message_frames(file, len(data)):
+        for frame in read_message_spans(file, len(data)):
             if frame.kind == CHUNK and frame.length > 20_000:
                 data[frame.start + 4096 : frame.end] = bytes(frame.length - 4096)
                 blanked += frame.length - 4096
@@ -43,10 +42,12 @@ def test_the_data_of_the_steps_is_not_read_for_the_header(tmp_path: Path) -> Non
         read_session(path)
 
 
-def test_a_damaged_head_of_a_chunk_is_named(recorded: Recorded, tmp_path: Path) -> None:
-    data = bytearray(recorded[0].read_bytes())
-    with recorded[0].open("rb") as file:
-        frames = [frame for frame in read_message_frames(file, len(data)) if frame.kind == CHUNK]
+def test_a_damaged_head_of_a_chunk_is_named(tmp_path: Path) -> None:
+    """In a session without an index, whose header is put together from the whole file."""
+    sample = SAMPLES / "ant.rrd"
+    data = bytearray(sample.read_bytes())
+    with sample.open("rb") as file:
+        frames = [frame for frame in read_message_spans(file, len(data)) if frame.kind == CHUNK]
     path = tmp_path / "a.rrd"
     for frame in frames[:: len(frames) // 12]:
         path.write_bytes(data[: frame.start] + b"\xff" * 64 + data[frame.start + 64 :])

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import io
 import random
 import struct
+from itertools import chain
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
 from pdtui.core.errors import SessionError
+from pdtui.sessions.rrd.message_framing import RrdMessageSpan, read_message_spans
+from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_activations, read_session
-from pdtui.sessions.session_repair import examine_session, repair_session
+from pdtui.sessions.session_repair import repair_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded
-from tests.sessions.recorded_drives import make_loop
+from tests.sessions.recorded_drives import make_loop, record_drive
 from tests.sessions.test_recording_failures import foreign
+
+SAMPLES = Path(__file__).parents[2] / "sessions" / "samples"
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +75,7 @@ def test_repairing_in_place_keeps_who_it_is(recorded: Recorded, tmp_path: Path) 
     repaired = repair_session(link, link)
     assert link.is_symlink()
     assert read_session(torn).steps == repaired.steps > 0
-    assert repaired.info == recorded[1].info
+    assert repaired.header.info == recorded[1].info
     assert RrdReader(torn).recordings() == RrdReader(recorded[0]).recordings()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["link.rrd", "torn.rrd"]
 
@@ -78,21 +85,119 @@ def test_a_whole_session_is_whole(recorded: Recorded) -> None:
     assert examine_session(recorded[0]).outcome == "the operator quit"
 
 
-def test_a_broken_middle_is_cut_there(recorded: Recorded, tmp_path: Path) -> None:
-    """A message in the middle claims to be of another length: what is before it is kept."""
+def spans(data: bytes) -> list[RrdMessageSpan]:
+    with io.BytesIO(data) as file:
+        return list(read_message_spans(file, len(data)))
+
+
+@pytest.mark.parametrize("claimed", [2**62, 2**33, 5000, 0])
+def test_a_wrong_length_loses_only_its_message(claimed: int, recorded: Recorded, tmp_path: Path) -> None:
+    """A message in the middle claims to be of another length: what is before and behind it is kept."""
     data = bytearray(recorded[0].read_bytes())
-    headers, place = [], 12
-    while place + 16 <= len(data):
-        headers.append(place)
-        place += 16 + struct.unpack_from("<QQ", data, place)[1]
-    for claimed in (2**62, 2**33, 0):
-        path = tmp_path / f"{claimed}.rrd"
-        struct.pack_into("<Q", data, headers[len(headers) // 2] + 8, claimed)
+    found = spans(data)
+    damaged = found[len(found) // 2]
+    struct.pack_into("<Q", data, damaged.begin + 8, claimed)
+    path = tmp_path / "a.rrd"
+    path.write_bytes(data)
+    there = examine_session(path)
+    assert not there.whole
+    assert [(span.start, span.end) for span in there.damage] == [(damaged.begin, damaged.end)]
+    assert repair_session(path, tmp_path / "repaired.rrd").outcome == "the operator quit"
+    assert examine_session(tmp_path / "repaired.rrd").whole
+
+
+@pytest.mark.parametrize("sealed", [True, False])
+def test_flipped_bits_cost_at_most_the_message_they_are_in(
+    sealed: bool, recorded: Recorded, tmp_path: Path
+) -> None:
+    """Messages of all kinds in turn, in a session with checksums, and in an old one without."""
+    source = recorded[0] if sealed else SAMPLES / "bipedal_walker.rrd"
+    data = source.read_bytes()
+    before = read_session(source)
+    drawn = random.Random(5)
+    found = spans(data)[:-1]
+    lost_steps, path, output = 0, tmp_path / "a.rrd", tmp_path / "b.rrd"
+    for span in found[::7] if sealed else found[::61]:
+        place = drawn.randrange(span.begin, span.end)
+        changed = bytearray(data)
+        changed[place] ^= 1 << drawn.randrange(8)
+        path.write_bytes(changed)
+        there = examine_session(path)
+        if there.whole:  # without checksums, some bits matter to nobody
+            assert not sealed
+            continue
+        assert all(span.begin <= damage.start <= damage.end <= span.end for damage in there.damage)
+        output.unlink(missing_ok=True)
+        repaired = repair_session(path, output)
+        assert repaired.outcome == before.outcome
+        session = read_session(output)
+        kept = np.delete(np.arange(before.steps), list(chain(*(range(*gap) for gap in session.gaps))))
+        kept = kept[: len(session.digests)]
+        assert (session.digests == before.digests[kept]).all()
+        assert session.attributes.tobytes() == before.attributes[kept].tobytes()
+        assert sealed <= (session.events == before.events)
+        rows = before.steps - len(kept)
+        assert rows <= (64 if sealed else 128)
+        lost_steps += rows
+        assert examine_session(output).whole
+    assert lost_steps
+
+
+def test_two_damaged_places_are_two_gaps(weights: Path, tmp_path: Path) -> None:
+    path, output = tmp_path / "a.rrd", tmp_path / "b.rrd"
+    record_drive(path, weights, rows_per_write=4)
+    data = bytearray(path.read_bytes())
+    rows = [span for span in spans(data) if b"digest_episode" in data[span.start : span.end]]
+    for span in (rows[3], rows[4], rows[9]):
+        data[span.start + span.length // 2] ^= 1
+    path.write_bytes(data)
+    repaired = repair_session(path, output)
+    assert len(repaired.header.gaps) == 2
+    session = read_session(output)
+    assert session.gaps == repaired.header.gaps
+    assert session.missing == sum(end - first for first, end in session.gaps)
+    assert session.steps == 100
+    assert all("missing" in line for line in repaired.describe_losses())
+
+
+def test_a_second_repair_keeps_the_gaps_of_the_first(weights: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    record_drive(path, weights, rows_per_write=4)
+    gaps = []
+    for number in (5, 9):
+        data = bytearray(path.read_bytes())
+        rows = [span for span in spans(data) if b"digest_episode" in data[span.start : span.end]]
+        data[rows[number].start + 40] ^= 1
         path.write_bytes(data)
-        assert not examine_session(path).whole
-        repaired = repair_session(path, tmp_path / "repaired.rrd")
-        assert repaired.outcome == f"repaired: cut at step {repaired.steps}"
-        assert 0 < repaired.steps <= 100
+        gaps.append(repair_session(path, path).header.gaps)
+    assert len(gaps[0]) == 1
+    assert len(gaps[1]) == 2
+    assert set(gaps[0]) < set(gaps[1])
+
+
+def test_a_damaged_description_is_read_from_its_copies(recorded: Recorded, tmp_path: Path) -> None:
+    data = bytearray(recorded[0].read_bytes())
+    described = [span for span in spans(data) if b"policy_hash" in data[span.start : span.end]][:-1]
+    assert len(described) == 2
+    path = tmp_path / "a.rrd"
+    for span in described:
+        data[span.start + span.length // 2] ^= 16
+        path.write_bytes(data)
+        output = tmp_path / f"{span.start}.rrd"
+        assert repair_session(path, output).header.info == recorded[1].info
+        assert read_session(output).info == recorded[1].info
+
+
+def test_messages_that_are_missing_or_exchanged_are_seen(recorded: Recorded, tmp_path: Path) -> None:
+    data = recorded[0].read_bytes()
+    a, b = spans(data)[8:10]
+    first, second = data[a.begin : a.end], data[b.begin : b.end]
+    path = tmp_path / "a.rrd"
+    for between in (second, first, second + first, first + first + second):
+        path.write_bytes(data[: a.begin] + between + data[b.end :])
+        there = examine_session(path)
+        assert not there.whole
+        assert there.damage
 
 
 @pytest.mark.parametrize(

@@ -73,7 +73,8 @@ class ChunkStream:
     def require_store(self) -> RrdStoreInfo:
         """Return the store of the recording; a file that announces none is a `SessionError`."""
         if self.store is None:
-            raise SessionError(f"{self._path}: contains no recording")
+            why = self._damage[0].reason if self._damage else "contains no recording"
+            raise SessionError(f"{self._path}: {why}")
         return self.store
 
     def _chunks(self, file: BinaryIO) -> Iterator[EntityChunk]:

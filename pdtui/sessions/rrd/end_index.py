@@ -1,8 +1,9 @@
-"""A session's own index at the end of its file: what `sessions list` and `show` print, without reading the rest.
+"""A session's own index at the end of its file: what `sessions list` and `show` print, without reading the
+rest.
 
-It is a field of the file's last message, the footer, which Rerun's own readers skip as unknown. The field is the last
-of the footer: a JSON object, compressed with zlib, its length (4 bytes), a mark (4 bytes) and an XXH3 checksum
-(8 bytes). It is found from the end of the file, before the trailer.
+It is a field of the file's last message, the footer, which Rerun's own readers skip as unknown. The field is
+the last of the footer: a JSON object, compressed with zlib, its length (4 bytes), a mark (4 bytes) and an
+XXH3 checksum (8 bytes). It is found from the end of the file, before the trailer.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _FIELD = 2046
 _MARK = b"PDTI"
 _END = struct.Struct("<I4sQ")
 _MAX_PACKED, _MAX_PLAIN = 32 << 20, 128 << 20
-"""Largest size of an index, bytes, compressed and not. One key press takes about 30 bytes, or 4 compressed."""
+"""Largest size of an index, bytes, compressed and not. A key press takes about 30 bytes, or 4 compressed."""
 
 
 def encode_end_index(index: dict[str, Any]) -> bytes:

@@ -1,10 +1,10 @@
 """Checksums of the messages of a session, by which damage shows without running anything.
 
-pdtui adds a field to each message that Rerun encodes; Rerun's own readers skip fields that they do not know. The
-field is the last of the message and contains 12 bytes:
+pdtui adds a field to each message that Rerun encodes; Rerun's own readers skip fields that they do not know.
+The field is the last of the message and contains 12 bytes:
 
-- the link, 4 bytes: the lower half of the checksum of the message before it, 0 in the first message. A message
-  that is missing, or that was put in, breaks the chain.
+- the link, 4 bytes: the lower half of the checksum of the message before it, 0 in the first message. A
+  message that is missing, or that was put in, breaks the chain.
 - the checksum, 8 bytes: XXH3 of the message's header, its payload before the field, and the link.
 
 The checksum finds accidents, not forgery: anyone can compute it.

@@ -1,8 +1,8 @@
 """Find the messages of an .rrd file, and find the next whole one where the file is damaged.
 
 A file begins with 12 bytes. Messages follow, each after a header of 16 bytes: its kind and its length. The
-last message is of kind 0 and is followed by 32 bytes that contain its position, length and checksum. pdtui's own
-recordings have a checksum in every message, too. An error names the byte but not the file.
+last message is of kind 0 and is followed by 32 bytes that contain its position, length and checksum. pdtui's
+own recordings have a checksum in every message, too. An error names the byte but not the file.
 """
 
 from __future__ import annotations

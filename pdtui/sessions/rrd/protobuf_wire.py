@@ -1,4 +1,4 @@
-"""Read and write Protobuf's wire format, as far as an .rrd file needs it; a `ValueError` says what is damaged."""
+"""Protobuf's wire format, as far as an .rrd file needs it; a `ValueError` says what is damaged."""
 
 from __future__ import annotations
 

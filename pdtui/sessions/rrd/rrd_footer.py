@@ -45,9 +45,10 @@ def move_chunks(footer: memoryview, starts: NDArray[np.uint64], longer: int) -> 
     def adapt(fields: memoryview, field: int, change: _Change) -> bytes:
         parts = []
         for number, value in iterate_fields(fields):
-            if number == field and not isinstance(value, int):
-                value = memoryview(change(value))
-            parts.append(_encode_field(number, value))
+            if number != field or isinstance(value, int):
+                parts.append(_encode_field(number, value))
+            else:
+                parts.append(encode_bytes_field(number, change(value)))
         return b"".join(parts)
 
     def adapt_table(table: memoryview) -> bytes:

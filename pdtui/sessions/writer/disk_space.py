@@ -23,7 +23,7 @@ _LEAST_STEP_BYTES = 2000
 
 
 def free_space(folder: Path, size: int) -> int:
-    """Return by how many bytes a file of this size can grow: the free space, within the limit on file sizes."""
+    """Return by how many bytes a file of this size can grow: free space, within the limit on file sizes."""
     disk = os.statvfs(folder)
     free = disk.f_bavail * disk.f_frsize
     limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -1,4 +1,4 @@
-"""A pipe that takes what Rerun writes, adds a checksum to each message, and hands whole messages to the file."""
+"""A pipe that takes what Rerun writes, adds checksums, and hands whole messages to the session's file."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ _SYNC_SECONDS = 1.0
 class MessagePipe:
     """Passes the messages of a recording on to its file.
 
-    Rerun writes into the pipe from a thread of its own. The messages are taken out by a thread of this object,
-    and by `drain`, which returns once everything that Rerun has written was handed to the operating system. When
-    the file cannot be written, the rest is thrown away, so that Rerun never waits, and `drain` raises the error.
+    Rerun writes into the pipe from a thread of its own. The messages are taken out by a thread of this
+    object, and by `drain`, which returns once everything that Rerun has written was handed to the operating
+    system. When the file cannot be written, the rest is thrown away, so that Rerun never waits, and `drain`
+    raises the error.
 
     Args:
         file: the file.

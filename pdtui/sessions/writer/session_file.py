@@ -17,9 +17,9 @@ ExistingFile = Literal["refuse", "number", "replace"]
 SyncMode = Literal["off", "batch", "full"]
 """When data are forced to the disk: never; in the background, about once a second; or with every write.
 
-A killed process loses nothing in any mode. A power failure may take what was not forced to the disk: with ``off``,
-what the operating system has not written by itself, on Linux up to about 30 s; with ``batch``, about the last second;
-with ``full``, nothing that was written.
+A killed process loses nothing in any mode. A power failure may take what was not forced to the disk: with
+``off``, what the operating system has not written by itself, on Linux up to about 30 s; with ``batch``, about
+the last second; with ``full``, nothing that was written.
 """
 
 SYNC_MODES: tuple[SyncMode, ...] = get_args(SyncMode)
@@ -76,7 +76,7 @@ class SessionFile:
         self._synchronise_folder()
 
     def write(self, data: bytes) -> None:
-        """Write whole messages. If they cannot be written, the file ends with those before them: an `OSError`."""
+        """Write whole messages; after a failure, which is an `OSError`, the file ends with those before."""
         if self._descriptor < 0:
             self._waiting += data
             self.size += len(data)
@@ -104,8 +104,8 @@ class SessionFile:
     def follow(self) -> str:
         """Find out whether the file is still where it was, and return one line if it is not.
 
-        A file that was renamed is followed. One that was deleted is written again, under a new name, from what
-        the operating system still holds. An `OSError` says that this is impossible.
+        A file that was renamed is followed. One that was deleted is written again, under a new name, from
+        what the operating system still holds. An `OSError` says that this is impossible.
         """
         if self._descriptor < 0:
             return ""
@@ -177,7 +177,7 @@ def is_being_recorded(path: Path) -> bool:
 
 
 def _create(path: Path, *, numbered: bool) -> tuple[int, Path]:
-    """Create and lock a file that does not exist; if asked, append the first free number from 2 to its name."""
+    """Create and lock a new file; if its name is taken and may be `numbered`, append a free number."""
     path.parent.mkdir(parents=True, exist_ok=True)
     for number in count(1):
         place = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
@@ -196,7 +196,7 @@ def _create(path: Path, *, numbered: bool) -> tuple[int, Path]:
 def _path_of_descriptor(descriptor: int) -> Path | None:
     """Return where an open file is now; None if the system does not tell."""
     try:
-        place = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
+        place = Path(f"/proc/self/fd/{descriptor}").readlink()
         there, own = place.stat(), os.fstat(descriptor)
     except OSError:
         return None

@@ -57,8 +57,8 @@ class SessionRecorder:
         rows_per_write: control steps per batch. Small batches lose less in a crash; large ones cost less.
         view_rows: control steps per batch of data that only the viewer draws.
         viewer: address of a viewer that shows the drive live; None for none.
-        existing: what to do if a file of this name exists. With ``replace``, the recording is written beside it,
-            and replaces it once it is closed whole.
+        existing: what to do if a file of this name exists. With ``replace``, the recording is written beside
+            it, and replaces it once it is closed whole.
         sync: when data are forced to the disk.
 
     Raises:
@@ -235,18 +235,12 @@ class SessionRecorder:
     def _send(self, entity: str, steps: Sequence[int], columns: list[ComponentColumn]) -> None:
         self._chunks += 1
         times, ready = time_columns(steps, self.info.dt), cast("list[rr.ComponentColumn]", columns)
-        self._write(
-            lambda recording: rr.send_columns(
-                entity, times, ready, recording=recording, strict=recording is self._recording.stream
-            )
-        )
+        own = self._recording.stream
+        self._write(lambda to: rr.send_columns(entity, times, ready, recording=to, strict=to is own))
 
     def _log_static(self, entity: str, archetype: Any) -> None:
-        self._write(
-            lambda recording: rr.log(
-                entity, archetype, static=True, recording=recording, strict=recording is self._recording.stream
-            )
-        )
+        own = self._recording.stream
+        self._write(lambda to: rr.log(entity, archetype, static=True, recording=to, strict=to is own))
 
     def _property(self, name: str, values: dict[str, Any]) -> None:
         self._write(lambda recording: send_property_group(recording, name, values))
