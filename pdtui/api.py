@@ -11,7 +11,6 @@ from typing import Any, ParamSpec, TypeVar
 
 from torch import nn
 
-from pdtui.core.errors import SessionError
 from pdtui.dissection.dissect import dissect as run_dissection
 from pdtui.dissection.dissection_config import QUICK_DISSECTION, DissectionConfig, DissectionSettings
 from pdtui.dissection.dissection_result import Dissection
@@ -29,6 +28,7 @@ from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, Obs
 from pdtui.policies.weights.weights_file import hash_file
 from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
+from pdtui.sessions.writer.session_file import ExistingFile
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_policy_lookup import resolve_map_policy
@@ -173,6 +173,7 @@ def drive(
     stochastic: bool = False,
     start: str = "",
     record: str | Path | None = None,
+    overwrite: bool = False,
     force: bool = False,
 ) -> DriveArrays:
     """Drive without a screen, as fast as the machine allows.
@@ -196,6 +197,7 @@ def drive(
         stochastic: Draw actions from the policy's distribution instead of taking its mean.
         start: State in which episodes start, for a robot with several.
         record: File of a new session.
+        overwrite: Replace that file, if it exists, once the new session is whole.
         force: Drive even if the map was made for another policy.
 
     Raises:
@@ -211,9 +213,8 @@ def drive(
     with open_robot(robot) as world:
         loop = build_control_loop(config, world, None if isinstance(policy, str | Path) else policy)
         presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
-        if record is not None and Path(record).exists():
-            raise SessionError(f"{record}: already exists; a drive is recorded into a new file")
-        recorder = SessionRecorder(Path(record), loop.info) if record is not None else None
+        existing: ExistingFile = "replace" if overwrite else "refuse"
+        recorder = None if record is None else SessionRecorder(Path(record), loop.info, existing=existing)
         return collect_drive_arrays(loop, presses, steps, recorder)
 
 

@@ -76,7 +76,10 @@ def test_show_tells_the_drive_key_by_key(folder: Path, map_text: str) -> None:
 
 def test_verify_says_what_is_whole_and_what_repeats(folder: Path) -> None:
     good = run("sessions", "verify", folder / "a.rrd")
-    assert (good.exit_code, good.stdout) == (0, f"{folder / 'a.rrd'}: whole, checksums match; identical: 80 steps\n")
+    assert (good.exit_code, good.stdout) == (
+        0,
+        f"{folder / 'a.rrd'}: whole, checksums match; identical: 80 steps\n",
+    )
     bad = run("sessions", "verify", folder / "a.rrd", folder / "cut.rrd", "--json")
     assert bad.exit_code == 1
     one, other = json.loads(bad.output)["sessions"]

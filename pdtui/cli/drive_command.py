@@ -25,6 +25,7 @@ from pdtui.core.errors import KeystrokeError, ScreenError, SessionError
 from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.sessions.viewer.viewer_address import LOCAL, PORT, ViewerAddress
+from pdtui.sessions.writer.session_file import SYNC_MODES
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
@@ -44,7 +45,16 @@ if TYPE_CHECKING:
 @click.option(
     "--record", type=FILE_PATH, metavar="FILE.rrd", help="Session to write; default: a new one in ./sessions."
 )
+@click.option("--overwrite", is_flag=True, help="Replace the file of --record once the new session is whole.")
 @click.option("--no-record", is_flag=True, help="Do not record the drive.")
+@click.option(
+    "--sync",
+    type=click.Choice(SYNC_MODES),
+    default="batch",
+    show_default=True,
+    help="When to force the recording to the disk, in case of a power failure: never, about once a second, "
+    "or with every write.",
+)
 @record_activations_option
 @click.option(
     "--viewer",
@@ -68,6 +78,7 @@ def drive_command(
     policy: str,
     import_options: ImportOptions,
     record: Path | None,
+    overwrite: bool,
     no_record: bool,
     viewer: str | None,
     fps: int,
@@ -78,8 +89,12 @@ def drive_command(
 ) -> None:
     """Drive ROBOT with the keys of its map. ROBOT may also be a map file."""
     config = build_drive_config(robot, map_name, policy, import_options, without_map=True, **options)
-    if record is not None and record.exists():
-        raise SessionError(f"{record}: already exists; a drive is recorded into a new file")
+    if record is not None and record.exists() and not overwrite:
+        raise SessionError(f"{record}: already exists; --overwrite replaces it")
+    if overwrite and record is None:
+        raise SessionError("--overwrite needs --record FILE")
+    if record is not None:
+        config = replace(config, recording=str(record), existing="replace" if overwrite else "refuse")
     if keys is not None and not headless:
         raise KeystrokeError("--keys needs --headless; on the screen, keys are pressed by hand")
     if viewer is not None:
@@ -87,20 +102,22 @@ def drive_command(
             raise SessionError("--viewer shows what is recorded: add --record FILE, or leave --no-record out")
         config = replace(config, viewer=ViewerAddress.parse(viewer))
     if headless:
-        _drive_headless(config, keys, steps, record)
+        _drive_headless(config, keys, steps)
+    elif no_record:
+        show_drive(replace(config, recording=""), fps=fps)
     else:
-        path = "" if no_record else str(record or _new_session(config))
-        show_drive(replace(config, recording=path), fps=fps)
+        show_drive(config if record is not None else _record_into_new_session(config), fps=fps)
 
 
-def _new_session(config: DriveConfig) -> Path:
+def _record_into_new_session(config: DriveConfig) -> DriveConfig:
+    """Return the drive with a name for its session, to which a number is appended if it is taken."""
     from pdtui.robots import robot_file_stem
 
     name = f"{robot_file_stem(config.robot)}-{datetime.now():%Y%m%d-%H%M%S}-seed{config.seed}.rrd"
-    return Path("sessions") / name
+    return replace(config, recording=str(Path("sessions") / name), existing="number")
 
 
-def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, record: Path | None) -> None:
+def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
     from pdtui.driving.headless_drive import catch_ending_signals, drive_headless
     from pdtui.driving.keystrokes import read_keystrokes
     from pdtui.driving.loop_builder import build_control_loop
@@ -112,7 +129,10 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, record: 
     if viewer is not None and not viewer.is_listening:
         click.echo(viewer.absence_message, err=True)
         viewer = None
-    recorder = SessionRecorder(record, info, viewer=viewer) if record is not None else None
+    recorder = None
+    if config.recording:
+        path, existing = Path(config.recording), config.existing
+        recorder = SessionRecorder(path, info, viewer=viewer, existing=existing, sync=config.sync)
     with catch_ending_signals() as ended:
         summary = drive_headless(loop, presses, steps, recorder, ended)
     click.echo(
@@ -121,8 +141,10 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, record: 
     )
     means = ", ".join(f"{name} {value:.3g}" for name, value in list(summary.mean.items())[:8])
     click.echo(make_printable(f"mean {means}"))
-    if record is not None:
-        click.echo(make_printable(f"recorded in {record}"))
+    if recorder is not None:
+        if recorder.notice:
+            click.echo(make_printable(recorder.notice), err=True)
+        click.echo(make_printable(f"recorded in {recorder.path}"))
 
 
 def show_drive(config: DriveConfig, *, fps: int = 12, watching: bool = False) -> None:
@@ -140,7 +162,7 @@ def show_drive(config: DriveConfig, *, fps: int = 12, watching: bool = False) ->
         last_words = connection.close()
     if app.return_code or connection.failed:
         said = message or last_words
-        raise ScreenError(said if config.recording in said else f"{said}; {last_words}")
+        raise ScreenError(said if connection.recording in said else f"{said}; {last_words}")
     click.echo(make_printable(last_words))
 
 
@@ -152,8 +174,7 @@ def pick_and_drive() -> None:
 
     chosen = MapPickerApp(map_picker_rows(list_maps())).run()
     if chosen is not None:
-        config = build_drive_config(str(chosen), None, "")
-        show_drive(replace(config, recording=str(_new_session(config))))
+        show_drive(_record_into_new_session(build_drive_config(str(chosen), None, "")))
 
 
 def _check_terminal() -> None:

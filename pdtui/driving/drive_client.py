@@ -61,7 +61,8 @@ class DriveClient(DriveConnection):
         self.failed = False
         """Whether the drive ended with an error; set by `close`."""
         self._asked = False
-        self._recording = config.recording
+        self.recording = ""
+        """File that the drive is recorded into; empty until it was created."""
 
     @property
     def pid(self) -> int:
@@ -70,6 +71,8 @@ class DriveClient(DriveConnection):
 
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:
         message = self._receive()
+        if isinstance(message, DriveFacts) and message.recorded:
+            self.recording = message.recording
         if isinstance(message, DriveFacts) or (message is None and not self._asked):
             self._send("frame", None)
             self._asked = True
@@ -124,4 +127,4 @@ class DriveClient(DriveConnection):
 
     def _describe_death(self) -> str:
         line = f"the simulation's process {describe_exit(self._process)}"
-        return f"{line}; the recording up to then is in {self._recording}" if self._recording else line
+        return f"{line}; the recording up to then is in {self.recording}" if self.recording else line

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pdtui.core.drive_events import DriveEvent
 from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
+from pdtui.sessions.writer.session_file import ExistingFile, SyncMode
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 
@@ -23,6 +24,8 @@ class DriveConfig:
         start: name of the state in which episodes start; empty for the robot's default.
         force: drive even if the policy is not the map's.
         recording: file to record into; empty for none.
+        existing: what to do if that file exists.
+        sync: when what is recorded is forced to the disk.
         activations: how activations are recorded.
         viewer: address of a Rerun viewer that shows the recorded drive; None for none.
         scripted_events: events of a watched session, applied instead of keys; None to drive by keys.
@@ -37,6 +40,8 @@ class DriveConfig:
     start: str = ""
     force: bool = False
     recording: str = ""
+    existing: ExistingFile = "refuse"
+    sync: SyncMode = "batch"
     activations: ActivationsKept = "all"
     viewer: ViewerAddress | None = None
     scripted_events: tuple[DriveEvent, ...] | None = None

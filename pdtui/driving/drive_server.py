@@ -53,7 +53,15 @@ class DriveServer:
             if viewer is not None and not viewer.is_listening:
                 self._builder.notice, viewer = viewer.absence_message, None
             info = replace(self._loop.info, activations=config.activations)
-            self._recorder = SessionRecorder(path, info, rows_per_write=PACED_ROWS_PER_WRITE, viewer=viewer)
+            self._recorder = SessionRecorder(
+                path,
+                info,
+                rows_per_write=PACED_ROWS_PER_WRITE,
+                viewer=viewer,
+                existing=config.existing,
+                sync=config.sync,
+            )
+        self._place = ""
         self._pacer = Pacer(self._loop.robot.control_dt, time.monotonic())
         self._pressed_keys: list[str] = []
         self._snapshot_requested = False
@@ -63,8 +71,8 @@ class DriveServer:
         self._scripted_events = group_events_by_step(config.scripted_events or ())
 
     def send_facts(self) -> None:
-        """Send the facts that the screen needs once."""
-        loop = self._loop
+        """Send the facts of the drive."""
+        loop, recorder = self._loop, self._recorder
         self._sent = self._send(
             DriveFacts(
                 title=loop.robot.title,
@@ -74,7 +82,8 @@ class DriveServer:
                 attributes=loop.robot.attributes,
                 links=loop.robot.links,
                 layers=loop.policy.layers,
-                recording=self._config.recording,
+                recording=str(recorder.path) if recorder is not None else "",
+                recorded=recorder is not None and recorder.created,
             )
         )
 
@@ -99,7 +108,8 @@ class DriveServer:
     def outcome(self) -> str:
         """Return one line on how the drive ended."""
         line = f"{self._finished or self._closing}: {self._loop.step} steps"
-        place = self._config.recording
+        recorder = self._recorder
+        place = str(recorder.path) if recorder is not None and recorder.created else ""
         return f"{line}, recorded in {place}" if place and place not in line else line
 
     def _serve(self) -> None:
@@ -148,6 +158,11 @@ class DriveServer:
             self._finished, self.failed = str(error), True
             with suppress(SessionError):
                 recorder.close(str(error))
+        if recorder.notice:
+            self._builder.notice, recorder.notice = recorder.notice, ""
+        if recorder.created and str(recorder.path) != self._place:
+            self._place = str(recorder.path)
+            self.send_facts()
 
     def _events(self) -> list[DriveEvent]:
         if self._config.scripted_events is not None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DriveFacts:
-    """The facts of a drive that never change, sent once robot and policy are loaded.
+    """The facts of a drive, sent once robot and policy are loaded, and again if the recording moves.
 
     Attributes:
         title: display name of the robot.
@@ -27,7 +27,8 @@ class DriveFacts:
         dt: simulated time of a control step, s.
         attributes, links: those of the robot.
         layers: widths of the policy's hidden layers.
-        recording: file that the drive is recorded into; empty if it is not.
+        recording: file that the drive is recorded into, or will be; empty if it is not recorded.
+        recorded: whether that file was created, which happens with the first control step.
     """
 
     title: str
@@ -38,6 +39,7 @@ class DriveFacts:
     links: tuple[Link, ...]
     layers: tuple[int, ...]
     recording: str = ""
+    recorded: bool = False
 
 
 @dataclass(frozen=True)

@@ -92,8 +92,6 @@ def record_forest_episode(
     Raises:
         SessionError: the session already exists, or cannot be written.
     """
-    if path.exists():
-        raise SessionError(f"{path}: already exists; a drive is recorded into a new file")
     with SessionRecorder(path, replace(loop.info, activations=activations)) as recorder:
         run, events = drive_forest_episode(loop, steps, operator, recorder)
     write_file(path.with_suffix(".keys"), format_keystrokes(events), SessionError)

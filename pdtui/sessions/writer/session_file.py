@@ -40,7 +40,7 @@ class SessionFile:
     Attributes:
         path: where the file is, or will be.
         size: number of bytes written.
-        created: whether the file exists.
+        created: whether the file was created.
 
     Raises:
         SessionError: the file exists and is to be refused, or is being recorded.
@@ -53,15 +53,12 @@ class SessionFile:
         self._waiting = bytearray()
         self._unsynchronised = False
         self.size = 0
+        self.created = False
         if os.path.lexists(path):
             if existing == "refuse" or not path.is_file():
                 raise SessionError(f"{path}: already exists; a drive is recorded into a new file")
             if existing == "replace" and is_being_recorded(path):
                 raise SessionError(f"{path}: cannot be replaced: it is being recorded")
-
-    @property
-    def created(self) -> bool:
-        return self._descriptor >= 0
 
     def create(self) -> None:
         """Create the file, and write what was kept in memory; an `OSError` says that it cannot be created."""
@@ -70,6 +67,7 @@ class SessionFile:
             self._replaced = wanted
             self.path = wanted.with_name(f"{wanted.stem}.new{wanted.suffix}")
         self._descriptor, self.path = _create(self.path, numbered=self._existing != "refuse")
+        self.created = True
         waiting, self._waiting = bytes(self._waiting), bytearray()
         self.size = 0
         self.write(waiting)

@@ -194,6 +194,7 @@ class SessionRecorder:
         )
 
     def _require_space(self) -> None:
+        self.notice = self._recording.follow_file() or self.notice  # also if it was deleted with its folder
         if self._reserve.is_short(self.path.parent, self.bytes, self._steps, self._chunks):
             self.close(f"the disk is full: {self._steps} steps were recorded")
             closed = f"{self.path} was closed in time and is complete"
@@ -203,7 +204,8 @@ class SessionRecorder:
         records, self._rows = self._rows, []
         if not records:
             return
-        self._follow_file()
+        if not self._recording.created:
+            self._recording.create_file()
         self._write_events(records)
         steps = [record.step for record in records]
         self._send(DRIVE, steps, step_record_columns(records, self.info.activations))
@@ -213,13 +215,6 @@ class SessionRecorder:
             self._viewer_data.write()
         if steps[0] < _DESCRIBED_AGAIN <= steps[-1] + 1:
             self._describe_drive()  # a second copy, in case the first is damaged
-
-    def _follow_file(self) -> None:
-        """Create the file with the first steps; later, find out whether it is still there."""
-        if self._recording.created:
-            self.notice = self._recording.follow_file() or self.notice
-        else:
-            self._recording.create_file()
 
     def _write_events(self, records: Sequence[StepRecord]) -> None:
         events = [event for record in records for event in record.events]
