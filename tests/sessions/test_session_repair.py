@@ -241,3 +241,17 @@ def test_a_recording_that_still_grows_can_be_examined(weights: Path, tmp_path: P
     there = examine_session(tmp_path / "a.rrd")
     recorder.close("done")
     assert (there.steps, there.outcome, there.whole) == (10, "", False)
+
+
+@pytest.mark.parametrize("place", range(12))
+def test_a_flipped_bit_in_the_start_of_the_file_is_seen_and_mended(
+    place: int, recorded: Recorded, tmp_path: Path
+) -> None:
+    data = bytearray(recorded[0].read_bytes())
+    data[place] ^= 2
+    path = tmp_path / "a.rrd"
+    path.write_bytes(data)
+    assert not examine_session(path).whole
+    assert repair_session(path, tmp_path / "b.rrd").header.missing == 0
+    assert examine_session(tmp_path / "b.rrd").whole
+    assert read_session(tmp_path / "b.rrd").steps == 100

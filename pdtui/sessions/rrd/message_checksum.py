@@ -3,8 +3,8 @@
 pdtui adds a field to each message that Rerun encodes; Rerun's own readers skip fields that they do not know.
 The field is the last of the message and contains 12 bytes:
 
-- the link, 4 bytes: the lower half of the checksum of the message before it, 0 in the first message. A
-  message that is missing, or that was put in, breaks the chain.
+- the link, 4 bytes: the lower half of the checksum of the message before it; in the first message, of that of
+  the bytes before it. A message that is missing, or that was put in, breaks the chain.
 - the checksum, 8 bytes: XXH3 of the message's header, its payload before the field, and the link.
 
 The checksum finds accidents, not forgery: anyone can compute it.
@@ -16,7 +16,7 @@ import re
 import struct
 from typing import NamedTuple
 
-from xxhash import xxh3_64
+from xxhash import xxh3_64, xxh3_64_intdigest
 
 from pdtui.sessions.rrd.protobuf_wire import encode_tag
 
@@ -40,10 +40,15 @@ class MessageSeal(NamedTuple):
     checksum: int
 
 
+def compute_start_checksum(start: bytes | bytearray) -> int:
+    """Return the checksum of the bytes with which a file starts, before its first message."""
+    return xxh3_64_intdigest(bytes(start))
+
+
 def seal_message(kind: int, payload: bytes | memoryview, previous: int) -> tuple[bytes, bytes, int]:
     """Return a message's header, the field to append to its payload, and its checksum.
 
-    `previous` is the checksum of the message before it, or 0.
+    `previous` is the checksum of the message before it, or of the start of the file.
     """
     link = previous & 0xFFFFFFFF
     length = len(payload) + SEAL_BYTES

@@ -15,6 +15,7 @@ from pdtui.sessions.rrd.message_checksum import (
     SEAL_BYTES,
     SEAL_PATTERN,
     compute_message_checksum,
+    compute_start_checksum,
     read_message_seal,
 )
 from pdtui.sessions.rrd.message_framing import RrdMessageSpan
@@ -60,15 +61,16 @@ class MessageReader:
         sealed: whether the messages have checksums.
         finished: whether the last message was read, and is whole.
         messages: number of messages so far, except the last.
-        checksum: checksum of the latest message that has one.
+        checksum: checksum of the latest message that has one; before the first, of the start of the file.
     """
 
     def __init__(self, file: BinaryIO, size: int, damage: list[DamagedSpan] | None = None) -> None:
         self._file, self._size, self._damage = file, size, damage
         file.seek(0)
-        self.sealed = _SEALED.search(file.read(_SEARCHED_FOR_SEALS)) is not None
+        head = file.read(_SEARCHED_FOR_SEALS)
+        self.sealed = _SEALED.search(head) is not None
         self.finished = False
-        self.messages = self.checksum = 0
+        self.messages, self.checksum = 0, compute_start_checksum(head[: framing.START_BYTES])
         self._candidates, self._bytes_left = _MAX_CANDIDATES, _SEARCH_FACTOR * size
         self._chain_known = True
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from pdtui.sessions.rrd import message_framing as framing
 from pdtui.sessions.rrd.end_index import encode_end_index
-from pdtui.sessions.rrd.message_checksum import SEAL_BYTES, seal_message
+from pdtui.sessions.rrd.message_checksum import SEAL_BYTES, compute_start_checksum, seal_message
 from pdtui.sessions.rrd.rrd_footer import move_chunks
 from pdtui.sessions.writer.session_file import SessionFile
 
@@ -130,8 +130,9 @@ class MessagePipe:
         if not self._place:
             if len(received) < framing.START_BYTES:
                 return
-            parts.append(bytes(received[: framing.START_BYTES]))
             place = framing.START_BYTES
+            parts.append(bytes(received[:place]))
+            self._checksum = compute_start_checksum(received[:place])
         while len(received) - place >= framing.HEADER_BYTES:
             span = framing.split_header(received, place)
             if span.end > len(received):
