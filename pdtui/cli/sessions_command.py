@@ -44,19 +44,22 @@ def list_command(folder: Path, as_json: bool) -> None:
 
 def _list_row(path: Path) -> dict[str, Any]:
     from pdtui.sessions.session_header import read_session_header
+    from pdtui.sessions.writer.session_file import is_being_recorded
 
     row: dict[str, Any] = {"path": str(path), "bytes": path.stat().st_size, "broken": ""}
     try:
         header = read_session_header(path)
     except SessionError as error:
         return {**row, "broken": str(error).removeprefix(f"{path}: ")}
+    recording = not header.outcome and is_being_recorded(path)
     return {
         **row,
         "robot": header.info.robot,
         "steps": header.steps,
+        "missing": header.missing,
         "seconds": header.seconds,
         "keys": header.keys,
-        "outcome": header.outcome,
+        "outcome": "is being recorded" if recording else header.outcome,
     }
 
 

@@ -44,9 +44,10 @@ class RerunRecording:
         if not is_enabled(self.stream):
             why = "recording is disabled by the environment variable RERUN=off"
             raise SessionError(f"{file.path}: cannot be written: {why}")
-        self._pipe, self._closed = MessagePipe(file), False
-        self.stream.set_sinks(rr.FileSink(self._pipe.sink), default_blueprint=session_blueprint(info))
-        self._pipe.start()
+        with name_file_in_errors(file.path):
+            self._pipe, self._closed = MessagePipe(file), False
+            self.stream.set_sinks(rr.FileSink(self._pipe.sink), default_blueprint=session_blueprint(info))
+            self._pipe.start()
         # A program that ends without closing its recording leaves all that was recorded.
         atexit.register(self.close)
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, cast
-
-import rerun as rr
+from typing import Any, Self
 
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import RecordingEnded, SessionError
@@ -17,14 +15,12 @@ from pdtui.sessions.drive_info import DriveInfo, encode_drive_info
 from pdtui.sessions.environment_versions import collect_versions
 from pdtui.sessions.session_index import encode_session_index
 from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
-from pdtui.sessions.viewer.live_viewer import LiveViewer
 from pdtui.sessions.viewer.session_blueprint import session_blueprint
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
 from pdtui.sessions.viewer.viewer_data_writer import ViewerDataWriter
-from pdtui.sessions.writer.arrow_columns import ComponentColumn, time_columns
 from pdtui.sessions.writer.disk_space import DiskReserve
-from pdtui.sessions.writer.rerun_recording import RerunRecording, send_property_group
 from pdtui.sessions.writer.session_file import ExistingFile, SessionFile, SyncMode
+from pdtui.sessions.writer.session_outputs import SessionOutputs
 from pdtui.sessions.writer.step_record_columns import episode_end_columns, event_columns, step_record_columns
 
 _VIEW_ROWS, _LIVE_ROWS = 128, 8
@@ -61,6 +57,10 @@ class SessionRecorder:
             it, and replaces it once it is closed whole.
         sync: when data are forced to the disk.
 
+    Attributes:
+        notice: one line on what happened to the file while it was written, such as that it was renamed; empty
+            if nothing did.
+
     Raises:
         SessionError: the file exists or cannot be written, or the disk is full.
     """
@@ -83,7 +83,7 @@ class SessionRecorder:
         self._rows: list[StepRecord] = []
         self._viewer_rows = max(view_rows if viewer is None else _LIVE_ROWS, 2 * self._rows_per_write)
         self._waits_for_batches = self._rows_per_write <= _SAFE_ROWS
-        self._steps = self._batches = self._chunks = 0
+        self._steps = self._batches = 0
         self._events: list[DriveEvent] = []
         self._endings: dict[int, str] = {}
         self._closed = self._failed = False
@@ -92,14 +92,10 @@ class SessionRecorder:
         file = SessionFile(Path(path), existing, sync)
         self._reserve = DiskReserve(sum(info.layers), self._viewer_rows + batches * self._rows_per_write)
         self._reserve.require_space_to_begin(file.path)
-        self._recording = RerunRecording(file, info)
-        recording_id = self._recording.stream.get_recording_id() or ""
-        self._live = None if viewer is None else LiveViewer(viewer, info, recording_id)
-        with self._recording.errors_named():
-            name = f"{info.robot}, policy {info.policy}, seed {info.seed}"
-            self._recording.stream.send_recording_name(name)
+        self._outputs = SessionOutputs(file, info, viewer)
+        self._recording = self._outputs.recording
         self._describe_drive()
-        self._viewer_data = ViewerDataWriter(info, self._send, self._log_static)
+        self._viewer_data = ViewerDataWriter(info, self._outputs.send_columns, self._outputs.log_static)
         self._flush_rows()
 
     @property
@@ -155,21 +151,13 @@ class SessionRecorder:
             if not self._failed and self._steps:
                 self.flush()
                 self._viewer_data.finish()
-                self._property(OUTCOME, {"outcome": outcome})
+                self._outputs.send_properties(OUTCOME, {"outcome": outcome})
                 self._flush_rows()
-                self._send_blueprint()
+                self._outputs.send_blueprint(session_blueprint(self.info, self._viewer_data.content()))
+                self._flush_rows()
                 whole = True
         finally:
-            self._recording.close(self._end_index(outcome) if whole else None)
-            if self._live is not None:
-                self._live.close()
-
-    def _send_blueprint(self) -> None:
-        """Replace the blueprint by one for what was recorded."""
-        blueprint = session_blueprint(self.info, self._viewer_data.content())
-        # Active: otherwise a viewer that shows another session would reuse the layout of that one.
-        self._write(lambda recording: recording.send_blueprint(blueprint, make_active=True))
-        self._flush_rows()
+            self._outputs.close(self._end_index(outcome) if whole else None)
 
     def __enter__(self) -> Self:
         return self
@@ -180,8 +168,8 @@ class SessionRecorder:
         self.close(f"stopped by {kind.__name__}: {error}".removesuffix(": ") if kind else "ended")
 
     def _describe_drive(self) -> None:
-        self._property(INFO, encode_drive_info(self.info, self._created))
-        self._property(VERSIONS, self._versions)
+        self._outputs.send_properties(INFO, encode_drive_info(self.info, self._created))
+        self._outputs.send_properties(VERSIONS, self._versions)
 
     def _end_index(self, outcome: str) -> dict[str, Any]:
         return encode_session_index(
@@ -195,7 +183,7 @@ class SessionRecorder:
 
     def _require_space(self) -> None:
         self.notice = self._recording.follow_file() or self.notice  # also if it was deleted with its folder
-        if self._reserve.is_short(self.path.parent, self.bytes, self._steps, self._chunks):
+        if self._reserve.is_short(self.path.parent, self.bytes, self._steps, self._outputs.chunks):
             self.close(f"the disk is full: {self._steps} steps were recorded")
             closed = f"{self.path} was closed in time and is complete"
             raise RecordingEnded(f"the disk is full; {closed}: {self._steps} steps")
@@ -208,7 +196,7 @@ class SessionRecorder:
             self._recording.create_file()
         self._write_events(records)
         steps = [record.step for record in records]
-        self._send(DRIVE, steps, step_record_columns(records, self.info.activations))
+        self._outputs.send_columns(DRIVE, steps, step_record_columns(records, self.info.activations))
         self._viewer_data.add(records)
         self._viewer_data.write_changes()
         if self._viewer_data.pending >= self._viewer_rows:
@@ -220,32 +208,12 @@ class SessionRecorder:
         events = [event for record in records for event in record.events]
         if events:
             first = len(self._events)
-            self._send(EVENTS, [event.step for event in events], event_columns(events, first))
+            self._outputs.send_columns(EVENTS, [event.step for event in events], event_columns(events, first))
             self._events += events
         ended = [record for record in records if record.ended]
         if ended:
-            self._send(ENDINGS, [record.step for record in ended], episode_end_columns(ended))
+            self._outputs.send_columns(ENDINGS, [record.step for record in ended], episode_end_columns(ended))
             self._endings |= {record.step: record.ended for record in ended}
-
-    def _send(self, entity: str, steps: Sequence[int], columns: list[ComponentColumn]) -> None:
-        self._chunks += 1
-        times, ready = time_columns(steps, self.info.dt), cast("list[rr.ComponentColumn]", columns)
-        own = self._recording.stream
-        self._write(lambda to: rr.send_columns(entity, times, ready, recording=to, strict=to is own))
-
-    def _log_static(self, entity: str, archetype: Any) -> None:
-        own = self._recording.stream
-        self._write(lambda to: rr.log(entity, archetype, static=True, recording=to, strict=to is own))
-
-    def _property(self, name: str, values: dict[str, Any]) -> None:
-        self._write(lambda recording: send_property_group(recording, name, values))
-
-    def _write(self, write: Callable[[rr.RecordingStream], object]) -> None:
-        """Write to the recording, and to that of a viewer, whose errors are not the session's."""
-        with self._recording.errors_named():
-            write(self._recording.stream)
-        if self._live is not None:
-            self._live.send(write)
 
     def _flush_rows(self, *, wait: bool = True) -> None:
         try:
