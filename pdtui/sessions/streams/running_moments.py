@@ -25,12 +25,13 @@ class RunningMoments:
         counts = finite.sum(axis=0)
         if not finite.all():
             values = np.where(finite, values, 0.0)
-        mean = values.sum(axis=0) / np.maximum(counts, 1)
-        squares = (np.where(finite, values - mean, 0.0) ** 2).sum(axis=0)
         total = np.maximum(self.counts + counts, 1)
-        change = mean - self._mean
-        self._squares += squares + change**2 * (self.counts * counts / total)
-        self._mean += change * (counts / total)
+        with np.errstate(over="ignore", invalid="ignore"):
+            mean = values.sum(axis=0) / np.maximum(counts, 1)
+            change = mean - self._mean
+            squares = (np.where(finite, values - mean, 0.0) ** 2).sum(axis=0)
+            self._squares += squares + change**2 * (self.counts * counts / total)
+            self._mean += change * (counts / total)
         self.counts += counts
 
     @property

@@ -133,9 +133,8 @@ def _decode(
     table: EntityTable, header: SessionHeader, activations: bool, queue: PoseQueue | None, at_end: bool
 ) -> StepBlock:
     low, high = (int(table.steps[0]), int(table.steps[-1])) if len(table.steps) else (0, -1)
-    others: dict[str, Any] = {
-        "endings": {step: text for step, text in header.endings.items() if low <= step <= high}
-    }
+    ended = [step for step in header.endings if low <= step <= high and step in table.steps]
+    others: dict[str, Any] = {"endings": {step: header.endings[step] for step in ended}}
     if queue is not None:
         others["pose_steps"], others["poses"] = queue.take(low, high, at_end=at_end)
     return decode_step_block(table, header.info, activations=activations, **others)
