@@ -60,9 +60,7 @@ def config_from_session(session: SessionHeader, source: str, policy: str = "") -
         policy=policy,
         stochastic=info.stochastic,
         start=info.start,
-        watched=SessionHeader(
-            **{field.name: getattr(session, field.name) for field in fields(SessionHeader)}
-        ),
+        watched=SessionHeader(**parts),
     )
 
 

@@ -91,10 +91,17 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
     try:
         drive = file.table(DRIVE)
         header = decode_header(file, path, count_control_steps(drive, read_gaps(file)))
-        info = header.info
-        if info.activations == "off":
-            how = "(--record-activations off); a replay computes them"
-            raise SessionError(f"the activations were not recorded {how}")
-        return decode_activations(drive, info).astype(np.float32, copy=False)
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
+    require_activations(header)
+    try:
+        return decode_activations(drive, header.info).astype(np.float32, copy=False)
+    except SessionError as error:
+        raise SessionError(f"{path}: {error}") from error
+
+
+def require_activations(header: SessionHeader) -> None:
+    """Check that a session contains activations; one that does not is a `SessionError`."""
+    if header.info.activations == "off":
+        how = "(--record-activations off); a replay computes them"
+        raise SessionError(f"{header.path}: the activations were not recorded {how}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pdtui.sessions.streams.attribute_deviations import ReplayDeviation
+from pdtui.sessions.streams.step_numbers import describe_step_ranges
 from pdtui.sessions.streams.value_differences import StreamDifference
 
 
@@ -98,6 +99,4 @@ class ReplayResult:
     def _missing_steps(self) -> str:
         if not self.missing:
             return ""
-        ranges = ", ".join(f"{start} to {stop - 1}" for start, stop in self.missing)
-        count = sum(stop - start for start, stop in self.missing)
-        return f"; {self.steps} steps were compared, {count} are missing from the session: {ranges}"
+        return f"; {self.steps} steps were compared, missing are {describe_step_ranges(self.missing)}"

@@ -124,6 +124,26 @@ class StepBlock:
         )
 
 
+def empty_step_block(info: DriveInfo) -> StepBlock:
+    """Return a block without control steps, as a session without any has."""
+    numbers = np.empty(0, np.int64)
+    return StepBlock(
+        steps=numbers,
+        digests=numbers,
+        episodes=numbers,
+        attributes=np.empty((0, len(info.attributes))),
+        actions=np.empty((0, 0)),
+        rewards=np.empty(0),
+        costs=np.empty(0),
+        behavior_counts=numbers,
+        behavior_names=[],
+        behavior_states=np.empty((0, len(ACTIVE_FIELDS))),
+        stimulated_counts=numbers,
+        stimulated=np.empty((0, 3)),
+        activations=np.empty((0, sum(info.layers)), np.float32),
+    )
+
+
 def step_block_of_records(
     records: Sequence[StepRecord], info: DriveInfo, pose_steps: NDArray[np.int64] | None = None
 ) -> StepBlock:

@@ -14,3 +14,10 @@ def number_steps(first_row: int, rows: int, gaps: Sequence[tuple[int, int]]) -> 
     for start, stop in sorted(gaps):
         numbers[numbers >= start] += stop - start
     return numbers
+
+
+def describe_step_ranges(ranges: Sequence[tuple[int, int]]) -> str:
+    """Return half-open ranges in words, such as ``3 steps: 4, 10 to 11``."""
+    count = sum(stop - start for start, stop in ranges)
+    named = (str(start) if stop == start + 1 else f"{start} to {stop - 1}" for start, stop in ranges)
+    return f"{count} steps: {', '.join(named)}"
