@@ -25,7 +25,7 @@ from pdtui.sessions.streams.step_block_reader import read_step_blocks
 
 Columns = dict[str, Any]
 _SUFFIXES = (".parquet", ".csv")
-_BLOCK_STEPS = 8192
+_BLOCK_STEPS = 4096
 """Control steps that are written at once: a row group of a Parquet file, which is slow to read if small."""
 
 
