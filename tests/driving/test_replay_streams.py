@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ EVENTS = {
     30: [DriveEvent(30, "reset", key="r")],
 }
 Drive = tuple[DriveInfo, list[StepRecord]]
+Number = TypeVar("Number", bound=np.ndarray[Any, Any])
 Change = Callable[[StepRecord], StepRecord]
 
 
@@ -41,20 +43,18 @@ def drive(small_map: StimulationMap) -> Drive:
 
 
 def record(
-    drive: Drive, path: Path, change: Change = lambda one: one, at: range | None = None, **info: object
+    drive: Drive, path: Path, change: Change = lambda one: one, at: range | None = None, **info: Any
 ) -> Path:
     """Record the drive with some steps changed."""
     described, records = drive
-    with SessionRecorder(path, replace(described, **info), rows_per_write=4) as recorder:  # type: ignore[arg-type]
+    with SessionRecorder(path, replace(described, **info), rows_per_write=4) as recorder:
         for one in records:
             recorder.write(change(one) if at is None or one.step in at else one)
         recorder.close("finished")
     return path
 
 
-def changed(
-    values: np.ndarray[tuple[int, ...], np.dtype[np.float64]], place: int | tuple[int, int]
-) -> object:
+def changed(values: Number, place: int) -> Number:
     """The same with the lowest bit of one value flipped."""
     copy = values.copy()
     copy[place] = np.nextafter(copy[place], np.array(9.0, copy.dtype))
@@ -189,7 +189,7 @@ def test_rounding_is_accepted_on_another_machine(
     ],
 )
 def test_another_description_is_refused(
-    info: dict[str, object], found: str, drive: Drive, tmp_path: Path
+    info: dict[str, Any], found: str, drive: Drive, tmp_path: Path
 ) -> None:
     result = replay_session(record(drive, tmp_path / "a.rrd", **info))
     assert not result.passed
