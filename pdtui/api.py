@@ -18,7 +18,8 @@ from pdtui.driving.drive_arrays import DriveArrays, collect_drive_arrays
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.keystrokes import read_keystrokes
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.driving.session_replay import ReplayResult, replay_session
+from pdtui.driving.replays.replay_result import ReplayResult
+from pdtui.driving.session_replay import replay_session
 from pdtui.policies.runtime.action_decoders import Decoder
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy

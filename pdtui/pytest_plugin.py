@@ -25,7 +25,7 @@ import pytest
 if TYPE_CHECKING:
     from torch import nn
 
-    from pdtui.driving.session_replay import ReplayResult
+    from pdtui.driving.replays.replay_result import ReplayResult
     from pdtui.policies.runtime.policy import Policy
     from pdtui.robots.robot import Robot
 

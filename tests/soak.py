@@ -21,7 +21,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pdtui.driving.session_replay import ReplayResult, replay_session
+from pdtui.driving.replays.replay_result import ReplayResult
+from pdtui.driving.session_replay import replay_session
 from pdtui.sessions.session_reader import read_session
 
 KEYS = (

@@ -50,9 +50,9 @@ def replay_command(session: Path, watch: bool, options: dict[str, Any]) -> None:
     from pdtui.driving.session_replay import config_from_session, replay_session
 
     if watch:
-        from pdtui.sessions.session_reader import read_session
+        from pdtui.sessions.session_header import read_session_header
 
-        recorded = read_session(session)
+        recorded = read_session_header(session)
         if recorded.steps == 0:
             raise SessionError(f"{session}: no control step is recorded, so there is nothing to watch")
         show_drive(config_from_session(recorded, str(session), options["policy"]), watching=True)

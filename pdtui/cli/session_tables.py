@@ -14,9 +14,11 @@ from rich.text import Text
 from pdtui.core.drive_events import describe_event
 from pdtui.core.printable_text import make_printable
 from pdtui.core.text_tables import new_facts_table, new_table
-from pdtui.sessions.session_comparison import ReplayDeviation, SessionComparison
-from pdtui.sessions.session_reader import Session
+from pdtui.sessions.session_comparison import SessionComparison
+from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.session_summary import SessionSummary
+from pdtui.sessions.streams.attribute_deviations import ReplayDeviation
+from pdtui.sessions.streams.step_numbers import describe_step_ranges
 
 _KEPT = {
     "all": "every unit, every step",
@@ -50,7 +52,7 @@ def session_list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
     return table
 
 
-def session_table(session: Session, summary: SessionSummary) -> Any:
+def session_table(session: SessionHeader, summary: SessionSummary) -> Any:
     """Return everything about a session: facts, figures, attributes, episodes and events."""
     info = session.info
     facts = [
@@ -61,6 +63,7 @@ def session_table(session: Session, summary: SessionSummary) -> Any:
         ("activations", _KEPT[info.activations]),
         ("map", f"{len(info.map_text.splitlines())} lines, inside the session"),
         *([("start", info.start)] if info.start else []),
+        *([("missing", describe_step_ranges(session.gaps))] if session.gaps else []),
         ("seed", f"{info.seed}{', with action noise' if info.stochastic else ''}"),
         ("driven", session.created),
         ("outcome", session.outcome or "none: the file is cut off"),
@@ -107,7 +110,7 @@ def _episodes(summary: SessionSummary) -> list[Table]:
     return [table]
 
 
-def _happened(session: Session) -> Table:
+def _happened(session: SessionHeader) -> Table:
     """Return events and ends of episodes in the order of their steps."""
     table = new_table("", "time", "step", "key", "what", left=("key", "what"))
     rows = [(event.step, 0, event.key, describe_event(event)) for event in session.events]
@@ -133,8 +136,10 @@ def attribute_deviation_table(deviations: Sequence[ReplayDeviation]) -> Table:
 
 
 def session_comparison_table(result: SessionComparison) -> Any:
-    """Return the first step that differs, and how far the attributes are apart from there on."""
+    """Return the first value that differs, and how far the attributes are apart from there on."""
     parts: list[Any] = [_cell(_compare_line(result))]
+    if result.difference is not None:
+        parts.append(_cell(result.difference.between_sessions()))
     if result.first_event:
         parts.append(_cell(result.first_event))
     if result.deviations:

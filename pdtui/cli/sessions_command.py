@@ -69,10 +69,10 @@ def _list_row(path: Path) -> dict[str, Any]:
 def show_command(file: Path, as_json: bool) -> None:
     """Show robot, policy, keys, attributes and outcome of FILE."""
     from pdtui.cli import session_tables
-    from pdtui.sessions.session_reader import read_session
+    from pdtui.sessions.session_header import read_session_header
     from pdtui.sessions.session_summary import summarise_session
 
-    session = read_session(file)
+    session = read_session_header(file)
     summary = summarise_session(session)
     data = {
         "path": str(file),
@@ -199,8 +199,8 @@ def export_command(
     if keys is not None:
         _export_keys(file, keys, overwrite)
     if stream is None and keys is None:
-        for name, (says, _) in STREAMS.items():
-            click.echo(f"{name:<12} {says}")
+        for name, one in STREAMS.items():
+            click.echo(f"{name:<12} {one.says}")
 
 
 def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
@@ -221,15 +221,15 @@ def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
 @click.argument("b", type=FILE_PATH)
 @json_option
 def compare_command(a: Path, b: Path, as_json: bool) -> None:
-    """Compare sessions A and B step by step.
+    """Compare sessions A and B step by step, in every stream.
 
     Exit codes: 0 if they are identical; 3 if they differ.
     """
     from pdtui.cli import session_tables
     from pdtui.sessions.session_comparison import compare_sessions
-    from pdtui.sessions.session_reader import read_session
+    from pdtui.sessions.session_header import read_session_header
 
-    result = compare_sessions(read_session(a), read_session(b))
+    result = compare_sessions(read_session_header(a), read_session_header(b))
     print_result(asdict(result), as_json, lambda: session_tables.session_comparison_table(result))
     if result.first_difference is not None or result.lengths[0] != result.lengths[1]:
         sys.exit(DIFFERS)

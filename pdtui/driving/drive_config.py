@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pdtui.core.drive_events import DriveEvent
+from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
 from pdtui.sessions.writer.session_file import ExistingFile, SyncMode
@@ -28,8 +28,8 @@ class DriveConfig:
         sync: when what is recorded is forced to the disk.
         activations: how activations are recorded.
         viewer: address of a Rerun viewer that shows the recorded drive; None for none.
-        scripted_events: events of a watched session, applied instead of keys; None to drive by keys.
-        expected_digests: digests of the watched session's steps.
+        watched: the session whose events are applied instead of keys, and with which every step is compared;
+            None to drive by keys.
     """
 
     robot: str
@@ -44,5 +44,4 @@ class DriveConfig:
     sync: SyncMode = "batch"
     activations: ActivationsKept = "all"
     viewer: ViewerAddress | None = None
-    scripted_events: tuple[DriveEvent, ...] | None = None
-    expected_digests: tuple[int, ...] = ()
+    watched: SessionHeader | None = None

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from pdtui.core.drive_events import DriveEvent, group_events_by_step
+from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import PdtuiError, SessionError, format_error_in_one_line
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
@@ -22,6 +22,7 @@ from pdtui.driving.drive_snapshot import DriveFacts
 from pdtui.driving.keystrokes import interpret_keys
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.pacer import Pacer
+from pdtui.driving.replays.watched_session import WatchedSession
 from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
@@ -68,7 +69,7 @@ class DriveServer:
         self._closing = ""
         self._finished = ""
         self.failed = False
-        self._scripted_events = group_events_by_step(config.scripted_events or ())
+        self._watched = None if config.watched is None else WatchedSession(config.watched)
 
     def send_facts(self) -> None:
         """Send the facts of the drive."""
@@ -147,8 +148,8 @@ class DriveServer:
         if record.diverged:
             self._finished, self.failed = record.ended, True
             self._close_recording()
-        if self._config.scripted_events is not None:
-            self._compare(record.step, record.digest)
+        if self._watched is not None:
+            self._compare(self._watched, record)
 
     def _record(self, recorder: SessionRecorder, record: StepRecord) -> None:
         try:
@@ -165,8 +166,8 @@ class DriveServer:
             self.send_facts()
 
     def _events(self) -> list[DriveEvent]:
-        if self._config.scripted_events is not None:
-            return self._scripted_events.get(self._loop.step, [])
+        if self._watched is not None:
+            return self._watched.events_before(self._loop.step)
         events = []
         for meaning in interpret_keys(self._pressed_keys, self._loop):
             if isinstance(meaning, DriveEvent):
@@ -176,11 +177,11 @@ class DriveServer:
         self._pressed_keys = []
         return events
 
-    def _compare(self, step: int, digest: int) -> None:
-        if digest != self._config.expected_digests[step]:
-            self._finished, self.failed = f"step {step} differs from the session", True
-        elif step + 1 == len(self._config.expected_digests):
-            self._finished = f"identical, {step + 1} steps"
+    def _compare(self, watched: WatchedSession, record: StepRecord) -> None:
+        if difference := watched.compare(record):
+            self._finished, self.failed = difference, True
+        elif watched.ended:
+            self._finished = f"identical, {watched.steps} steps"
 
     def _send_snapshot(self) -> None:
         snapshot = self._builder.build_snapshot(

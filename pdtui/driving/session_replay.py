@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 
-import numpy as np
 from torch import nn
 
-from pdtui.core.attributes import Floats
 from pdtui.core.drive_events import group_events_by_step
 from pdtui.core.errors import PdtuiError, SessionError
+from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
+from pdtui.driving.replays.replay_comparison import ReplayComparison, describe_info_differences
+from pdtui.driving.replays.replay_result import ReplayResult
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
 from pdtui.sessions.environment_versions import collect_versions, list_version_differences
-from pdtui.sessions.session_comparison import (
-    ReplayDeviation,
-    absolute_attribute_differences,
-    measure_attribute_spread,
-    summarise_deviations,
-)
-from pdtui.sessions.session_reader import Session, read_session
+from pdtui.sessions.session_header import SessionHeader, read_session_header
+from pdtui.sessions.streams.attribute_deviations import ReplayDeviation
+from pdtui.sessions.streams.step_block_reader import read_step_blocks
+from pdtui.sessions.streams.value_differences import StreamDifference
 from pdtui.stimulation.map_policy_lookup import locate_map_policy
 from pdtui.stimulation.map_reader import parse_map
 
@@ -43,71 +41,14 @@ REQUIRED_STEPS = 5
 """Control steps in which a drive on another machine must be within the tolerance."""
 
 
-@dataclass(frozen=True)
-class ReplayResult:
-    """How a replay compares with its session.
-
-    Attributes:
-        steps: control steps that were compared.
-        first_difference: the first control step whose digest differs; None if none does.
-        change: difference, in that step and in its unit, of the attribute that differs most.
-        detail: that attribute and its difference, in words.
-        environment: how machine and versions differ from the session's.
-        total: control steps of the session.
-        dt: simulated time of a control step, s.
-        deviations: how far each attribute is off from the first difference on, worst first.
-        agreed: number of first control steps in which every attribute is within the tolerance.
-        tolerance: in standard deviations of each attribute; None if every bit must be the same.
-        judged: number of first control steps that must be within the tolerance.
-        stopped: why the replay could not go on after it differed from the session; empty if it could.
-    """
-
-    steps: int
-    first_difference: int | None
-    change: float
-    detail: str
-    environment: tuple[str, ...]
-    total: int = 0
-    dt: float = 0.0
-    deviations: tuple[ReplayDeviation, ...] = ()
-    agreed: int = 0
-    tolerance: float | None = None
-    judged: int = 0
-    stopped: str = ""
-
-    @property
-    def identical(self) -> bool:
-        """Whether every step left the same digest."""
-        return self.first_difference is None
-
-    @property
-    def passed(self) -> bool:
-        """Whether the session repeats: bit for bit, or on another machine within the tolerance."""
-        return self.identical or (self.tolerance is not None and self.agreed >= self.judged)
-
-    @property
-    def verdict(self) -> str:
-        """The result in one line."""
-        if self.identical:
-            return f"identical: {self.steps} steps"
-        where = f"step {self.first_difference} of {self.total}"
-        if self.tolerance is None:
-            return f"differs: {where}: {self.detail}"
-        kept = (
-            f"{self.agreed} steps ({self.agreed * self.dt:g} s) are within {self.tolerance:g} of the spread"
-        )
-        if self.passed:
-            return f"repeats within tolerance: bits differ from {where} on; the first {kept}"
-        return f"differs: {where}: {self.detail}; only the first {kept}, but {self.judged} have to be"
-
-
-def config_from_session(session: Session, source: str, policy: str = "") -> DriveConfig:
+def config_from_session(session: SessionHeader, source: str, policy: str = "") -> DriveConfig:
     """Return the configuration of the drive that repeats a session.
 
     A `MapError` means that the map inside the session is broken; a `PolicyError`, that the map names a file
     outside of the session's folder and the working directory.
     """
     info = session.info
+    parts = {part.name: getattr(session, part.name) for part in fields(SessionHeader)}
     stimulation_map = parse_map(info.map_text, f"{source} (map)")
     stimulation_map = locate_map_policy(stimulation_map, policy)
     # A forced drive had other weights than its map was made for; a replay needs the session's own.
@@ -119,8 +60,7 @@ def config_from_session(session: Session, source: str, policy: str = "") -> Driv
         policy=policy,
         stochastic=info.stochastic,
         start=info.start,
-        scripted_events=session.events,
-        expected_digests=tuple(int(digest) for digest in session.digests),
+        watched=SessionHeader(**parts),
     )
 
 
@@ -137,9 +77,17 @@ def replay_session(
 ) -> ReplayResult:
     """Run a session from its file and its policy alone, and compare every step.
 
-    On the machine and with the versions that recorded it, every digest must be the same. Elsewhere, sums may
+    Everything that is recorded is compared: digests, attributes, actions, rewards, costs, activations,
+    stimulated units with both outputs, behaviors with their controllers, episodes and how they ended, the
+    poses for the viewer, and the description of robot and policy.
+
+    On the machine and with the versions that recorded it, every bit must be the same. Elsewhere, sums may
     be rounded differently, and a robot's contacts with the ground amplify that until nothing agrees any more;
-    there, the attributes must agree in the first control steps.
+    there, the attributes must agree within the tolerance in the first control steps; the other streams within
+    `STREAM_TOLERANCE` in these steps and for as long as the simulator's state is the same; and stimulated
+    units, behaviors, endings, the duration of a control step and the layers exactly.
+
+    The session is read block by block. Steps that it lacks are run, but not compared.
 
     Args:
         path: the session.
@@ -155,77 +103,91 @@ def replay_session(
         PdtuiError: the session or its policy cannot be loaded, or an event does not fit although nothing had
             differed before it.
     """
-    session = read_session(path)
+    header = read_session_header(path)
     given = None if isinstance(policy, str) else policy
-    config = config_from_session(session, str(path), policy if isinstance(policy, str) else "given")
+    config = config_from_session(header, str(path), policy if isinstance(policy, str) else "given")
+    here = collect_versions()
+    elsewhere = bool(list_version_differences(header.versions, here, numeric=True)) and not strict
+    comparison = ReplayComparison(header.info, required_steps)
     with open_robot(robot or config.robot) as world:
         loop = build_control_loop(replace(config, force=force), world, given)
-        if world.attributes != session.info.attributes:
+        if world.attributes != header.info.attributes:
             raise SessionError(f"{path}: the robot has other attributes than the session")
-        first, changes, stopped = _compare_steps(session, loop, progress)
-    here = collect_versions()
-    elsewhere = bool(list_version_differences(session.versions, here, numeric=True)) and not strict
-    spread = measure_attribute_spread(session.attributes)
-    outside = np.flatnonzero((changes > tolerance * spread).any(axis=1))
-    agreed = (first or 0) + (int(outside[0]) if outside.size else len(changes))
-    deviations = (
-        summarise_deviations(changes, session.info.attributes, first, spread) if first is not None else ()
-    )
+        description = describe_info_differences(loop.info, header.info, exact=not elsewhere)
+        stopped = "" if description else _compare_steps(header, loop, comparison, progress)
+    first, deviations = comparison.difference, comparison.deviations.summarise()
+    missing = sum(stop - start for start, stop in header.gaps)
+    state_differs = first is not None and comparison.first_digest == first.step
     return ReplayResult(
-        steps=session.steps if first is None else first + len(changes),
-        first_difference=first,
+        steps=comparison.steps,
+        first_difference=None if first is None else first.step,
         change=deviations[0].first if deviations else 0.0,
-        detail=_detail(deviations),
-        environment=tuple(list_version_differences(session.versions, here)),
-        total=session.steps,
-        dt=session.info.dt,
+        detail=_detail(first, deviations, state_differs),
+        environment=tuple(list_version_differences(header.versions, here)),
+        total=header.steps + missing,
+        dt=header.info.dt,
         deviations=deviations,
-        agreed=session.steps if first is None else agreed,
+        agreed=comparison.rows_before + comparison.deviations.count_within(tolerance),
         tolerance=tolerance if elsewhere else None,
-        judged=min(session.steps, required_steps),
+        judged=min(header.steps, required_steps),
         stopped=stopped,
+        difference=first,
+        damaged=first is not None and _is_damage(comparison, elsewhere=elsewhere),
+        beyond_rounding=comparison.beyond_rounding,
+        description=description,
+        missing=header.gaps,
     )
 
 
 def _compare_steps(
-    session: Session, loop: ControlLoop, progress: Callable[[int, int], None] | None
-) -> tuple[int | None, Floats, str]:
-    """Return the first step that differs, how far attributes are off from there on, and why it stopped."""
-    events = group_events_by_step(session.events)
-    first: int | None = None
-    changes = []
-    stopped = ""
-    for step, digest in enumerate(session.digests.tolist()):
-        try:
-            record = loop.advance(events.get(step, ()))
-        except PdtuiError as error:
-            if first is None:
-                raise
-            # Once the replay differs, an event of the session may no longer fit its state.
-            stopped = f"step {step}: {error}"
-            break
-        if first is None and record.digest != digest:
-            first = step
-        if first is not None:
-            changes.append(
-                absolute_attribute_differences(
-                    record.attributes, session.attributes[step], session.info.attributes
-                )
-            )
-        if progress is not None:
-            progress(step + 1, session.steps)
-        if record.diverged and step + 1 < session.steps:
-            if first is None:
-                raise SessionError(f"{session.path}: step {step} diverges, but {session.steps} are recorded")
-            stopped = f"step {step}: {record.ended}"
-            break
-    return first, np.array(changes).reshape(-1, len(session.info.attributes)), stopped
+    header: SessionHeader,
+    loop: ControlLoop,
+    comparison: ReplayComparison,
+    progress: Callable[[int, int], None] | None,
+) -> str:
+    """Run the session block by block; return why the replay stopped before its end, or nothing."""
+    events = group_events_by_step(header.events)
+    for block in read_step_blocks(header, activations=True, poses=True):
+        records: list[StepRecord] = []
+        stopped = ""
+        recorded = frozenset(block.steps.tolist())
+        for step in range(loop.step, int(block.steps[-1]) + 1):
+            try:
+                record = loop.advance(events.get(step, ()))
+            except PdtuiError as error:
+                comparison.add(records, block.part(0, len(records)))
+                # Once the replay differs, an event of the session may no longer fit its state.
+                if comparison.difference is None:
+                    raise
+                return f"step {step}: {error}"
+            if step in recorded:
+                records.append(record)
+                if progress is not None:
+                    progress(comparison.steps + len(records), header.steps)
+            if record.diverged and comparison.steps + len(records) < header.steps:
+                stopped = f"step {step}: {record.ended}"
+                break
+        comparison.add(records, block.part(0, len(records)))
+        if stopped and comparison.difference is None:
+            raise SessionError(f"{header.path}: {stopped}, but {header.steps} steps are recorded")
+        if stopped:
+            return stopped
+    return ""
 
 
-def _detail(deviations: tuple[ReplayDeviation, ...]) -> str:
-    if not deviations:
-        return "the simulator's state differs, but no attribute does"
-    worst = deviations[0]
-    if worst.first == 0.0:
-        return f"the simulator's state differs; attributes differ later: {worst}"
-    return f"{worst.attribute} is off by {worst.first:.3g} {worst.unit}"
+def _is_damage(comparison: ReplayComparison, *, elsewhere: bool) -> bool:
+    """Return whether a recorded value is wrong by more than rounding although the state was right."""
+    wrong = comparison.beyond_rounding if elsewhere else comparison.difference
+    state = comparison.first_digest
+    return wrong is not None and (state is None or wrong.step < state)
+
+
+def _detail(
+    difference: StreamDifference | None, deviations: Sequence[ReplayDeviation], state_differs: bool
+) -> str:
+    if difference is None:
+        return ""
+    if state_differs and deviations and deviations[0].first > 0.0:
+        worst = deviations[0]
+        return f"{worst.attribute} is off by {worst.first:.3g} {worst.unit}"
+    return str(difference)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-PACKAGES = ("pdtui", "mujoco", "gymnasium", "torch", "numpy", "simple-pid", "rerun-sdk")
+PACKAGES = ("pdtui", "mujoco", "pybullet", "box2d", "gymnasium", "torch", "numpy", "simple-pid", "rerun-sdk")
 COMPUTES_NOTHING = ("system", "rerun-sdk")
 """Entries that may differ without affecting any number of a run."""
 
@@ -49,6 +49,9 @@ def list_version_differences(
 ) -> list[str]:
     """List the differences between two environments, such as ``numpy: 2.2.0 there, 2.3.1 here``.
 
+    A package that a session does not name took no part in its drive, or was not looked for by the version of
+    pdtui that recorded it, and is left out.
+
     Args:
         a: the versions there, from a session.
         b: the versions here.
@@ -57,7 +60,7 @@ def list_version_differences(
     return [
         f"{name}: {there} there, {here} here"
         for name, there, here in version_differences(a, b)
-        if not (numeric and name in COMPUTES_NOTHING)
+        if not (numeric and name in COMPUTES_NOTHING) and not (name in PACKAGES and name not in a)
     ]
 
 

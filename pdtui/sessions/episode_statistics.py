@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from pdtui.core.attributes import Floats
@@ -63,6 +67,23 @@ class EpisodeStatisticsCounter:
             distance=None if self._column is None else float(attributes[self._column]),
             collisions=None if before.collisions is None else before.collisions + cost,
         )
+
+    def add_steps(
+        self, episodes: NDArray[np.int64], *, keyed: NDArray[np.bool_], costs: Floats, attributes: Floats
+    ) -> None:
+        """Count n control steps, n > 0: arrays of shape (n,), and attributes of shape (n, J)."""
+        starts = [0, *(np.flatnonzero(np.diff(episodes)) + 1).tolist(), len(episodes)]
+        for start, stop in pairwise(starts):
+            before = self.of(int(episodes[start]))
+            self._statistics[before.episode] = replace(
+                before,
+                steps=before.steps + stop - start,
+                involvement=before.involvement + int(np.count_nonzero(keyed[start:stop])),
+                distance=None if self._column is None else float(attributes[stop - 1, self._column]),
+                collisions=None
+                if before.collisions is None
+                else before.collisions + float(costs[start:stop].sum()),
+            )
 
     def of(self, episode: int) -> EpisodeStatistics:
         """Return the statistics of an episode."""

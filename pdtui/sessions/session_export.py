@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +12,37 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
+from numpy.typing import NDArray
 
 from pdtui.core.atomic_file import replace_file
 from pdtui.core.errors import SessionError
 from pdtui.core.units import format_unit
-from pdtui.sessions.session_reader import Session, read_activations, read_session
+from pdtui.sessions.session_header import SessionHeader, read_session_header
+from pdtui.sessions.session_reader import require_activations
 from pdtui.sessions.session_schema import ACTIVE_FIELDS
+from pdtui.sessions.streams.step_block import StepBlock, empty_step_block
+from pdtui.sessions.streams.step_block_reader import read_step_blocks
 
 Columns = dict[str, Any]
-_WRITERS: dict[str, Callable[[pa.Table, str], None]] = {
-    ".parquet": pyarrow.parquet.write_table,
-    ".csv": pyarrow.csv.write_csv,
-}
+_SUFFIXES = (".parquet", ".csv")
+_BLOCK_STEPS = 4096
+"""Control steps that are written at once: a row group of a Parquet file, which is slow to read if small."""
+
+
+@dataclass(frozen=True)
+class ExportStream:
+    """A stream that can be exported.
+
+    Attributes:
+        says: what it contains.
+        columns: returns its columns in a block of control steps, with ``step`` if a step may have any number
+            of rows; None for the events, which do not come in blocks.
+        activations: whether the block has to contain activations.
+    """
+
+    says: str
+    columns: Callable[[StepBlock, SessionHeader], Columns] | None
+    activations: bool = False
 
 
 def export_stream(path: Path, stream: str, output: Path, *, overwrite: bool = False) -> int:
@@ -41,89 +62,122 @@ def export_stream(path: Path, stream: str, output: Path, *, overwrite: bool = Fa
     """
     if stream not in STREAMS:
         raise SessionError(f"no stream '{stream[:40]}'; available: {', '.join(STREAMS)}")
-    if output.suffix not in _WRITERS:
-        raise SessionError(f"{output}: expected a name that ends with {' or '.join(_WRITERS)}")
+    if output.suffix not in _SUFFIXES:
+        raise SessionError(f"{output}: expected a name that ends with {' or '.join(_SUFFIXES)}")
     if output.exists() and not overwrite:
         raise SessionError(f"{output}: already exists; --overwrite replaces it")
-    session = read_session(path)
-    columns = STREAMS[stream][1](session)
-    steps = np.asarray(columns.pop("step", np.arange(session.steps)), np.int64)
-    table = pa.table({"step": steps, "time": steps * session.info.dt, **columns})
+    header = read_session_header(path)
+    if STREAMS[stream].activations:
+        require_activations(header)
+    tables = _read_tables(STREAMS[stream], header)
+    rows = 0
     try:
         with replace_file(output, SessionError) as partial:
-            _WRITERS[output.suffix](table, str(partial))
+            first = next(tables)
+            with _open_writer(partial, output.suffix, first.schema) as writer:
+                for table in chain([first], tables):
+                    writer.write_table(table)
+                    rows += table.num_rows
     except pa.ArrowException as error:
         raise SessionError(f"{output}: cannot be written: {error}") from error
-    return int(table.num_rows)
+    return rows
 
 
-def _attribute_columns(session: Session) -> Columns:
-    names = [f"{attribute.name} ({attribute.unit})" for attribute in session.info.attributes]
-    return _name_columns(session.attributes, names)
+def _read_tables(stream: ExportStream, header: SessionHeader) -> Iterator[pa.Table]:
+    """Yield the rows of each block of control steps; a session without any has an empty table."""
+    if stream.columns is None:
+        yield _event_table(header)
+        return
+    blocks = read_step_blocks(header, activations=stream.activations, block_steps=_BLOCK_STEPS)
+    for block in chain([next(blocks, None) or empty_step_block(header.info)], blocks):
+        columns = stream.columns(block, header)
+        steps = np.asarray(columns.pop("step", block.steps), np.int64)
+        yield pa.table({"step": steps, "time": steps * header.info.dt, **columns})
 
 
-def _action_columns(session: Session) -> Columns:
-    return _name_columns(session.actions, [f"action {index}" for index in range(session.actions.shape[1])])
+def _open_writer(path: Path, suffix: str, schema: pa.Schema) -> Any:
+    if suffix == ".csv":
+        return pyarrow.csv.CSVWriter(str(path), schema)
+    return pyarrow.parquet.ParquetWriter(str(path), schema)
 
 
-def _reward_columns(session: Session) -> Columns:
+def _attribute_columns(block: StepBlock, header: SessionHeader) -> Columns:
+    names = [f"{attribute.name} ({attribute.unit})" for attribute in header.info.attributes]
+    return _name_columns(block.attributes, names)
+
+
+def _action_columns(block: StepBlock, _: SessionHeader) -> Columns:
+    actions = block.actions.astype(np.float32)
+    return _name_columns(actions, [f"action {index}" for index in range(actions.shape[1])])
+
+
+def _reward_columns(block: StepBlock, _: SessionHeader) -> Columns:
+    ended = [block.endings.get(step, "") for step in block.steps.tolist()]
     return {
-        "reward": session.rewards,
-        "cost": session.costs,
-        "episode": session.episodes,
-        "ended": [session.endings.get(step, "") for step in range(session.steps)],
+        "reward": block.rewards,
+        "cost": block.costs,
+        "episode": block.episodes,
+        "ended": pa.array(ended, pa.utf8()),
     }
 
 
-def _activation_columns(session: Session) -> Columns:
-    activations = read_activations(session.path)
-    units = [format_unit(unit, session.info.layers) for unit in range(activations.shape[1])]
-    return _name_columns(activations, units)
+def _digest_columns(block: StepBlock, _: SessionHeader) -> Columns:
+    return {"digest": block.digests}
 
 
-def _behavior_columns(session: Session) -> Columns:
-    rows = [(step, view) for step, views in enumerate(session.active) for view in views]
-    columns: Columns = {"step": [step for step, _ in rows], "behavior": [view.name for _, view in rows]}
-    for field in ACTIVE_FIELDS:
-        columns[field] = pa.array([getattr(view, field) for _, view in rows], pa.float64())
+def _activation_columns(block: StepBlock, header: SessionHeader) -> Columns:
+    layers = header.info.layers
+    names = [format_unit(unit, layers) for unit in range(sum(layers))]
+    assert block.activations is not None
+    return _name_columns(block.activations.astype(np.float32, copy=False), names)
+
+
+def _behavior_columns(block: StepBlock, _: SessionHeader) -> Columns:
+    columns: Columns = {
+        "step": np.repeat(block.steps, block.behavior_counts),
+        "behavior": pa.array(block.behavior_names, pa.utf8()),
+    }
+    for column, field in enumerate(ACTIVE_FIELDS):
+        # NaN stands for None.
+        columns[field] = pa.array(block.behavior_states[:, column], pa.float64(), from_pandas=True)
     return columns
 
 
-def _unit_columns(session: Session) -> Columns:
-    rows = [
-        (step, format_unit(unit, session.info.layers), value, natural)
-        for step, (stimulation, outputs) in enumerate(zip(session.stimulations, session.natural, strict=True))
-        for unit, value, natural in zip(stimulation.units, stimulation.values, outputs, strict=True)
-    ]
-    steps, units, values, natural = zip(*rows, strict=True) if rows else ((), (), (), ())
+def _unit_columns(block: StepBlock, header: SessionHeader) -> Columns:
+    units = [format_unit(int(unit), header.info.layers) for unit in block.stimulated[:, 0]]
     return {
-        "step": steps,
+        "step": np.repeat(block.steps, block.stimulated_counts),
         "unit": pa.array(units, pa.utf8()),
-        "overwritten": pa.array(values, pa.float64()),
-        "natural": pa.array(natural, pa.float64()),
+        "overwritten": block.stimulated[:, 1],
+        "natural": block.stimulated[:, 2],
     }
 
 
-def _event_columns(session: Session) -> Columns:
-    columns: Columns = {"step": [event.step for event in session.events]}
+def _event_table(header: SessionHeader) -> pa.Table:
+    steps = np.array([event.step for event in header.events], np.int64)
+    columns: Columns = {"step": steps, "time": steps * header.info.dt}
     kinds = {"kind": pa.utf8(), "name": pa.utf8(), "value": pa.float64(), "key": pa.utf8()}
     for field, kind in kinds.items():
-        columns[field] = pa.array([getattr(event, field) for event in session.events], kind)
-    return columns
+        columns[field] = pa.array([getattr(event, field) for event in header.events], kind)
+    return pa.table(columns)
 
 
-def _name_columns(block: np.ndarray[Any, Any], names: list[str]) -> Columns:
+def _name_columns(block: NDArray[Any], names: list[str]) -> Columns:
     return {name: block[:, column] for column, name in enumerate(names)}
 
 
-STREAMS: dict[str, tuple[str, Callable[[Session], Columns]]] = {
-    "attributes": ("kinematic attributes after each step", _attribute_columns),
-    "actions": ("what the policy commanded", _action_columns),
-    "gains": ("reward, cost, episode, and why it ended", _reward_columns),
-    "digests": ("digest of the simulator's state after each step", lambda one: {"digest": one.digests}),
-    "activations": ("output of every hidden unit, as the next layer received it", _activation_columns),
-    "behaviors": ("active behaviors with their controllers, one row each", _behavior_columns),
-    "stimulation": ("stimulated units, with natural and overwritten outputs, one row each", _unit_columns),
-    "events": ("everything that changed the run, one row per event", _event_columns),
+STREAMS: dict[str, ExportStream] = {
+    "attributes": ExportStream("kinematic attributes after each step", _attribute_columns),
+    "actions": ExportStream("what the policy commanded", _action_columns),
+    "gains": ExportStream("reward, cost, episode, and why it ended", _reward_columns),
+    "digests": ExportStream("digest of the simulator's state after each step", _digest_columns),
+    "activations": ExportStream(
+        "output of every hidden unit, as the next layer received it", _activation_columns, activations=True
+    ),
+    "behaviors": ExportStream("active behaviors with their controllers, one row each", _behavior_columns),
+    "stimulation": ExportStream(
+        "stimulated units, with natural and overwritten outputs, one row each", _unit_columns
+    ),
+    "events": ExportStream("everything that changed the run, one row per event", None),
 }
-"""The streams by name: what each contains, and the function that returns its columns."""
+"""The streams by name."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,16 +12,15 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import SessionError
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.core.units import Stimulation
-from pdtui.sessions.drive_info import decode_drive_info
-from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_header import SessionHeader, count_control_steps, decode_header, read_gaps
-from pdtui.sessions.session_schema import ACTIVE_FIELDS, DIGEST_EPISODE, DRIVE, INFO, REWARD_COST_ACTION
+from pdtui.sessions.session_schema import DRIVE
+from pdtui.sessions.streams.step_block_decoding import decode_activations, decode_step_block
 
 
 @dataclass(frozen=True, kw_only=True)
 class Session(SessionHeader):
-    """A recorded drive of S control steps, J attributes and A actions.
+    """A recorded drive of S control steps (without its `gaps`), J attributes and A actions.
 
     Attributes:
         digests: digest of the simulator's state after each step, shape (S,), int64.
@@ -64,24 +61,18 @@ def read_session(path: Path | str) -> Session:
     try:
         drive = file.table(DRIVE)
         header = decode_header(file, path, count_control_steps(drive, read_gaps(file)))
-        info = header.info
-        gains = drive.read_matrix(REWARD_COST_ACTION, np.float64)
-        if header.steps and gains.shape[1] < 2:
-            raise SessionError(f"stream '{DRIVE}/{REWARD_COST_ACTION}': expected reward and cost first")
-        gains = gains if header.steps else np.empty((0, 2))
-        counters = drive.read_matrix(DIGEST_EPISODE, np.int64, 2)
-        stimulations, natural = _read_stimulations(drive, sum(info.layers))
+        block = decode_step_block(drive, header.info)
         return Session(
             **vars(header),
-            digests=counters[:, 0],
-            attributes=drive.read_matrix("attributes", np.float64, len(info.attributes)),
-            actions=gains[:, 2:].astype(np.float32),
-            rewards=gains[:, 0],
-            costs=gains[:, 1],
-            episodes=counters[:, 1],
-            active=_read_active_behaviors(drive),
-            stimulations=stimulations,
-            natural=natural,
+            digests=block.digests,
+            attributes=block.attributes,
+            actions=block.actions.astype(np.float32),
+            rewards=block.rewards,
+            costs=block.costs,
+            episodes=block.episodes,
+            active=block.active,
+            stimulations=block.stimulations,
+            natural=block.natural,
         )
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
@@ -98,44 +89,19 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
     path = Path(path)
     file = RrdContents(path, only=("activations",))
     try:
-        info, _ = decode_drive_info(file.properties(INFO))
         drive = file.table(DRIVE)
-        count_control_steps(drive, read_gaps(file))
-        if info.activations == "off":
-            how = "(--record-activations off); a replay computes them"
-            raise SessionError(f"the activations were not recorded {how}")
-        kind = np.float16 if info.activations == "half" else np.float32
-        return drive.read_matrix("activations", kind, sum(info.layers)).astype(np.float32, copy=False)
+        header = decode_header(file, path, count_control_steps(drive, read_gaps(file)))
+    except SessionError as error:
+        raise SessionError(f"{path}: {error}") from error
+    require_activations(header)
+    try:
+        return decode_activations(drive, header.info).astype(np.float32, copy=False)
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
 
 
-def _read_active_behaviors(drive: EntityTable) -> tuple[tuple[ActiveBehavior, ...], ...]:
-    width = len(ACTIVE_FIELDS)
-    steps = []
-    states = drive.read_lists("active", float, optional=True)
-    for names, flat in zip(drive.read_lists("behaviors", str, optional=True), states, strict=True):
-        if len(flat) != len(names) * width:
-            raise SessionError(f"stream 'active': expected {width} numbers per behavior")
-        parts = [flat[start : start + width] for start in range(0, len(flat), width)]
-        steps.append(tuple(map(_decode_active_behavior, names, parts)))
-    return tuple(steps)
-
-
-def _decode_active_behavior(name: str, values: Sequence[float]) -> ActiveBehavior:
-    remaining, factor, *controller = (None if math.isnan(value) else value for value in values)
-    steps = None if remaining is None or math.isinf(remaining) else int(remaining)
-    return ActiveBehavior(name, steps, math.nan if factor is None else factor, *controller)
-
-
-def _read_stimulations(
-    drive: EntityTable, units: int
-) -> tuple[tuple[Stimulation, ...], tuple[tuple[float, ...], ...]]:
-    stimulations, natural = [], []
-    for flat in drive.read_lists("stimulation", float, optional=True):
-        chosen, values, unstimulated = flat[::3], flat[1::3], flat[2::3]
-        if len(flat) % 3 or not all(unit.is_integer() and 0 <= unit < units for unit in chosen):
-            raise SessionError(f"stream 'stimulation': expected units 0..{units - 1} with two values each")
-        stimulations.append(Stimulation(tuple(int(unit) for unit in chosen), tuple(values)))
-        natural.append(tuple(unstimulated))
-    return tuple(stimulations), tuple(natural)
+def require_activations(header: SessionHeader) -> None:
+    """Check that a session contains activations; one that does not is a `SessionError`."""
+    if header.info.activations == "off":
+        how = "(--record-activations off); a replay computes them"
+        raise SessionError(f"{header.path}: the activations were not recorded {how}")

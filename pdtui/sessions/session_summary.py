@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pdtui.core.attributes import Floats
+from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.episode_statistics import EpisodeStatistics, EpisodeStatisticsCounter
-from pdtui.sessions.session_reader import Session
+from pdtui.sessions.session_header import SessionHeader
+from pdtui.sessions.streams.running_moments import RunningMoments
+from pdtui.sessions.streams.step_block_reader import read_step_blocks
+
+_COUNTED_AT_ONCE = 1024
+"""Control steps that are counted at once: one by one would take longer than the recording itself."""
 
 
 @dataclass(frozen=True)
@@ -49,36 +57,113 @@ class SessionSummary:
     attributes: tuple[AttributeSummary, ...]
 
 
-def summarise_session(session: Session) -> SessionSummary:
-    """Compute the summary statistics of a session."""
-    keyed = {event.step for event in session.events if event.key}
-    return SessionSummary(
-        steps=session.steps,
-        seconds=session.seconds,
-        episodes=int(session.episodes.max(initial=-1)) + 1,
-        falls=len(session.endings),
-        involvement=len(keyed),
-        total_reward=float(session.rewards.sum()),
-        total_cost=float(session.costs.sum()),
-        stimulated=sum(bool(stimulation.units) for stimulation in session.stimulations),
-        tallies=_count_episodes(session, keyed),
-        attributes=_summarise_attributes(session),
-    )
+class SessionSummaryCounter:
+    """Counts the summary statistics of a session whose control steps come in blocks of any size.
+
+    The size of the blocks affects no bit of the result.
+
+    Args:
+        info: the drive.
+    """
+
+    def __init__(self, info: DriveInfo) -> None:
+        self._info = info
+        self._moments = RunningMoments(len(info.attributes))
+        self._statistics = EpisodeStatisticsCounter(info)
+        self._pending: list[tuple[NDArray[Any], ...]] = []
+        self._rows = 0
+        self._steps = self._keyed = self._stimulated = 0
+        self._last_episode = -1
+        self._reward = self._cost = 0.0
+
+    def add(
+        self,
+        *,
+        attributes: Floats,
+        rewards: Floats,
+        costs: Floats,
+        episodes: NDArray[np.int64],
+        keyed: NDArray[np.bool_],
+        stimulated: NDArray[np.bool_],
+    ) -> None:
+        """Add n control steps in their order. The counter keeps the arrays, which must not be changed.
+
+        Args:
+            attributes: shape (n, J).
+            rewards, costs, episodes: shape (n,).
+            keyed: whether a key was pressed before each step, shape (n,).
+            stimulated: whether units were overwritten in each step, shape (n,).
+        """
+        self._pending.append((attributes, rewards, costs, episodes, keyed, stimulated))
+        self._rows += len(rewards)
+        if self._rows >= _COUNTED_AT_ONCE:
+            self._count_pending()
+
+    def summary(self, falls: int) -> SessionSummary:
+        """Return the statistics so far, of which `falls` episodes ended by themselves."""
+        self._count_pending(all_rows=True)
+        rows = zip(self._info.attributes, self._moments.mean, self._moments.deviation, strict=True)
+        return SessionSummary(
+            steps=self._steps,
+            seconds=self._steps * self._info.dt,
+            episodes=self._last_episode + 1,
+            falls=falls,
+            involvement=self._keyed,
+            total_reward=self._reward,
+            total_cost=self._cost,
+            stimulated=self._stimulated,
+            tallies=self._statistics.all,
+            attributes=tuple(
+                AttributeSummary(attribute.name, attribute.unit, float(mean), float(deviation))
+                for attribute, mean, deviation in rows
+            ),
+        )
+
+    def _count_pending(self, *, all_rows: bool = False) -> None:
+        """Count in pieces of the same size, so that sums are rounded in the same way."""
+        if not self._rows:
+            return
+        columns = [np.concatenate(column) for column in zip(*self._pending, strict=True)]
+        whole = self._rows if all_rows else self._rows - self._rows % _COUNTED_AT_ONCE
+        for start in range(0, whole, _COUNTED_AT_ONCE):
+            self._count(*(column[start : min(start + _COUNTED_AT_ONCE, whole)] for column in columns))
+        self._rows -= whole
+        self._pending = [tuple(column[whole:] for column in columns)] if self._rows else []
+
+    def _count(
+        self,
+        attributes: Floats,
+        rewards: Floats,
+        costs: Floats,
+        episodes: NDArray[np.int64],
+        keyed: NDArray[np.bool_],
+        stimulated: NDArray[np.bool_],
+    ) -> None:
+        self._moments.add(attributes)
+        self._statistics.add_steps(episodes, keyed=keyed, costs=costs, attributes=attributes)
+        self._steps += len(rewards)
+        self._keyed += int(np.count_nonzero(keyed))
+        self._stimulated += int(np.count_nonzero(stimulated))
+        self._last_episode = max(self._last_episode, int(episodes.max()))
+        self._reward += float(rewards.sum())
+        self._cost += float(costs.sum())
 
 
-def _count_episodes(session: Session, keyed: set[int]) -> tuple[EpisodeStatistics, ...]:
-    counter = EpisodeStatisticsCounter(session.info)
-    steps = zip(session.episodes.tolist(), session.costs.tolist(), session.attributes, strict=True)
-    for step, (episode, cost, attributes) in enumerate(steps):
-        counter.add(episode, keyed=step in keyed, cost=cost, attributes=attributes)
-    return counter.all
+def summarise_session(session: SessionHeader) -> SessionSummary:
+    """Compute the summary statistics of a session from its file, of which a block at a time is in memory.
 
-
-def _summarise_attributes(session: Session) -> tuple[AttributeSummary, ...]:
-    found = []
-    for column, attribute in enumerate(session.info.attributes):
-        values = session.attributes[:, column]
-        values = values[np.isfinite(values)]
-        mean, std = (float(values.mean()), float(values.std())) if len(values) else (math.nan, math.nan)
-        found.append(AttributeSummary(attribute.name, attribute.unit, mean, std))
-    return tuple(found)
+    Raises:
+        SessionError: the file is damaged or incomplete.
+    """
+    counter = SessionSummaryCounter(session.info)
+    keyed = np.array(sorted({event.step for event in session.events if event.key}), np.int64)
+    for block in read_step_blocks(session):
+        counter.add(
+            attributes=block.attributes,
+            rewards=block.rewards,
+            costs=block.costs,
+            episodes=block.episodes,
+            keyed=np.isin(block.steps, keyed),
+            stimulated=block.stimulated_counts > 0,
+        )
+    return counter.summary(len(session.endings))

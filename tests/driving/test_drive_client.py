@@ -19,6 +19,7 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.session_replay import replay_session
 from pdtui.policies.weights.weights_file import hash_file
+from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
@@ -192,10 +193,7 @@ def test_a_session_can_be_watched(
     _until(connection, lambda snapshot: bool(snapshot.active_behaviors))
     connection.close()
     session = read_session(recording)
-    digests = tuple(int(digest) for digest in session.digests)
-    watching = DriveClient(
-        DriveConfig("ant", small_map, 3, scripted_events=session.events, expected_digests=digests)
-    )
+    watching = DriveClient(DriveConfig("ant", small_map, 3, watched=read_session_header(recording)))
     last = _until(watching, lambda snapshot: bool(snapshot.finished))[-1]
     watching.close()
     assert last.finished == f"identical, {session.steps} steps"

@@ -17,3 +17,16 @@ def test_differences_name_both_sides() -> None:
         "torch: 2.6 there, absent here",
         "blas: absent there, mkl here",
     ]
+
+
+def test_the_simulators_of_all_robots_are_named() -> None:
+    assert {"mujoco", "box2d"} <= collect_versions().keys()
+    there = {**collect_versions(), "pybullet": "3.2.6", "box2d": "2.3.9"}
+    differences = list_version_differences(there, collect_versions(), numeric=True)
+    # From Python 3.12 on, there is no pybullet.
+    assert {line.partition(":")[0] for line in differences} == {"pybullet", "box2d"}
+
+
+def test_a_package_that_an_older_session_does_not_name_is_no_difference() -> None:
+    there = {name: found for name, found in collect_versions().items() if name != "box2d"}
+    assert list_version_differences(there, collect_versions()) == []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pdtui import api
 from pdtui.cli import main
 from pdtui.dissection.dissection_config import DissectionConfig
-from pdtui.driving.session_replay import ReplayResult
+from pdtui.driving.replays.replay_result import ReplayResult
 from pdtui.guide.guide_pages import GUIDE_FOLDER
 from pdtui.guide.reference.command_reference import render_command_reference
 from pdtui.guide.reference.python_reference import render_python_reference

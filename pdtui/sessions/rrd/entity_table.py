@@ -81,6 +81,48 @@ class EntityTable:
         """Return one number per row, shape (rows,)."""
         return self.read_matrix(name, kind, 1)[:, 0]
 
+    def read_ragged(self, name: str, kind: type[Number]) -> tuple[NDArray[np.int64], NDArray[Number]]:
+        """Return how many numbers each row has, shape (rows,), and all numbers in one array.
+
+        A batch without the column, or a row without a list, stands for empty lists.
+        """
+        wanted = pa.from_numpy_dtype(np.dtype(kind))
+        lengths, values = [np.empty(0, np.int64)], [np.empty(0, kind)]
+        for batch in self._batches:
+            if name not in batch.schema.names:
+                lengths.append(np.zeros(batch.num_rows, np.int64))
+                continue
+            column = self._column(batch, name, optional=True)
+            numbers = column.flatten()
+            if numbers.type != wanted or numbers.null_count:
+                raise SessionError(
+                    f"stream '{self._entity}/{name}': expected lists of {wanted}, found {column.type}"
+                )
+            counts = pc.fill_null(pc.list_value_length(column), 0)
+            lengths.append(counts.to_numpy(zero_copy_only=False).astype(np.int64))
+            values.append(numbers.to_numpy(zero_copy_only=False))
+        counted, flat = np.concatenate(lengths), np.concatenate(values)
+        if (self._order == np.arange(len(self._order))).all():
+            return counted, flat
+        pieces = np.split(flat, np.cumsum(counted)[:-1])
+        return counted[self._order], np.concatenate([pieces[row] for row in self._order])
+
+    def read_vectors(self, name: str, length: int, width: int) -> NDArray[np.float32]:
+        """Return equally many vectors of this length per row, shape (rows, width, length)."""
+        blocks = [np.empty((0, width, length), np.float32)]
+        for batch in self._batches:
+            column = self._column(batch, name)
+            kind = column.type.value_type
+            fits = pa.types.is_fixed_size_list(kind) and kind.list_size == length
+            fits = fits and kind.value_type == pa.float32()
+            fits = fits and bool((pc.list_value_length(column).to_numpy(zero_copy_only=False) == width).all())
+            values = column.flatten().flatten() if fits else None
+            if values is None or values.null_count or len(values) != len(column) * width * length:
+                expected = f"expected {width} vectors of {length} float per row"
+                raise SessionError(f"stream '{self._entity}/{name}': {expected}, found {column.type}")
+            blocks.append(values.to_numpy(zero_copy_only=False).reshape(-1, width, length))
+        return np.concatenate(blocks)[self._order]
+
     def _column(self, batch: pa.RecordBatch, name: str, *, optional: bool = False) -> pa.Array:
         if name not in batch.schema.names:
             raise SessionError(f"stream '{self._entity}/{name}' is missing")

@@ -1,0 +1,54 @@
+"""The session of a replay that is watched, with which each step is compared as soon as it was run."""
+
+from __future__ import annotations
+
+from pdtui.core.drive_events import DriveEvent, group_events_by_step
+from pdtui.core.step_record import StepRecord
+from pdtui.driving.replays.replay_comparison import ReplayComparison
+from pdtui.sessions.session_header import SessionHeader
+from pdtui.sessions.streams.step_block_reader import read_step_blocks
+
+_READ_AT_ONCE = 128
+"""Control steps per block. Reading a large block would delay the next control step visibly."""
+
+
+class WatchedSession:
+    """Compares control steps one by one, in all streams.
+
+    Args:
+        header: the header of the session.
+
+    Attributes:
+        ended: whether the last recorded control step was compared.
+    """
+
+    def __init__(self, header: SessionHeader) -> None:
+        self._events = group_events_by_step(header.events)
+        self._blocks = read_step_blocks(header, activations=True, poses=True, block_steps=_READ_AT_ONCE)
+        self._comparison = ReplayComparison(header.info, 0)
+        self._block, self._row = next(self._blocks, None), 0
+        self.ended = self._block is None
+
+    @property
+    def steps(self) -> int:
+        """The number of control steps that were compared."""
+        return self._comparison.steps
+
+    def events_before(self, step: int) -> list[DriveEvent]:
+        """Return the events that were applied before a control step."""
+        return self._events.get(step, [])
+
+    def compare(self, record: StepRecord) -> str:
+        """Compare the next control step; return how it differs, or an empty text.
+
+        A step that the session lacks is not compared. A damaged file is a `SessionError`.
+        """
+        if self._block is None or self._block.steps[self._row] != record.step:
+            return ""
+        self._comparison.add([record], self._block.part(self._row, self._row + 1))
+        self._row += 1
+        if self._row == len(self._block):
+            self._block, self._row = next(self._blocks, None), 0
+            self.ended = self._block is None
+        difference = self._comparison.difference
+        return "" if difference is None else f"step {record.step} differs from the session: {difference}"

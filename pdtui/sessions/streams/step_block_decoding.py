@@ -1,0 +1,63 @@
+"""Decode the rows of the drive into a block of control steps; everything in them is checked."""
+
+from __future__ import annotations
+
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.errors import SessionError
+from pdtui.sessions.drive_info import DriveInfo
+from pdtui.sessions.rrd.entity_table import EntityTable
+from pdtui.sessions.session_schema import ACTIVE_FIELDS, DIGEST_EPISODE, DRIVE, REWARD_COST_ACTION
+from pdtui.sessions.streams.step_block import StepBlock
+
+
+def decode_step_block(
+    drive: EntityTable, info: DriveInfo, *, activations: bool = False, **others: Any
+) -> StepBlock:
+    """Return all rows of a table of the drive; `others` are the fields of the block that it does not have.
+
+    A stream that is missing or damaged is a `SessionError`.
+    """
+    count = len(drive.steps)
+    gains = drive.read_matrix(REWARD_COST_ACTION, np.float64) if count else np.empty((0, 2))
+    if gains.shape[1] < 2:
+        raise SessionError(f"stream '{DRIVE}/{REWARD_COST_ACTION}': expected reward and cost first")
+    counters = drive.read_matrix(DIGEST_EPISODE, np.int64, 2)
+    names = drive.read_lists("behaviors", str, optional=True)
+    counts = np.fromiter(map(len, names), np.int64, count)
+    lengths, states = drive.read_ragged("active", np.float64)
+    if not np.array_equal(lengths, counts * len(ACTIVE_FIELDS)):
+        raise SessionError(f"stream 'active': expected {len(ACTIVE_FIELDS)} numbers per behavior")
+    triples, flat = drive.read_ragged("stimulation", np.float64)
+    if (triples % 3).any():
+        raise SessionError("stream 'stimulation': expected units with two values each")
+    stimulated, units = flat.reshape(-1, 3), sum(info.layers)
+    chosen = stimulated[:, 0]
+    if not ((chosen >= 0) & (chosen < units) & (chosen == np.floor(chosen))).all():
+        raise SessionError(f"stream 'stimulation': expected units 0..{units - 1} with two values each")
+    return StepBlock(
+        steps=drive.steps,
+        digests=counters[:, 0],
+        episodes=counters[:, 1],
+        attributes=drive.read_matrix("attributes", np.float64, len(info.attributes)),
+        actions=gains[:, 2:],
+        rewards=gains[:, 0],
+        costs=gains[:, 1],
+        behavior_counts=counts,
+        behavior_names=list(chain.from_iterable(names)),
+        behavior_states=states.reshape(-1, len(ACTIVE_FIELDS)),
+        stimulated_counts=triples // 3,
+        stimulated=stimulated,
+        activations=decode_activations(drive, info) if activations and info.activations != "off" else None,
+        **others,
+    )
+
+
+def decode_activations(drive: EntityTable, info: DriveInfo) -> NDArray[Any]:
+    """Return the output of every hidden unit, shape (n, U), float16 or float32 as it was recorded."""
+    kind = np.float16 if info.activations == "half" else np.float32
+    return drive.read_matrix("activations", kind, sum(info.layers))
