@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich import filesize
 from rich.console import Group
@@ -14,11 +14,12 @@ from rich.text import Text
 from pdtui.core.drive_events import describe_event
 from pdtui.core.printable_text import make_printable
 from pdtui.core.text_tables import new_facts_table, new_table
-from pdtui.sessions.session_comparison import SessionComparison
-from pdtui.sessions.session_header import SessionHeader
-from pdtui.sessions.session_summary import SessionSummary
-from pdtui.sessions.streams.attribute_deviations import ReplayDeviation
-from pdtui.sessions.streams.step_numbers import describe_step_ranges
+
+if TYPE_CHECKING:
+    from pdtui.sessions.session_comparison import SessionComparison
+    from pdtui.sessions.session_header import SessionHeader
+    from pdtui.sessions.session_summary import SessionSummary
+    from pdtui.sessions.streams.attribute_deviations import ReplayDeviation
 
 _KEPT = {
     "all": "every unit, every step",
@@ -54,6 +55,8 @@ def session_list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
 
 def session_table(session: SessionHeader, summary: SessionSummary) -> Any:
     """Return everything about a session: facts, figures, attributes, episodes and events."""
+    from pdtui.sessions.streams.step_numbers import describe_step_ranges
+
     info = session.info
     facts = [
         ("session", session.path),

@@ -70,10 +70,10 @@ def show_command(file: Path, as_json: bool) -> None:
     """Show robot, policy, keys, attributes and outcome of FILE."""
     from pdtui.cli import session_tables
     from pdtui.sessions.session_header import read_session_header
-    from pdtui.sessions.session_summary import summarise_session
+    from pdtui.sessions.session_summary import read_session_summary
 
     session = read_session_header(file)
-    summary = summarise_session(session)
+    summary = read_session_summary(session)
     data = {
         "path": str(file),
         "robot": session.info.robot,

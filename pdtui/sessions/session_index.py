@@ -24,6 +24,7 @@ def encode_session_index(
     endings: Mapping[int, str],
     outcome: str,
     gaps: Sequence[tuple[int, int]] = (),
+    summary: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the index of a session as plain data.
 
@@ -35,6 +36,7 @@ def encode_session_index(
         endings: why episodes ended by themselves, by the control step that ended each.
         outcome: how the drive ended.
         gaps: ranges of control steps that a repair could not rescue, each without its end.
+        summary: the fields of a `SessionSummary`, if it was computed.
     """
     return {
         "drive": dict(drive),
@@ -44,6 +46,7 @@ def encode_session_index(
         "endings": [[step, reason] for step, reason in endings.items()],
         "outcome": outcome,
         "gaps": [list(gap) for gap in gaps],
+        "summary": dict(summary) if summary is not None else None,
     }
 
 

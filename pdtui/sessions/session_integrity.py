@@ -15,14 +15,14 @@ from pdtui.sessions.rrd.end_index import read_end_index
 from pdtui.sessions.rrd.file_check import check_file
 from pdtui.sessions.rrd.message_reader import DamagedSpan
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_header import (
-    SessionHeader,
+from pdtui.sessions.session_description import (
     find_gaps,
     read_drive_outcome,
     read_endings,
     read_events,
     read_gaps,
 )
+from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.session_index import decode_session_index
 from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, ENDINGS, EVENTS, INFO, REPAIR, VERSIONS
 

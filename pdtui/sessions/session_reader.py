@@ -13,7 +13,8 @@ from pdtui.core.errors import SessionError
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.core.units import Stimulation
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_header import SessionHeader, count_control_steps, decode_header, read_gaps
+from pdtui.sessions.session_description import count_control_steps, decode_header, read_gaps
+from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.session_schema import DRIVE
 from pdtui.sessions.streams.step_block_decoding import decode_activations, decode_step_block
 

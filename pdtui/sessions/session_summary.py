@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Floats
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.episode_statistics import EpisodeStatistics, EpisodeStatisticsCounter
+from pdtui.sessions.rrd.end_index import read_end_index
 from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.streams.running_moments import RunningMoments
-from pdtui.sessions.streams.step_block_reader import read_step_blocks
 
 _COUNTED_AT_ONCE = 1024
 """Control steps that are counted at once: one by one would take longer than the recording itself."""
+
+_ALLOWED: dict[Any, Any] = {int: int, float: int | float, str: str, float | None: int | float | None}
+"""Types in the index of what has a type in Python."""
 
 
 @dataclass(frozen=True)
@@ -149,12 +152,28 @@ class SessionSummaryCounter:
         self._cost += float(costs.sum())
 
 
+def read_session_summary(session: SessionHeader) -> SessionSummary:
+    """Read the summary statistics of a session from the index at its end, or compute them without one.
+
+    Raises:
+        SessionError: as `summarise_session`.
+    """
+    index = read_end_index(session.path) or {}
+    try:
+        return _decode_summary(index["summary"])
+    except (KeyError, TypeError):
+        return summarise_session(session)
+
+
 def summarise_session(session: SessionHeader) -> SessionSummary:
     """Compute the summary statistics of a session from its file, of which a block at a time is in memory.
 
     Raises:
         SessionError: the file is damaged or incomplete.
     """
+    # Not needed by sessions with an index, and takes longer to load than that takes to read.
+    from pdtui.sessions.streams.step_block_reader import read_step_blocks
+
     counter = SessionSummaryCounter(session.info)
     keyed = np.array(sorted({event.step for event in session.events if event.key}), np.int64)
     for block in read_step_blocks(session):
@@ -167,3 +186,16 @@ def summarise_session(session: SessionHeader) -> SessionSummary:
             stimulated=block.stimulated_counts > 0,
         )
     return counter.summary(len(session.endings))
+
+
+def _decode_summary(fields: dict[str, Any]) -> SessionSummary:
+    """Return a summary from the index; fields that are not as expected are a `KeyError` or a `TypeError`."""
+    tallies = tuple(EpisodeStatistics(**tally) for tally in fields["tallies"])
+    attributes = tuple(AttributeSummary(**attribute) for attribute in fields["attributes"])
+    summary = SessionSummary(**{**fields, "tallies": tallies, "attributes": attributes})
+    for item in (summary, *tallies, *attributes):
+        for name, value in vars(item).items():
+            wanted = get_type_hints(type(item))[name]
+            if name not in ("tallies", "attributes") and not isinstance(value, _ALLOWED[wanted]):
+                raise TypeError(f"{name} is not as expected")
+    return summary

@@ -15,7 +15,8 @@ from pdtui.core.errors import SessionError
 from pdtui.sessions.rrd.chunk_stream import ChunkStream
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_header import SessionHeader, count_control_steps
+from pdtui.sessions.session_description import count_control_steps
+from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, ROBOT, STEP
 from pdtui.sessions.streams.pose_queue import PoseQueue
 from pdtui.sessions.streams.step_block import StepBlock

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+
+import numpy as np
 
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import RecordingEnded, SessionError
@@ -15,9 +18,11 @@ from pdtui.sessions.drive_info import DriveInfo, encode_drive_info
 from pdtui.sessions.environment_versions import collect_versions
 from pdtui.sessions.session_index import encode_session_index
 from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
+from pdtui.sessions.session_summary import SessionSummaryCounter
 from pdtui.sessions.viewer.session_blueprint import session_blueprint
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
 from pdtui.sessions.viewer.viewer_data_writer import ViewerDataWriter
+from pdtui.sessions.writer.arrow_columns import stack_rows
 from pdtui.sessions.writer.disk_space import DiskReserve
 from pdtui.sessions.writer.session_file import ExistingFile, SessionFile, SyncMode
 from pdtui.sessions.writer.session_outputs import SessionOutputs
@@ -84,6 +89,7 @@ class SessionRecorder:
         self._viewer_rows = max(view_rows if viewer is None else _LIVE_ROWS, 2 * self._rows_per_write)
         self._waits_for_batches = self._rows_per_write <= _SAFE_ROWS
         self._steps = self._batches = 0
+        self._summary = SessionSummaryCounter(info)
         self._events: list[DriveEvent] = []
         self._endings: dict[int, str] = {}
         self._closed = self._failed = False
@@ -179,6 +185,7 @@ class SessionRecorder:
             events=self._events,
             endings=self._endings,
             outcome=outcome,
+            summary=asdict(self._summary.summary(len(self._endings))),
         )
 
     def _require_space(self) -> None:
@@ -195,6 +202,7 @@ class SessionRecorder:
         if not self._recording.created:
             self._recording.create_file()
         self._write_events(records)
+        self._count(records)
         steps = [record.step for record in records]
         self._outputs.send_columns(DRIVE, steps, step_record_columns(records, self.info.activations))
         self._viewer_data.add(records)
@@ -203,6 +211,16 @@ class SessionRecorder:
             self._viewer_data.write()
         if steps[0] < _DESCRIBED_AGAIN <= steps[-1] + 1:
             self._describe_drive()  # a second copy, in case the first is damaged
+
+    def _count(self, records: Sequence[StepRecord]) -> None:
+        self._summary.add(
+            attributes=stack_rows([record.attributes for record in records]),
+            rewards=np.array([record.reward for record in records]),
+            costs=np.array([record.cost for record in records]),
+            episodes=np.array([record.episode for record in records]),
+            keyed=np.array([any(event.key for event in record.events) for record in records]),
+            stimulated=np.array([bool(record.stimulation.units) for record in records]),
+        )
 
     def _write_events(self, records: Sequence[StepRecord]) -> None:
         events = [event for record in records for event in record.events]

@@ -1,0 +1,106 @@
+"""Put the header of a session together from its messages: description, events, endings, outcome and gaps."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.drive_events import DriveEvent
+from pdtui.core.errors import SessionError
+from pdtui.sessions.drive_info import decode_drive_info
+from pdtui.sessions.rrd.entity_table import EntityTable
+from pdtui.sessions.rrd.rrd_contents import RrdContents
+from pdtui.sessions.session_header import SessionHeader, count_missing
+from pdtui.sessions.session_index import decode_event, decode_gaps
+from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, REPAIR, VERSIONS
+
+
+def scan_session_header(path: Path) -> SessionHeader:
+    """Read the header of a session without its index, from the heads of all messages.
+
+    Raises:
+        SessionError: as `read_session_header`.
+    """
+    file = RrdContents(path, entities=(EVENTS, ENDINGS))
+    try:
+        return decode_header(file, path, file.skipped_rows[DRIVE])
+    except SessionError as error:
+        raise SessionError(f"{path}: {error}") from error
+
+
+def decode_header(file: RrdContents, path: Path, rows: int) -> SessionHeader:
+    """Return the header of a session of which properties, events and endings were read.
+
+    `rows` is the number of control steps that are there.
+    """
+    info, created = decode_drive_info(file.properties(INFO))
+    versions = {name: str(values[0]) for name, values in file.properties(VERSIONS).items() if values}
+    gaps = read_gaps(file)
+    events = read_events(file.table(EVENTS), complete=not file.properties(REPAIR))
+    endings, outcome = read_endings(file.table(ENDINGS)), read_drive_outcome(file)
+    steps = rows + count_missing(gaps)
+    return SessionHeader(path, info, versions, created, events, steps, endings, outcome, gaps)
+
+
+def find_gaps(steps: NDArray[np.int64]) -> tuple[tuple[int, int], ...]:
+    """Return the ranges of control steps that are missing before and between these, which are in order."""
+    before = np.concatenate([[-1], steps])[: len(steps)]
+    places = np.flatnonzero(steps - before > 1)
+    return tuple((int(before[place]) + 1, int(steps[place])) for place in places)
+
+
+def count_control_steps(drive: EntityTable, gaps: Sequence[tuple[int, int]] = ()) -> int:
+    """Count the control steps that are there; one that is missing, except in gaps, is a `SessionError`."""
+    steps = drive.steps
+    expected = np.arange(len(steps) + count_missing(gaps))
+    for first, end in reversed(gaps):
+        expected = np.delete(expected, slice(first, end))
+    expected = expected[: len(steps)]
+    wrong = np.flatnonzero(steps[: len(expected)] != expected)
+    if wrong.size:
+        raise SessionError(f"expected control step {expected[wrong[0]]}, found step {steps[wrong[0]]}")
+    return len(steps)
+
+
+def read_gaps(file: RrdContents) -> tuple[tuple[int, int], ...]:
+    """Return the ranges of control steps that a repair could not rescue."""
+    text = file.properties(REPAIR).get("gaps", ["[]"])
+    try:
+        return decode_gaps(json.loads(text[0]))
+    except (ValueError, TypeError, IndexError, RecursionError) as error:
+        raise SessionError(f"property 'gaps': invalid: {error!r}") from error
+
+
+def read_events(table: EntityTable, *, complete: bool = True) -> tuple[DriveEvent, ...]:
+    """Return the events in their order; a missing one is a `SessionError` if they have to be `complete`."""
+    if not len(table.steps):
+        return ()
+    numbers = table.read_numbers("number", np.int64)
+    order = np.argsort(numbers, kind="stable")
+    if complete and not np.array_equal(numbers[order], np.arange(len(order))):
+        raise SessionError("an event is missing")
+    kinds, names, keys = table.read_texts("kind"), table.read_texts("name"), table.read_texts("key")
+    values = table.read_numbers("value", np.float64)
+    try:
+        return tuple(
+            decode_event(int(table.steps[row]), kinds[row], names[row], float(values[row]), keys[row])
+            for row in order
+        )
+    except ValueError as error:
+        raise SessionError(f"an event is damaged: {error}") from error
+
+
+def read_endings(table: EntityTable) -> dict[int, str]:
+    if not len(table.steps):
+        return {}
+    return dict(zip(table.steps.tolist(), table.read_texts("TextLog:text"), strict=True))
+
+
+def read_drive_outcome(file: RrdContents) -> str:
+    """Return how the drive ended; empty if the recording was cut off."""
+    values = file.properties(OUTCOME).get("outcome", [])
+    return values[0] if len(values) == 1 and isinstance(values[0], str) else ""
