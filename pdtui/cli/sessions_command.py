@@ -244,9 +244,7 @@ def open_command(file: Path, web: bool) -> None:
     from pdtui.sessions.viewer.viewer_process import CANNOT_START, run_viewer
 
     read_session_header(file)  # for a file that is no session, the viewer would show an empty window
-    command = viewer_command_line(file, web=web)
-    code = run_viewer(command)
-    if code == CANNOT_START:
-        raise SessionError(f"{command[0]}: the viewer cannot be started")
+    code = run_viewer(viewer_command_line(file, web=web))
     if code:
-        raise SessionError(f"{file}: the viewer ended with code {code}")
+        how = "cannot be started" if code == CANNOT_START else f"ended with code {code}"
+        raise SessionError(f"{file}: the viewer {how}")
