@@ -166,3 +166,15 @@ def test_nothing_that_a_terminal_sends_ends_a_drive(screen: pexpect.spawn[str], 
     recorded = read_session(session)
     assert [event.key for event in recorded.events] == ["w", "space"]
     assert recorded.outcome == "stopped"
+
+
+def test_a_drive_whose_terminal_is_gone_ends(screen: pexpect.spawn[str], session: Path) -> None:
+    """As when its tmux session is killed: the terminal is gone before the signal has been handled."""
+    _drive_a_little(screen, session)
+    with Path(os.devnull).open() as nothing:
+        os.dup2(nothing.fileno(), screen.child_fd)
+    deadline = time.monotonic() + PATIENCE
+    while screen.isalive():
+        assert time.monotonic() < deadline, "the screen is still there"
+        time.sleep(0.1)
+    assert _outcome(session) in ("ended by SIGHUP", "stopped", "the screen went away")

@@ -24,13 +24,24 @@ class TerminalDriver(LinuxDriver):
     form) and numbers of keys that are no characters would otherwise end the application.
     """
 
+    def write(self, data: str) -> None:
+        """Write to the terminal; once it is gone, Textual would wait for its writer, which has died."""
+        if self._writer_thread is not None and self._writer_thread.is_alive():
+            super().write(data)
+
     def run_input_thread(self) -> None:
         """Read input until the application ends, and send it keys, clicks and pasted text."""
         decode = getincrementaldecoder("utf-8")(errors="replace").decode
         reader = TerminalReader(self.process_message)
         while not self.exit_event.is_set():
             if select.select([self.fileno], [], [], _WAIT)[0]:
-                reader.feed(decode(os.read(self.fileno, _CHUNK)))
+                try:
+                    received = os.read(self.fileno, _CHUNK)
+                except OSError:
+                    return
+                if not received:
+                    return  # the terminal is gone, and this thread must not keep the process alive
+                reader.feed(decode(received))
             reader.tick()
 
 
