@@ -138,3 +138,43 @@ def test_a_killed_screen_leaves_a_whole_session(screen: pexpect.spawn[str], sess
     _drive_a_little(screen, session)
     os.kill(_pid(screen), signal.SIGKILL)
     assert _outcome(session) in ("the screen went away", "ended by SIGHUP")
+
+
+def test_nothing_that_a_terminal_sends_ends_a_drive(screen: pexpect.spawn[str], session: Path) -> None:
+    _drive_a_little(screen, session)
+    fd = screen.child_fd
+    for nonsense in (
+        b"\xe9\xff\xfe",
+        b"\x1b[M\xff\xff\xff",
+        b"\x1b[55296u",
+        b"\x1b[99999999u",
+        b"\x11",
+        b"\x1a",
+    ):
+        os.write(fd, nonsense)
+        time.sleep(0.2)
+    os.write(fd, b"\x1b[200~q\x1b[A\x03q\x1b[201~ ")
+    for size in ((1, 1), (1, 2), (2, 300), (400, 400), (24, 80)):
+        screen.setwinsize(*size)
+        time.sleep(0.05)
+    screen.expect("behaviors")
+    screen.send("q")
+    screen.expect("stopped: ")
+    screen.expect(pexpect.EOF)
+    screen.wait()
+    assert screen.exitstatus == 0
+    recorded = read_session(session)
+    assert [event.key for event in recorded.events] == ["w", "space"]
+    assert recorded.outcome == "stopped"
+
+
+def test_a_drive_whose_terminal_is_gone_ends(screen: pexpect.spawn[str], session: Path) -> None:
+    """As when its tmux session is killed: the terminal is gone before the signal has been handled."""
+    _drive_a_little(screen, session)
+    with Path(os.devnull).open() as nothing:
+        os.dup2(nothing.fileno(), screen.child_fd)
+    deadline = time.monotonic() + PATIENCE
+    while screen.isalive():
+        assert time.monotonic() < deadline, "the screen is still there"
+        time.sleep(0.1)
+    assert _outcome(session) in ("ended by SIGHUP", "stopped", "the screen went away")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -242,11 +241,10 @@ def open_command(file: Path, web: bool) -> None:
     """Open FILE in the Rerun viewer, which listens on 127.0.0.1 only."""
     from pdtui.sessions.session_header import read_session_header
     from pdtui.sessions.viewer.viewer_address import viewer_command_line
+    from pdtui.sessions.viewer.viewer_process import CANNOT_START, run_viewer
 
     read_session_header(file)  # for a file that is no session, the viewer would show an empty window
-    try:
-        code = subprocess.run(viewer_command_line(file, web=web), check=False).returncode
-    except OSError as error:
-        raise SessionError(f"the viewer cannot be started: {error}") from error
+    code = run_viewer(viewer_command_line(file, web=web))
     if code:
-        raise SessionError(f"{file}: the viewer ended with code {code}")
+        how = "cannot be started" if code == CANNOT_START else f"ended with code {code}"
+        raise SessionError(f"{file}: the viewer {how}")

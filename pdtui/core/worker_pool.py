@@ -7,6 +7,7 @@ import multiprocessing.connection
 import os
 import signal
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -180,7 +181,7 @@ def describe_exit(process: BaseProcess) -> str:
 
 def _serve_calls(connection: Connection, build: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
     """Answer calls until the pipe is closed. The first call builds the state, and reports errors in that."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
     state = cache(partial(build, *arguments))
     with suppress(EOFError, OSError):
         while True:
@@ -205,9 +206,16 @@ def _send_answer(connection: Connection, answer: tuple[bool, Any]) -> None:
         connection.send((False, TypeError(f"{answer[1]!r}: {format_error_in_one_line(error)}")))
 
 
-def _end_with_parent() -> None:
-    """End this process with its parent, which cannot tell a busy worker that it is being killed."""
+def end_with_parent(patience: float = 0.0) -> None:
+    """Wait until this process's parent has ended, and end this process too; run it in a thread of its own.
+
+    Nobody else can end a process that is busy or stuck once its parent has been killed.
+
+    Args:
+        patience: time that this process has to end by itself, s.
+    """
     parent = multiprocessing.parent_process()
     if parent is not None:
         multiprocessing.connection.wait([parent.sentinel])
+        time.sleep(patience)
         os._exit(1)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import threading
 import time
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Protocol
 
 from pdtui.core.errors import PdtuiError
-from pdtui.core.worker_pool import describe_exit
+from pdtui.core.worker_pool import describe_exit, end_with_parent
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
 
 _PATIENCE = 60.0
-"""Longest wait for the recording to be completed, s; after it, the process is killed."""
+"""Longest wait for the recording to be completed, s; after it, the process ends at once."""
 
 
 class DriveConnection(Protocol):
@@ -43,6 +44,8 @@ class DriveConnection(Protocol):
 def _simulate(connection: Connection, config: DriveConfig) -> None:
     # The recording library would print over the screen when the disk is full or a viewer has gone.
     os.environ.setdefault("RUST_LOG", "off")
+    # The drive ends by itself once the screen has gone, unless its world is stuck in a step.
+    threading.Thread(target=end_with_parent, args=(_PATIENCE,), daemon=True).start()
     from pdtui.driving import drive_server  # loads torch and the simulator, which the screen does without
 
     drive_server.serve_drive(connection, config)

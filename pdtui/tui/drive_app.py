@@ -27,6 +27,7 @@ from pdtui.tui.cell_text import ScreenRow, displayed_key_name
 from pdtui.tui.help_screen import HelpScreen
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
+from pdtui.tui.terminal_driver import TerminalDriver
 from pdtui.tui.theme import STYLES, THEME
 from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
 from pdtui.tui.widgets.attribute_table import AttributeTable
@@ -49,8 +50,10 @@ _HINTS = {row.id: row.hint for row in sorted(KEY_TABLE, key=lambda row: row.hint
 """Words of the key line by the bindings' ids, the most useful first."""
 
 
-class DriveApp(App[str]):
+class DriveApp(App[str], inherit_bindings=False):
     """Shows the newest snapshot of a drive and passes keys on to it.
+
+    Textual's own keys are left out: with its ctrl+q, which resumes output on many terminals, it would quit.
 
     The caller closes the connection afterwards. `run` returns None when the user quits; where the drive's
     process fails, it returns the failure's message and `return_code` is 1.
@@ -81,7 +84,7 @@ class DriveApp(App[str]):
         fps: int = 12,
         watching: bool = False,
     ) -> None:
-        super().__init__()
+        super().__init__(driver_class=TerminalDriver)
         self.connection, self.map, self.fps, self.watching = connection, stimulation_map, fps, watching
         # The map's keys come before the application's own.
         behaviors = stimulation_map.behaviors.values()

@@ -14,6 +14,7 @@ from textual.binding import Binding
 from pdtui.core.printable_text import make_printable
 from pdtui.tui.cell_text import fit_cells
 from pdtui.tui.choice_list import ChoiceList, ListChoice, has_all_words
+from pdtui.tui.terminal_driver import TerminalDriver
 from pdtui.tui.theme import STYLES, THEME
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ class MapPickerApp(App[MapPickerRow]):
     BINDINGS: ClassVar = [Binding("ctrl+c", "quit", "quits without choosing", id="pick_quit", priority=True)]
 
     def __init__(self, rows: Sequence[MapPickerRow]) -> None:
-        super().__init__()
+        super().__init__(driver_class=TerminalDriver)
         self.rows = tuple(rows)
         self.register_theme(THEME)
         self.theme = THEME.name

@@ -9,7 +9,7 @@ from rich.segment import Segment
 from rich.style import Style
 from textual.color import Color
 from textual.filter import ANSIToTruecolor
-from textual.geometry import Region
+from textual.geometry import Region, Size
 from textual.reactive import reactive
 from textual.strip import Strip
 from textual.widget import Widget
@@ -22,10 +22,16 @@ if TYPE_CHECKING:
 
 
 Sides = tuple[Strip, Strip, Color, Style]
+LEAST_PAINTED = Size(16, 2)
+"""Columns and lines of the smallest picture that is painted; a smaller widget shows its upper left part."""
 
 
 class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
-    """Paints whole lines, repaints only those that changed, and never changes the layout."""
+    """Paints whole lines, repaints only those that changed, and never changes the layout.
+
+    A terminal may have any size, and a widget without room gets none. So `paint` is never asked for less than
+    `LEAST_PAINTED`, and what does not fit is cut off.
+    """
 
     ALLOW_SELECT: ClassVar[bool] = False
     facts: reactive[DriveFacts | None] = reactive(None, init=False, repaint=False, always_update=True)
@@ -36,11 +42,15 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         self.map = stimulation_map
         self._strips: list[Strip] = []
         self._framed: list[Strip | None] = []
+        self._painted_size = Size(0, 0)
         self._sides: Sides | None = None
 
     @abstractmethod
     def paint(self, width: int, height: int) -> list[Strip]:
-        """Return the lines of the widget as it is now; missing lines are blank."""
+        """Return the lines of the widget as it is now, each `width` cells long; missing lines are blank.
+
+        Neither size is less than that of `LEAST_PAINTED`.
+        """
 
     def remember(self, snapshot: DriveSnapshot) -> None:
         """Keep what later frames need of a snapshot; called once per snapshot."""
@@ -59,22 +69,32 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
 
     def redraw(self) -> None:
         """Paint, and have Textual repaint the lines that changed."""
-        width, height = self.content_size
-        if not self.is_attached or width <= 0 or height <= 0:
+        if not self.is_attached:
             return
-        blank = Strip.blank(width)
-        strips = self.paint(width, height)[:height]
-        strips += [blank] * (height - len(strips))
-        old, self._strips = self._strips, strips
-        if len(old) != height or old[0].cell_length != width:
-            self._framed = [None] * height
+        old, old_size = self._strips, self._painted_size
+        self._paint_strips()
+        if self._painted_size != old_size:
             self.refresh()
             return
-        changed = [row for row, strip in enumerate(strips) if strip != old[row]]
+        changed = [row for row, strip in enumerate(self._strips) if strip != old[row]]
         for row in changed:
             self._framed[row] = None
         if changed:
-            self.refresh(*(Region(0, row, width, 1) for row in changed))
+            self.refresh(*(Region(0, row, self._painted_size.width, 1) for row in changed))
+
+    def _paint_strips(self) -> None:
+        """Paint lines for the present size; framed lines of another size are dropped."""
+        width, height = size = self.content_size
+        strips: list[Strip] = []
+        if width > 0 and height > 0:
+            wide, high = max(width, LEAST_PAINTED.width), max(height, LEAST_PAINTED.height)
+            strips = self.paint(wide, high)[:height]
+            strips += [Strip.blank(wide)] * (height - len(strips))
+            if wide > width:
+                strips = [strip.crop(0, width) for strip in strips]
+        if size != self._painted_size:
+            self._framed, self._sides = [None] * len(strips), None
+        self._strips, self._painted_size = strips, size
 
     def notify_style_update(self) -> None:
         """Drop what was painted with the old styles."""
@@ -94,6 +114,8 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         Textual's own method resolves border, padding and background again for every changed line, which costs
         as much as painting it. Here one empty line provides the sides of all.
         """
+        if self._painted_size != self.content_size:
+            self._paint_strips()  # Textual may want lines of a new size before it tells the widget
         width = self.outer_size.width
         top, bottom = self.gutter.top, self.gutter.top + len(self._framed)
         lines: list[Strip] = []

@@ -18,6 +18,7 @@ from pdtui.guide.guide_pages import GUIDE_FOLDER, GuidePage, search_guide
 from pdtui.tui.choice_list import ChoiceList, ListChoice, has_all_words
 from pdtui.tui.guide.guide_viewer import GuideViewer, guide_line_link
 from pdtui.tui.style_sheets import WIDTHS
+from pdtui.tui.terminal_driver import TerminalDriver
 from pdtui.tui.theme import STYLES, THEME
 
 GUIDE_STYLE = """
@@ -55,7 +56,7 @@ class GuideApp(App[None]):
     ]
 
     def __init__(self, pages: Mapping[str, GuidePage], topic: str) -> None:
-        super().__init__()
+        super().__init__(driver_class=TerminalDriver)
         self._pages, self._first = pages, topic
         self.register_theme(THEME)
         self.theme = THEME.name

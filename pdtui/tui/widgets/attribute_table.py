@@ -39,7 +39,7 @@ class AttributeTable(SnapshotWidget):
             return [ScreenRow(width).add("waiting for the policy", STYLES.faint).strip()]
         shown = self._choose(height)
         attributes = [self.facts.attributes[index] for index in shown]
-        widest = max(cell_len(make_printable(attribute.name)) for attribute in attributes)
+        widest = max((cell_len(make_printable(attribute.name)) for attribute in attributes), default=0)
         holds = any(behavior.pid is not None for behavior in self.map.behaviors.values())
         target_width = _TARGET if holds else 0
         fixed = _VALUE + _UNIT + target_width + 3

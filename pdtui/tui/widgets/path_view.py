@@ -21,6 +21,7 @@ _ARROWS = "→↗↑↖←↙↓↘"
 _LEAST_SIZE = 2.0  # of the area shown, m
 MOST_POINTS = 5000
 _JUMP = 1.0  # longest step that is drawn as a line, m
+_FARTHEST = 1e9  # coordinates beyond it, in m, come from a simulation that diverges and are not drawn
 _PAST, _NONE, _MARK, _LABEL, _FIRST_BEHAVIOR = range(5)
 
 
@@ -42,7 +43,7 @@ class PathTrail:
         if restarted and len(self.points):
             self.past, self.points = self.points, np.empty((0, 3))
             self._stride, self._skip = 1, 0
-        path = path[np.isfinite(path).all(axis=1)]
+        path = path[(np.abs(path) < _FARTHEST).all(axis=1)]
         kept = path[self._skip :: self._stride]
         self._skip = (self._skip - len(path)) % self._stride
         self.points = np.concatenate([self.points, kept])
@@ -74,9 +75,10 @@ class PathView(SnapshotWidget):
         self.trail.extend(snapshot.path, restarted=snapshot.restarted)
         if self.facts is not None and len(snapshot.poses):
             root = snapshot.poses[root_body_row(self.facts.links)]
-            ahead = rotate_vectors(root[3:], np.array([1.0, 0.0, 0.0]))
-            self._here = root[:2]
-            self._heading = atan2(float(ahead[1]), float(ahead[0]))
+            if (np.abs(root) < _FARTHEST).all():  # else the mark stays where it was
+                ahead = rotate_vectors(root[3:], np.array([1.0, 0.0, 0.0]))
+                self._here = root[:2]
+                self._heading = atan2(float(ahead[1]), float(ahead[0]))
 
     def paint(self, width: int, height: int) -> list[Strip]:
         points = self.trail.points

@@ -1,0 +1,92 @@
+"""The viewer ends with the command that opened it, whatever ends that."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from pdtui.sessions.viewer.viewer_process import CANNOT_START, run_viewer
+from tests.real_viewer import free_port
+
+SAMPLE = Path(__file__).parents[2] / "sessions" / "samples" / "ant.rrd"
+PATIENCE = 30.0
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+
+@pytest.fixture
+def mark(tmp_path: Path) -> str:
+    """A word by which the processes of one test are found."""
+    return str(tmp_path / "opened.rrd")
+
+
+@pytest.fixture
+def opening(tmp_path: Path, mark: str) -> Iterator[subprocess.Popen[bytes]]:
+    """`pdtui sessions open --web`, whose real viewer serves on free ports."""
+    shutil.copyfile(SAMPLE, mark)
+    binary = files("rerun_cli") / "rerun"
+    ports = f"--port {free_port()} --web-viewer-port {free_port()}"
+    script = tmp_path / "rerun-on-free-ports"
+    script.write_text(f'#!/bin/sh\nexec "{binary}" "$@" {ports} # {mark}\n')
+    script.chmod(0o755)
+    command = [sys.executable, "-m", "pdtui", "sessions", "open", "--web", mark]
+    environment = {**os.environ, "RERUN_CLI_PATH": str(script)}
+    process = subprocess.Popen(command, env=environment, start_new_session=True)
+    yield process
+    process.kill()
+    process.wait()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGKILL])
+def test_the_viewer_ends_with_the_command_that_opened_it(
+    opening: subprocess.Popen[bytes], mark: str, number: signal.Signals
+) -> None:
+    assert any("rerun_cli/rerun" in command for command in processes_of(mark, least=4)), commands_with(mark)
+    opening.send_signal(number)
+    opening.wait(PATIENCE)
+    assert not processes_of(mark)
+
+
+def test_a_viewer_whose_script_is_killed_does_not_stay(tmp_path: Path, mark: str) -> None:
+    """The script waits for a program that it has started, as that of the viewer does."""
+    script = f"sleep 600 & kill -KILL $$ # {mark}"
+    assert run_viewer(["sh", "-c", script]) == 128 + signal.SIGKILL
+    assert not processes_of(mark)
+
+
+def test_exit_codes_are_those_of_the_viewer(tmp_path: Path) -> None:
+    assert run_viewer(["sh", "-c", "exit 0"]) == 0
+    assert run_viewer(["sh", "-c", "exit 7"]) == 7
+    assert run_viewer([str(tmp_path / "none")]) == CANNOT_START
+
+
+def processes_of(mark: str, least: int = 0) -> list[str]:
+    """Wait until at least so many processes have opened the file, or, for 0, until none is left."""
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        found = commands_with(mark)
+        if (least and len(found) >= least) or not (least or found):
+            break
+        time.sleep(0.05)
+    return found
+
+
+def commands_with(word: str) -> list[str]:
+    """The command lines of the processes that were told this word and still run."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
+        except OSError:
+            continue
+        if any(word in one for one in words):
+            found.append(" ".join(words))
+    return found
