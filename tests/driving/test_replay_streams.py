@@ -212,7 +212,7 @@ def test_steps_that_a_session_lacks_are_run_but_not_compared(drive: Drive, tmp_p
             if not 10 <= one.step < 15:
                 recorder.write(one)
         recorder.close("finished")
-    header = replace(read_session_header(path), gaps=((10, 15),))
+    header = replace(read_session_header(path), steps=40, gaps=((10, 15),))
     watched = WatchedSession(header)
     assert [watched.compare(one) for one in records] == [""] * 40
     assert (watched.ended, watched.steps) == (True, 35)

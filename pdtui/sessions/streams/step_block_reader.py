@@ -70,8 +70,12 @@ def read_step_blocks(
         whole = _gather_steps(header, activations, queue)
         for start in range(taken, len(whole), block_steps):
             yield whole.part(start, min(start + block_steps, len(whole)))
-    if queue is not None:
-        with _named_errors(header.path):
+        taken = len(whole)
+    with _named_errors(header.path):
+        # A session that is being recorded may have grown since its header was read.
+        if header.outcome and taken != header.steps - header.missing:
+            raise SessionError(f"expected {header.steps - header.missing} control steps, found {taken}")
+        if queue is not None:
             queue.require_empty()
 
 
