@@ -69,7 +69,7 @@ class DriveServer:
         self._closing = ""
         self._finished = ""
         self.failed = False
-        self._watched = None if config.watched is None else WatchedSession(config.watched)
+        self._watched = None if config.watched is None else WatchedSession(config.watched, self._loop.info)
 
     def send_facts(self) -> None:
         """Send the facts of the drive."""

@@ -116,7 +116,6 @@ def replay_session(
         description = describe_info_differences(loop.info, header.info, exact=not elsewhere)
         stopped = "" if description else _compare_steps(header, loop, comparison, progress)
     first, deviations = comparison.difference, comparison.deviations.summarise()
-    missing = sum(stop - start for start, stop in header.gaps)
     state_differs = first is not None and comparison.first_digest == first.step
     return ReplayResult(
         steps=comparison.steps,
@@ -124,12 +123,12 @@ def replay_session(
         change=deviations[0].first if deviations else 0.0,
         detail=_detail(first, deviations, state_differs),
         environment=tuple(list_version_differences(header.versions, here)),
-        total=header.steps + missing,
+        total=header.steps,
         dt=header.info.dt,
         deviations=deviations,
         agreed=comparison.rows_before + comparison.deviations.count_within(tolerance),
         tolerance=tolerance if elsewhere else None,
-        judged=min(header.steps, required_steps),
+        judged=min(header.steps - header.missing, required_steps),
         stopped=stopped,
         difference=first,
         damaged=first is not None and _is_damage(comparison, elsewhere=elsewhere),
@@ -147,6 +146,7 @@ def _compare_steps(
 ) -> str:
     """Run the session block by block; return why the replay stopped before its end, or nothing."""
     events = group_events_by_step(header.events)
+    total = header.steps - header.missing
     for block in read_step_blocks(header, activations=True, poses=True):
         records: list[StepRecord] = []
         stopped = ""
@@ -163,13 +163,13 @@ def _compare_steps(
             if step in recorded:
                 records.append(record)
                 if progress is not None:
-                    progress(comparison.steps + len(records), header.steps)
-            if record.diverged and comparison.steps + len(records) < header.steps:
+                    progress(comparison.steps + len(records), total)
+            if record.diverged and comparison.steps + len(records) < total:
                 stopped = f"step {step}: {record.ended}"
                 break
         comparison.add(records, block.part(0, len(records)))
         if stopped and comparison.difference is None:
-            raise SessionError(f"{header.path}: {stopped}, but {header.steps} steps are recorded")
+            raise SessionError(f"{header.path}: {stopped}, but {total} steps are recorded")
         if stopped:
             return stopped
     return ""

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.drive_events import DriveEvent
+from pdtui.core.errors import SessionError
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
@@ -212,15 +213,28 @@ def test_steps_that_a_session_lacks_are_run_but_not_compared(drive: Drive, tmp_p
             if not 10 <= one.step < 15:
                 recorder.write(one)
         recorder.close("finished")
-    header = replace(read_session_header(path), gaps=((10, 15),))
-    watched = WatchedSession(header)
+    header = replace(read_session_header(path), steps=40, gaps=((10, 15),))
+    watched = WatchedSession(header, info)
     assert [watched.compare(one) for one in records] == [""] * 40
     assert (watched.ended, watched.steps) == (True, 35)
 
 
 def test_who_watches_is_told_what_differs_at_once(drive: Drive, tmp_path: Path) -> None:
     path = record(drive, tmp_path / "a.rrd", CHANGES["rewards is "], range(12, 13))
-    watched = WatchedSession(read_session_header(path))
+    watched = WatchedSession(read_session_header(path), drive[0])
     found = [watched.compare(one) for one in drive[1][:13]]
     assert found[:12] == [""] * 12
     assert found[12].startswith("step 12 differs from the session: rewards is ")
+
+
+def test_who_watches_a_session_of_another_description_is_told_so(drive: Drive, tmp_path: Path) -> None:
+    path = record(drive, tmp_path / "a.rrd", dt=0.1)
+    with pytest.raises(SessionError, match=r"a\.rrd: differs: description: dt is 0\.05, recorded 0\.1"):
+        WatchedSession(read_session_header(path), drive[0])
+
+
+def test_another_number_of_actions_is_a_difference(drive: Drive, tmp_path: Path) -> None:
+    path = record(drive, tmp_path / "a.rrd", lambda one: one._replace(action=one.action[:7]))
+    assert replay_session(path).verdict.startswith(
+        "differs: step 0 of 40: actions is '8 numbers', recorded '7 numbers'"
+    )

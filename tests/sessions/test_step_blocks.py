@@ -102,7 +102,7 @@ def test_a_missing_step_is_an_error_unless_it_is_a_known_gap(recorded: Recorded,
                 recorder.write(one._replace(events=()))
     with pytest.raises(SessionError, match=r"a\.rrd: expected control step 30, found step 35"):
         read_blocks(path)
-    header = replace(read_session_header(path), gaps=((30, 35), (80, 81)))
+    header = replace(read_session_header(path), steps=100, gaps=((30, 35), (80, 81)))
     blocks = list(read_step_blocks(header, block_steps=16))
     steps = [step for block in blocks for step in block.steps.tolist()]
     assert steps == [*range(30), *range(35, 80), *range(81, 100)]

@@ -93,6 +93,8 @@ def describe_info_differences(here: DriveInfo, recorded: DriveInfo, *, exact: bo
         for name in _COMPARED
         if getattr(here, name) != getattr(recorded, name)
     ]
+    if here.attributes != recorded.attributes:
+        lines.append("the robot has other attributes than the session")
     if len(here.links) != len(recorded.links):
         lines.append(f"the robot has {len(here.links)} links, recorded {len(recorded.links)}")
     tolerance = 0.0 if exact else _LINK_TOLERANCE

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from pdtui.core.drive_events import DriveEvent, group_events_by_step
+from pdtui.core.errors import SessionError
 from pdtui.core.step_record import StepRecord
-from pdtui.driving.replays.replay_comparison import ReplayComparison
+from pdtui.driving.replays.replay_comparison import ReplayComparison, describe_info_differences
+from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.streams.step_block_reader import read_step_blocks
 
@@ -17,12 +19,18 @@ class WatchedSession:
 
     Args:
         header: the header of the session.
+        info: what is known about the drive here.
+
+    Raises:
+        SessionError: robot or policy are not as the session describes them, or the file is damaged.
 
     Attributes:
         ended: whether the last recorded control step was compared.
     """
 
-    def __init__(self, header: SessionHeader) -> None:
+    def __init__(self, header: SessionHeader, info: DriveInfo) -> None:
+        if different := describe_info_differences(info, header.info, exact=False):
+            raise SessionError(f"{header.path}: differs: description: {'; '.join(different)}")
         self._events = group_events_by_step(header.events)
         self._blocks = read_step_blocks(header, activations=True, poses=True, block_steps=_READ_AT_ONCE)
         self._comparison = ReplayComparison(header.info, 0)

@@ -35,6 +35,7 @@ class PoseQueue:
         """Add rows in the order of the file."""
         if self._gathered or not batch.num_rows:
             return
+        batch = _select_columns(batch)
         steps = EntityTable(ROBOT, [batch]).steps
         self._batches.append(batch)
         self._newest = int(steps[-1])
@@ -46,8 +47,9 @@ class PoseQueue:
         found, self._batches = ChunkStream(self._path, lambda entity: entity == ROBOT), []
         for chunk in found:
             if STEP in chunk.timelines and chunk.entity == ROBOT and chunk.batch.num_rows:
-                EntityTable(ROBOT, [chunk.batch])  # checks the numbers of the steps
-                self._batches.append(chunk.batch.filter(pc.greater(chunk.batch.column(STEP), self._taken)))
+                batch = _select_columns(chunk.batch)
+                EntityTable(ROBOT, [batch])  # checks the numbers of the steps
+                self._batches.append(batch.filter(pc.greater(batch.column(STEP), self._taken)))
         self._gathered = True
 
     def take(self, first: int, last: int, *, at_end: bool) -> tuple[NDArray[np.int64], Poses]:
@@ -79,3 +81,8 @@ class PoseQueue:
         """Check that all poses were taken; those of steps beyond the last are a `SessionError`."""
         for batch in self._batches:
             raise SessionError(f"poses of step {batch.column(STEP)[0]}, which is not recorded")
+
+
+def _select_columns(batch: pa.RecordBatch) -> pa.RecordBatch:
+    places = {name: place for place, name in enumerate(batch.schema.names)}
+    return batch.select([places[name] for name in (STEP, *VECTOR_LENGTHS) if name in places])

@@ -17,7 +17,7 @@ from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_description import count_control_steps
 from pdtui.sessions.session_header import SessionHeader
-from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, ROBOT, STEP
+from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, REWARD_COST_ACTION, ROBOT, STEP
 from pdtui.sessions.streams.pose_queue import PoseQueue
 from pdtui.sessions.streams.step_block import StepBlock
 from pdtui.sessions.streams.step_block_decoding import decode_step_block
@@ -30,6 +30,18 @@ _POSES_LATE = 512
 """Control steps that are read ahead of a block whose poses are wanted: the recorder writes poses in larger
 batches than the data of the drive, but not later than this or than four of the largest batches."""
 
+_COLUMNS = {
+    *(
+        STEP,
+        "attributes",
+        REWARD_COST_ACTION,
+        DIGEST_EPISODE,
+        "activations",
+        "stimulation",
+        "behaviors",
+        "active",
+    )
+}
 _Batches = list[pa.RecordBatch]
 
 
@@ -71,8 +83,12 @@ def read_step_blocks(
         whole = _gather_steps(header, activations, queue)
         for start in range(taken, len(whole), block_steps):
             yield whole.part(start, min(start + block_steps, len(whole)))
-    if queue is not None:
-        with _named_errors(header.path):
+        taken = len(whole)
+    with _named_errors(header.path):
+        # A session that is being recorded may have grown since its header was read.
+        if header.outcome and taken != header.steps - header.missing:
+            raise SessionError(f"expected {header.steps - header.missing} control steps, found {taken}")
+        if queue is not None:
             queue.require_empty()
 
 
@@ -87,7 +103,8 @@ def _cut_blocks(path: Path, block_steps: int, queue: PoseQueue | None) -> Iterat
         if STEP not in chunk.timelines:
             continue
         if chunk.entity == ROBOT and queue is not None:
-            queue.add(chunk.batch)
+            with _named_errors(path):
+                queue.add(chunk.batch)
         elif chunk.entity == DRIVE:
             pending.append(chunk.batch)
             rows += chunk.batch.num_rows
@@ -118,15 +135,16 @@ def _split_batches(batches: _Batches, rows: int) -> tuple[_Batches, _Batches]:
 def _merge_batches(batches: _Batches, *, activations: bool) -> _Batches:
     """Join batches that have the same columns: decoding a hundred short ones takes much longer."""
 
-    def columns(batch: pa.RecordBatch) -> tuple[tuple[str, pa.DataType], ...]:
-        both = zip(batch.schema.names, batch.schema.types, strict=True)
-        return tuple((name, kind) for name, kind in both if activations or name != "activations")
+    def columns(batch: pa.RecordBatch) -> tuple[tuple[str, int, pa.DataType], ...]:
+        found = zip(batch.schema.names, range(batch.num_columns), batch.schema.types, strict=True)
+        kept = {one[0]: one for one in found if one[0] in _COLUMNS}
+        return tuple(one for name, one in kept.items() if activations or name != "activations")
 
     merged = []
     for found, run in groupby(batches, columns):
-        names, parts = [name for name, _ in found], list(run)
-        arrays = [pa.concat_arrays([part.column(name) for part in parts]) for name in names]
-        merged.append(pa.RecordBatch.from_arrays(arrays, names))
+        parts = list(run)
+        arrays = [pa.concat_arrays([part.column(place) for part in parts]) for _, place, _ in found]
+        merged.append(pa.RecordBatch.from_arrays(arrays, [name for name, _, _ in found]))
     return merged
 
 
@@ -158,3 +176,6 @@ def _named_errors(path: Path) -> Iterator[None]:
     except SessionError as error:
         known = str(error).startswith(f"{path}: ")
         raise error if known else SessionError(f"{path}: {error}") from error
+    except pa.ArrowException as error:
+        why = " ".join(str(error).split())[:200]
+        raise SessionError(f"{path}: a stream is damaged: {why}") from error
