@@ -15,8 +15,11 @@ import pytest
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.session_replay import replay_session
+from pdtui.sessions.drive_info import encode_drive_info
 from pdtui.sessions.session_reader import read_session
-from pdtui.sessions.writer.session_recorder import SessionRecorder
+from pdtui.sessions.session_schema import INFO
+from pdtui.sessions.writer.rerun_recording import RerunRecording, send_property_group
+from pdtui.sessions.writer.session_file import SessionFile
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 PATIENCE = 60
@@ -93,8 +96,12 @@ def test_a_drive_in_a_terminal_replays_bit_for_bit(screen: pexpect.spawn[str], s
 
 
 def test_a_session_without_steps_cannot_be_watched(small_map: StimulationMap, session: Path) -> None:
-    with SessionRecorder(session, build_control_loop(DriveConfig("ant", small_map, 5)).info):
-        pass
+    """Nowadays none is written, but earlier versions did."""
+    info = build_control_loop(DriveConfig("ant", small_map, 5)).info
+    recording = RerunRecording(SessionFile(session), info)
+    recording.create_file()
+    send_property_group(recording.stream, INFO, encode_drive_info(info, "2026-01-01T00:00:00+00:00"))
+    recording.close()
     arguments = ["-m", "pdtui", "replay", str(session), "--watch"]
     child = pexpect.spawn(
         sys.executable,
