@@ -25,7 +25,9 @@ from pdtui.cli.shared_options import (
     workers_option,
 )
 from pdtui.core.errors import MapError
+from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
+from pdtui.stimulation.seed_ranges import require_unused_seeds
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
@@ -132,6 +134,8 @@ def evaluate_command(
     if experiment is not None:
         _check_experiment(EXPERIMENTS.get(experiment), others, pictures, own_options)
     config = build_drive_config(robot, map_name, policy, import_options, force=force, start=start)
+    if not policy_only:
+        _require_unused_seeds(config, seeds)
     if experiment is not None:
         rest = [build_drive_config(other, None, "", import_options, force=force) for other in others]
         _run_experiment(
@@ -160,6 +164,13 @@ def evaluate_command(
         print_result(asdict(alone), as_json, lambda: policy_evaluation_table(alone))
     else:
         _evaluate_behaviors(config, seeds, workers, update, as_json)
+
+
+def _require_unused_seeds(config: DriveConfig, seeds: range) -> None:
+    the_map = config.stimulation_map
+    warning = require_unused_seeds(seeds, the_map.seeds, the_map.source)
+    if warning:
+        click.echo(make_printable(warning), err=True)
 
 
 def _evaluate_behaviors(config: DriveConfig, seeds: range, workers: int, update: bool, as_json: bool) -> None:

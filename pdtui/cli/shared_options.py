@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
@@ -12,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pdtui.core.errors import MapError
+from pdtui.core.errors import MapError, SeedError
 from pdtui.core.printable_text import make_printable, to_json
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, NO_OPTIONS, SQUASH_NAMES, ImportOptions
 from pdtui.sessions.session_schema import ACTIVATIONS_KEPT
+from pdtui.stimulation.seed_ranges import FIRST_SEARCH_SEED, parse_seed_range
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
@@ -31,10 +31,10 @@ class SeedList(click.ParamType[range]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
         if isinstance(value, range):
             return value
-        match = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}))?", str(value))
-        if match is None or int(match[2] or match[1]) < int(match[1]):
-            self.fail(f"'{value}': expected seeds such as 7 or 100-119", param, ctx)
-        return range(int(match[1]), int(match[2] or match[1]) + 1)
+        try:
+            return parse_seed_range(str(value))
+        except SeedError as error:
+            self.fail(str(error), param, ctx)
 
 
 FILE_PATH = click.Path(path_type=Path)
@@ -74,9 +74,12 @@ preset_option = click.option(
     show_default=True,
     help="Match units as the paper describes it, or as its authors' code does.",
 )
-# Evaluations use the seeds below 1000.
 search_seed_option = integer_option(
-    "--seed", least=1000, most=2**31 - 1, default=1000, help="Seed of every random choice."
+    "--seed",
+    least=FIRST_SEARCH_SEED,
+    most=2**31 - 1,
+    default=FIRST_SEARCH_SEED,
+    help="Seed of every random choice.",
 )
 start_option = click.option(
     "--start",

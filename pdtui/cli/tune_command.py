@@ -33,9 +33,10 @@ from pdtui.policies.weights.import_options import ImportOptions
 @click.option(
     "--seeds",
     type=SeedList(),
-    default="200-209",
+    default="2000-2009",
     show_default=True,
-    help="Range of seeds; the first half is for the search, the second for judging its result.",
+    help="Range of seeds; the first half is for the search, the second for choosing between what it "
+    "found and the map's gains.",
 )
 @integer_option("--points", default=48, help="Number of gains to try first, spread over their range.")
 @integer_option("--refinements", least=0, default=24, help="Number of gains to try near the best ones.")
@@ -68,7 +69,7 @@ def tune_command(
     from pdtui.evaluation.evaluation_tables import tuning_table
     from pdtui.search.gain_tuning import TuningSettings, tune_gains
     from pdtui.stimulation.map_library import find_map
-    from pdtui.stimulation.map_writer import replace_gains, rewrite_map
+    from pdtui.stimulation.map_writer import add_seeds, replace_gains, rewrite_map
 
     path = find_map(map_name)
     config = build_drive_config(str(path), None, policy, import_options, force=force)
@@ -78,7 +79,8 @@ def tune_command(
         )
     better = {one.behavior: one.new for one in results if one.better}
     if better and not dry_run:
-        rewrite_map(path, lambda text: replace_gains(text, better, str(path)))
+        source = str(path)
+        rewrite_map(path, lambda text: add_seeds(replace_gains(text, better, source), [seeds], source))
     written = sorted(better) if not dry_run else []
     data = {"map": str(path), "behaviors": [one.as_dict() for one in results], "written": written}
     print_result(data, as_json, lambda: tuning_table(results))

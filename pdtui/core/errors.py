@@ -44,6 +44,10 @@ class RecordingEnded(SessionError):  # noqa: N818 - it names an event
     """A recording had to end before its drive; what was recorded is complete."""
 
 
+class SeedError(PdtuiError):
+    """Seeds are invalid, or reserved for another purpose."""
+
+
 class PictureError(PdtuiError):
     """A picture cannot be drawn or written."""
 

@@ -15,9 +15,13 @@ from pdtui.robots.robot import Robot
 from pdtui.search.behavior_search import BehaviorSearchSettings
 from pdtui.search.controller_search import ControllerSearchSettings
 from pdtui.search.imprint_candidates import ImprintSettings
+from pdtui.stimulation.seed_ranges import FIRST_SEARCH_SEED, require_search_seeds
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 StageProgress = Callable[[str, int, int], None]
+
+SEEDS_PER_DISSECTION = 2000
+"""Number of seeds from a dissection's first on, outside of which it uses none."""
 
 
 Part = TypeVar("Part", "DissectionSettings", BehaviorSearchSettings, ControllerSearchSettings)
@@ -124,8 +128,9 @@ class DissectionConfig:
         preset_changes: Changes to the preset, each as ``NAME=VALUE``; see `pdtui.spectra.matching_presets`.
         settings: How much work is done.
         episodes: Monitored episodes; the paper has 5.
-        seed: Seed of every random choice. Monitored episodes are reset with the seeds from here on, and walks
-            to the starts of roll-outs with those from ``seed + 100`` on.
+        seed: Seed of every random choice, none of those for judging. Monitored episodes are reset with the
+            seeds from here on, walks to the starts of roll-outs with those from ``seed + 100`` on, and
+            nothing with those from ``seed + SEEDS_PER_DISSECTION`` on.
         start_from: A map, or its name or file, whose fixed behaviors the searches also begin from.
         budget_minutes: Time after which the searches end with the best found so far. Every unit is screened
             even if that takes longer.
@@ -133,6 +138,9 @@ class DissectionConfig:
         journal: File that keeps every roll-out, so that an interrupted dissection continues where it stopped.
             It is left in place: delete it when the results are saved.
         progress: Called with the stage, the units of work done, and their total.
+
+    Raises:
+        SeedError: The seed is reserved for judging.
     """
 
     robot: str | Robot
@@ -143,9 +151,12 @@ class DissectionConfig:
     preset_changes: Sequence[str] = ()
     settings: DissectionSettings = field(default_factory=DissectionSettings)
     episodes: int = 5
-    seed: int = 1000
+    seed: int = FIRST_SEARCH_SEED
     start_from: str | Path | StimulationMap | None = None
     budget_minutes: float | None = None
     workers: int = 2
     journal: Path | None = None
     progress: StageProgress | None = None
+
+    def __post_init__(self) -> None:
+        require_search_seeds([self.seed], "a dissection")

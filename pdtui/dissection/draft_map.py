@@ -9,6 +9,7 @@ import numpy as np
 from pdtui.core.attributes import BehaviorAim
 from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.core.units import Stimulation, describe_units, format_unit
+from pdtui.dissection.dissection_config import SEEDS_PER_DISSECTION
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.probing.primitive_confirmation import rank_probed_units
 from pdtui.robots.robot_goals import HoldBehaviorGoal
@@ -43,6 +44,7 @@ def draft_map(dissection: Dissection) -> str:
         {one.name: one for one in behaviors},
         source=f"dissection of {dissection.policy}",
         import_options=dissection.import_options,
+        seeds=(range(dissection.seed, dissection.seed + SEEDS_PER_DISSECTION),),
     )
     return compose_map(stimulation_map, _comments(dissection, {one.attribute for one in primitives}))
 

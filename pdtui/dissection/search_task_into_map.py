@@ -20,7 +20,7 @@ from pdtui.search.plan_search import SharedTimeBudget
 from pdtui.search.task_rollout import TimedStimulation
 from pdtui.search.task_search import TaskSearch, TaskSearchResult, TaskSearchSettings
 from pdtui.stimulation.map_reader import load_map
-from pdtui.stimulation.map_writer import add_behavior, compose_map, rewrite_map
+from pdtui.stimulation.map_writer import add_behavior, add_seeds, compose_map, rewrite_map
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 
@@ -105,11 +105,14 @@ def search_task_into_map(
     units = result.plan.stimulation.by_address(layers)
     seconds = None if result.plan.steps is None else round(result.plan.steps * dt, 6)
     behavior = Behavior(goal.name, goal.key, goal.says, units, period=seconds, task=goal.name)
+
+    def change(text: str) -> str:
+        return add_seeds(add_behavior(text, behavior, str(output)), search.seeds, str(output))
+
     if known is None:
-        text = add_behavior(compose_map(new_map), behavior, str(output))
-        write_file(output, text, MapError)
+        write_file(output, change(compose_map(new_map)), MapError)
     else:
-        rewrite_map(output, lambda text: add_behavior(text, behavior, str(output)))
+        rewrite_map(output, change)
     return WrittenBehavior(result, units, seconds, output)
 
 

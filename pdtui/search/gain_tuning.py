@@ -25,6 +25,7 @@ from pdtui.search.pid_gain_space import gains_from_point, point_from_gains, samp
 from pdtui.search.plan_search import Deadline, PlanScoringStage, SharedTimeBudget, select_plans
 from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveResult, TrackingDriveRunner
 from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarise_tracking
+from pdtui.stimulation.seed_ranges import require_search_seeds
 from pdtui.stimulation.stimulation_map import Behavior, PidGains, StimulationMap
 
 STEPS_OF_ANGLE: tuple[float, ...] = (0.0, 0.4, 1.2, 0.3, -0.9, -0.5, 0.0, 0.9, 0.0)
@@ -103,17 +104,20 @@ def tune_gains(
     Args:
         config: robot, map and policy, or a loop of them.
         names: names of behaviors of mode ``pid``; empty for all of the map.
-        seeds: at least 2; one half for the search, the other to compare its result with the map's gains.
+        seeds: at least 2, none of them for judging; one half for the search, the other to compare its result
+            with the map's gains.
         settings: how much to do.
         workers: number of processes.
         progress: called with controllers tried, controllers in all, and a note.
 
     Raises:
         MapError: the map has no such behavior, or it is of another mode; fewer than 2 seeds.
+        SeedError: a seed is reserved for judging.
         PdtuiError: the robot or the policy cannot be loaded.
     """
     if len(seeds) < 2:
-        raise MapError(f"expected at least 2 seeds, half of them to judge by, found {len(seeds)}")
+        raise MapError(f"expected at least 2 seeds, half of them to choose by, found {len(seeds)}")
+    require_search_seeds(seeds, "tuning")
     budget = SharedTimeBudget(settings.minutes)
     with TrackingDriveRunner(config, workers) as runner:
         behaviors = _find_pid_behaviors(runner.loop.map, names)

@@ -18,6 +18,7 @@ from pdtui.robots.task import Task, TaskVerdict
 from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionProblem, EvolutionSettings
 from pdtui.search.stimulation_sampler import CROSSED, StimulationSampler
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
+from pdtui.stimulation.seed_ranges import JUDGING_SEEDS, require_search_seeds
 
 _SEEDS_APART = 1000
 """Seeds from the first of one stage to the first of the next."""
@@ -86,8 +87,8 @@ class TaskSearchResult:
 class TaskSearch:
     """Search for a stimulation, and its duration, that does a task.
 
-    The walks of the search have the seeds from ``seed`` on, those of the selection from ``seed + 1000`` on,
-    those of the figures from ``seed + 2000`` on.
+    The walks of the search have the seeds from ``seed`` on, those of the selection from ``seed + 1000`` on.
+    The figures are measured on the last of the seeds for judging, which nothing is chosen on.
 
     Args:
         pool: runs the roll-outs.
@@ -95,6 +96,9 @@ class TaskSearch:
         seed: first seed of the walks, and seed of every random choice.
         settings: how much to do.
         known: plans to begin with besides the best single units.
+
+    Raises:
+        SeedError: a seed is reserved for judging.
     """
 
     def __init__(
@@ -107,6 +111,7 @@ class TaskSearch:
     ) -> None:
         self._pool, self._task, self._seed, self._settings, self._known = pool, task, seed, settings, known
         self._rng, self._rollouts = np.random.default_rng(seed), 0
+        require_search_seeds([seed], f"the search for '{task.name}'")
 
     def run(self, deadline: Deadline, progress: StepProgress | None = None) -> TaskSearchResult:
         """Try every unit alone, search, select on other walks, and measure on held-out ones.
@@ -126,7 +131,7 @@ class TaskSearch:
             final=self._count_successes,
         )
         search_score, best = EvolutionarySearch(problem, settings).run(deadline, progress)
-        plans, seeds = [best, TimedStimulation()], self._seeds(2, settings.held_out_seeds)
+        plans, seeds = [best, TimedStimulation()], JUDGING_SEEDS[-settings.held_out_seeds :]
         verdicts, untouched = map(tuple, self._judge(plans, seeds))
         return TaskSearchResult(self._task, best, search_score, verdicts, untouched, self._rollouts)
 
@@ -168,6 +173,13 @@ class TaskSearch:
         weights[tried] = np.maximum(best - np.median(scores), 0.0)
         order = np.argsort(-scores, kind="stable")[: settings.children]
         return [plans[index] for index in order], weights + (weights.mean() or 1.0)
+
+    @property
+    def seeds(self) -> tuple[range, ...]:
+        """The seeds on which something is chosen."""
+        settings = self._settings
+        searched = max(settings.screen_seeds, settings.quick_seeds, settings.full_seeds)
+        return self._seeds(0, searched), self._seeds(1, settings.selection_seeds)
 
     def _seeds(self, stage: int, count: int) -> range:
         first = self._seed + stage * _SEEDS_APART

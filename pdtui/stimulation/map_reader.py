@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import cast, get_args
 
 from pdtui.core.attributes import AimDirection, BehaviorAim
-from pdtui.core.errors import MapError
+from pdtui.core.errors import MapError, SeedError
 from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.core.units import ADDRESS
 from pdtui.core.untrusted_file import read_bounded_file
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions
 from pdtui.stimulation.map_table_reader import MapTableReader
+from pdtui.stimulation.seed_ranges import merge_seed_ranges, parse_seed_range
 from pdtui.stimulation.stimulation_map import (
     SCHEMA,
     Behavior,
@@ -77,6 +78,7 @@ def parse_map(text: str, source: str) -> StimulationMap:
         ]
         for kind in ("primitives", "behaviors")
     }
+    seeds = _read_seeds(top)
     top.done()
     primitives = {p.name: p for p in (_read_primitive(table) for table in tables["primitives"])}
     behaviors: dict[str, Behavior] = {}
@@ -92,8 +94,19 @@ def parse_map(text: str, source: str) -> StimulationMap:
             if other not in behaviors:
                 raise table.error("together", f"names '{other}', which does not exist")
     return StimulationMap(
-        robot, name, sha256, default_key, primitives, behaviors, text, source, import_options
+        robot, name, sha256, default_key, primitives, behaviors, text, source, import_options, seeds
     )
+
+
+def _read_seeds(top: MapTableReader) -> tuple[range, ...] | None:
+    """Read the seeds on which anything in the map was chosen."""
+    texts = top.take("seeds", list, None)
+    if texts is None:
+        return None
+    try:
+        return merge_seed_ranges(parse_seed_range(str(text)) for text in texts)
+    except SeedError as error:
+        raise top.error("seeds", str(error)) from error
 
 
 def _has_long_key(text: str) -> bool:

@@ -6,7 +6,7 @@ as `source` and says what is wrong.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,6 +20,7 @@ from pdtui.core.attributes import BehaviorAim
 from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.stimulation.map_reader import parse_map
+from pdtui.stimulation.seed_ranges import format_seed_ranges, merge_seed_ranges, parse_seed_range
 from pdtui.stimulation.stimulation_map import (
     SCHEMA,
     Behavior,
@@ -43,6 +44,8 @@ def compose_map(stimulation_map: StimulationMap, comments: Sequence[str] = ()) -
         document.add(tomlkit.comment(line))
     document.add("schema", tomlkit.item(SCHEMA))
     document.add("robot", tomlkit.item(stimulation_map.robot))
+    if stimulation_map.seeds:
+        document.add("seeds", tomlkit.item(format_seed_ranges(stimulation_map.seeds)))
     policy = stimulation_map.policy, stimulation_map.policy_hash, stimulation_map.import_options
     document.add("policy", _table_of(_policy_fields(*policy)))
     document.add("keys", _table_of({"default": stimulation_map.default_key}))
@@ -104,6 +107,20 @@ def add_behavior(text: str, behavior: Behavior, source: str) -> str:
         for name, value in _table_of(fields).items():
             if name not in ("name", "key"):
                 table[name] = value
+
+    return _edit(text, source, add)
+
+
+def add_seeds(text: str, seeds: Iterable[int | range], source: str) -> str:
+    """Return the text of a map that also records these seeds, on which something in it was chosen."""
+
+    def add(document: Any) -> None:
+        before = [parse_seed_range(str(one)) for one in document.get("seeds", [])]
+        ranges = format_seed_ranges(merge_seed_ranges([*before, *seeds]))
+        if "seeds" in document:
+            document["seeds"] = tomlkit.item(ranges)
+        else:
+            document.add("seeds", tomlkit.item(ranges))
 
     return _edit(text, source, add)
 

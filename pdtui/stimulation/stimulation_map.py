@@ -126,6 +126,7 @@ class StimulationMap:
         text: Text of the file.
         source: Name of the map in messages.
         import_options: Answers to what the weights file does not state.
+        seeds: Seeds on which anything in the map was searched, tuned or chosen; None if it does not say.
     """
 
     robot: str
@@ -137,6 +138,7 @@ class StimulationMap:
     text: str = field(default="", repr=False)
     source: str = "map"
     import_options: ImportOptions = NO_OPTIONS
+    seeds: tuple[range, ...] | None = None
 
     def units_of(self, behavior: Behavior) -> dict[str, float]:
         """Return a behavior's outputs v by unit address; ``v = c ρ`` for a primitive (section 3.3)."""

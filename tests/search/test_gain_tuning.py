@@ -19,19 +19,19 @@ SMALL = TuningSettings(points=16, refinements=6)
 
 
 def test_bad_gains_get_better_and_the_same_arguments_give_the_same_ones() -> None:
-    (result,) = tune_gains(turning_loop(kp=0.3), ["hold heading"], range(200, 204), settings=SMALL)
+    (result,) = tune_gains(turning_loop(kp=0.3), ["hold heading"], range(2000, 2004), settings=SMALL)
     assert result.better
     assert result.after.error < 0.6 * result.before.error
     assert result.after.responses.unrisen < result.before.responses.unrisen
-    assert result.after.seeds == (202, 203)
+    assert result.after.seeds == (2002, 2003)
     assert result.after.falls == 0
-    (again,) = tune_gains(turning_loop(kp=0.3), ["hold heading"], range(200, 204), settings=SMALL)
+    (again,) = tune_gains(turning_loop(kp=0.3), ["hold heading"], range(2000, 2004), settings=SMALL)
     assert again == result
 
 
 def test_gains_that_make_it_fall_are_limited() -> None:
     (result,) = tune_gains(
-        turning_loop(kp=20.0, limit=4.0), ["hold heading"], range(200, 204), settings=SMALL
+        turning_loop(kp=20.0, limit=4.0), ["hold heading"], range(2000, 2004), settings=SMALL
     )
     assert result.before.falls == 2
     assert result.after.falls == 0
@@ -40,10 +40,10 @@ def test_gains_that_make_it_fall_are_limited() -> None:
 
 
 def test_what_is_no_better_is_not_taken() -> None:
-    (once,) = tune_gains(turning_loop(), ["hold heading"], range(200, 204), settings=SMALL)
+    (once,) = tune_gains(turning_loop(), ["hold heading"], range(2000, 2004), settings=SMALL)
     loop = turning_loop(once.new.kp, once.new.limit)
     kept = TuningSettings(points=1, refinements=0)
-    (result,) = tune_gains(loop, ["hold heading"], range(200, 204), settings=kept)
+    (result,) = tune_gains(loop, ["hold heading"], range(2000, 2004), settings=kept)
     assert not result.better
     assert "no better than the map's" in result.verdict
 
@@ -51,16 +51,16 @@ def test_what_is_no_better_is_not_taken() -> None:
 def test_what_is_no_angle_is_stepped_about_its_natural_value() -> None:
     loop = turning_loop()
     with TrackingDriveRunner(loop) as runner:
-        targets = choose_tracking_targets(runner, loop.map.behaviors["hold pace"], [200])
+        targets = choose_tracking_targets(runner, loop.map.behaviors["hold pace"], [2000])
     assert targets == pytest.approx([1.0, 1.1, 1.2, 1.1, 1.0, 0.9, 0.8, 0.9, 1.0])
-    (result,) = tune_gains(loop, ["hold pace"], range(200, 202), settings=SMALL)
+    (result,) = tune_gains(loop, ["hold pace"], range(2000, 2002), settings=SMALL)
     assert result.better
     assert result.after.unit == "m/s"
 
 
 def test_a_search_without_time_ends_with_what_it_has() -> None:
     (result,) = tune_gains(
-        turning_loop(), ["hold heading"], [200, 201], settings=TuningSettings(minutes=1e-9)
+        turning_loop(), ["hold heading"], [2000, 2001], settings=TuningSettings(minutes=1e-9)
     )
     assert result.ended_early
     assert result.tried == 1
@@ -71,11 +71,11 @@ def test_a_search_without_time_ends_with_what_it_has() -> None:
 def test_what_cannot_be_tuned_is_named() -> None:
     loop = turning_loop()
     with pytest.raises(MapError, match="test: no behavior 'spin'; of mode pid are: hold heading, hold pace"):
-        tune_gains(loop, ["spin"], [200, 201])
+        tune_gains(loop, ["spin"], [2000, 2001])
     with pytest.raises(MapError, match="behavior 'turn': expected mode pid, found fixed"):
-        tune_gains(loop, ["turn"], [200, 201])
+        tune_gains(loop, ["turn"], [2000, 2001])
     with pytest.raises(MapError, match="expected at least 2 seeds"):
-        tune_gains(loop, [], [200])
+        tune_gains(loop, [], [2000])
 
 
 def test_points_stand_for_gains_and_back() -> None:
