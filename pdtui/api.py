@@ -23,10 +23,10 @@ from pdtui.driving.session_replay import replay_session
 from pdtui.policies.runtime.action_decoders import Decoder
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.torchscript import is_torchscript, read_torchscript
+from pdtui.policies.torchscript import build_torchscript
 from pdtui.policies.weights import policy_loading
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
-from pdtui.policies.weights.weights_file import hash_file
+from pdtui.policies.weights.weights_file import find_weights_file
 from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
 from pdtui.sessions.writer.session_file import ExistingFile
@@ -111,10 +111,12 @@ def load_policy(
     Raises:
         PdtuiError: The policy cannot be loaded, or is for another robot.
     """
-    sha256 = ""
-    if not isinstance(policy, nn.Module) and is_torchscript(Path(policy)):
-        name, sha256 = name or Path(policy).stem, hash_file(Path(policy))
-        policy = read_torchscript(Path(policy))
+    sha256, found = "", None
+    if not isinstance(policy, nn.Module):
+        path = find_weights_file(str(policy))
+        found = policy_loading.read_policy_of_another_program(path)
+        if found is not None and found.form == "torchscript":
+            policy, name, sha256 = build_torchscript(found), name or path.stem, found.sha256
     with nullcontext() if robot is None else open_robot(robot) as world:
         if not isinstance(policy, nn.Module):
             return policy_loading.load_policy(
@@ -122,6 +124,7 @@ def load_policy(
                 None if world is None else world.name,
                 import_options=import_options,
                 spaces=None if world is None else ObservationActionSpaces.of_world(world),
+                found=found,
             )
         return policy_from_network(
             policy,
