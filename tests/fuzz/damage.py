@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import struct
+import zipfile
 
 import pyarrow as pa
 from hypothesis import strategies as st
@@ -83,6 +85,23 @@ def damaged_weights(content: Content) -> SearchStrategy[bytes]:
     return st.one_of(
         damaged(content), repacked, damaged(Content(content[: 8 + length])).map(lambda some: some + rest)
     )
+
+
+@st.composite
+def damaged_archive(draw: DrawFn, content: Content) -> bytes:
+    """As `damaged`; mostly one entry inside the archive, so that the archive itself is whole."""
+    if draw(st.integers(0, 4)) == 0:
+        return draw(damaged(content))
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    name = draw(st.sampled_from(sorted(entries)))
+    inner = Content(entries[name])
+    entries[name] = draw(damaged_archive(inner) if inner.startswith(b"PK\3\4") else damaged(inner))
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name, changed in entries.items():
+            archive.writestr(name, changed)
+    return stream.getvalue()
 
 
 def _starts(content: bytes) -> list[int]:
