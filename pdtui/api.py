@@ -29,7 +29,6 @@ from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, Obs
 from pdtui.policies.weights.weights_file import find_weights_file
 from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
-from pdtui.sessions.writer.session_file import ExistingFile
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_policy_lookup import resolve_map_policy
@@ -217,8 +216,8 @@ def drive(
     with open_robot(robot) as world:
         loop = build_control_loop(config, world, None if isinstance(policy, str | Path) else policy)
         presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
-        existing: ExistingFile = "replace" if overwrite else "refuse"
-        recorder = None if record is None else SessionRecorder(Path(record), loop.info, existing=existing)
+        wanted = "replace" if overwrite else "refuse"
+        recorder = SessionRecorder(Path(record), loop.info, existing=wanted) if record is not None else None
         return collect_drive_arrays(loop, presses, steps, recorder)
 
 

@@ -22,8 +22,8 @@ from tests.sessions.recorded_drives import events_of, make_loop, random_weights
 
 KEYS = "# a drive\n3 w\n10 t\n20 space\n25 h\n25 left\n40 r\n"
 SUITE = {"session": 200, "map": 150, "keys": 75, "weights": 75}
-SUITE |= dict.fromkeys(("npz", "sb3", "torchscript", "statistics"), 75)
-LONG = {kind: 20 * count for kind, count in SUITE.items()}
+SUITE |= dict.fromkeys(("npz", "sb3", "torchscript", "statistics"), 15)
+LONG = {kind: 20 * max(75, count) for kind, count in SUITE.items()}
 
 
 @pytest.fixture(scope="module")

@@ -85,7 +85,7 @@ def test_a_whole_session_is_whole(recorded: Recorded) -> None:
     assert examine_session(recorded[0]).outcome == "the operator quit"
 
 
-def spans(data: bytes) -> list[RrdMessageSpan]:
+def spans(data: bytes | bytearray) -> list[RrdMessageSpan]:
     with io.BytesIO(data) as file:
         return list(read_message_spans(file, len(data)))
 
