@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -191,8 +191,7 @@ def drive(
     Args:
         robot: The robot's name, or a `Robot`.
         stimulation_map: A map, or its name or file. By default, the map that has the robot's name.
-        policy: The policy to use instead of the map's. A network in memory has to be the one that the map
-            was made for.
+        policy: The policy to use instead of the map's; a network in memory has to be the map's own.
         import_options: Answers to what the weights file does not state, in preference to the map's.
         keys: One key or several for each control step before which they are pressed; or a keystroke file.
         steps: Control steps.
@@ -216,8 +215,8 @@ def drive(
     with open_robot(robot) as world:
         loop = build_control_loop(config, world, None if isinstance(policy, str | Path) else policy)
         presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
-        wanted = "replace" if overwrite else "refuse"
-        recorder = SessionRecorder(Path(record), loop.info, existing=wanted) if record is not None else None
+        open_recorder = partial(SessionRecorder, existing="replace" if overwrite else "refuse")
+        recorder = open_recorder(Path(record), loop.info) if record is not None else None
         return collect_drive_arrays(loop, presses, steps, recorder)
 
 
