@@ -1,6 +1,6 @@
 """Two drives that are recorded into a file of the same name at the same time.
 
-Two processes load everything once, and then do one thing after the other, each at a moment that they are told.
+Two processes load everything once; then they do one thing after the other, each at a given moment.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import sys
 import time
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from pdtui.sessions.session_integrity import examine_session
@@ -182,7 +183,7 @@ def _record_numbered(moment: float, arguments: list[str]) -> int:
     from pdtui.sessions.writer.session_recorder import SessionRecorder
     from pdtui.stimulation.map_reader import load_map
 
-    given = dict(zip(arguments[:-1], arguments[1:], strict=True))
+    given = dict(pairwise(arguments))
     loop = build_control_loop(DriveConfig("ant", load_map(Path(given["--map"])), int(given["--seed"])))
     records = [loop.advance() for _ in range(_STEPS)]
     _wait_until(max(moment, time.monotonic()))
