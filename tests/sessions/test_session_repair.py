@@ -158,6 +158,24 @@ def test_two_damaged_places_are_two_gaps(weights: Path, tmp_path: Path) -> None:
     assert all("missing" in line for line in repaired.describe_losses())
 
 
+def test_missing_last_steps_are_a_gap(weights: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    record_drive(path, weights, rows_per_write=4)
+    data = bytearray(path.read_bytes())
+    last = [span for span in spans(data)[:-1] if b"digest_episode" in data[span.start : span.end]][-1]
+    data[last.start + last.length // 2] ^= 1
+    path.write_bytes(data)
+    repaired = repair_session(path, tmp_path / "b.rrd")
+    (gap,) = repaired.header.gaps
+    assert gap[0] in range(96, 100)
+    assert gap[1] == 100
+    session = read_session(tmp_path / "b.rrd")
+    assert (session.steps, session.gaps, len(session.digests)) == (100, (gap,), gap[0])
+    cut = tmp_path / "c.rrd"
+    cut.write_bytes((tmp_path / "b.rrd").read_bytes()[:-100])
+    assert repair_session(cut, cut).header.gaps == (gap,)
+
+
 def test_a_second_repair_keeps_the_gaps_of_the_first(weights: Path, tmp_path: Path) -> None:
     path = tmp_path / "a.rrd"
     record_drive(path, weights, rows_per_write=4)
