@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import resource
+import signal
 import subprocess
 import time
 from pathlib import Path
@@ -14,7 +15,7 @@ from tests.faults.fault_tally import FalseReport, FaultTally, StepsLost
 from tests.faults.killed_headless_drives import PATIENCE, start_pdtui
 
 _ENDLESS = "1000000000"
-_SMALLEST, _LARGEST = 1_000_000, 16_000_000
+_SMALLEST, _LARGEST = 3_000_000, 10_000_000
 _LATE = 400_000
 
 
@@ -34,6 +35,7 @@ def fill_disks(bench: FaultBench, number: int) -> list[FaultTally]:
             child = start_pdtui(bench, bench.drive_arguments(path, "--steps", _ENDLESS))
             steps = _record_a_little(bench, path, child)
             _limit(child, path.stat().st_size + bench.drawn.randrange(_LATE))
+            child.send_signal(signal.SIGCONT)
             _judge(bench, path, child, late, steps)
     return [early, late]
 
@@ -44,7 +46,7 @@ def fill_small_file_systems(bench: FaultBench, number: int) -> list[FaultTally]:
     mounted = bench.folder / "small"
     mounted.mkdir()
     for one in range(number):
-        size = bench.drawn.randrange(3_000_000, 12_000_000)
+        size = bench.drawn.randrange(3_000_000, 9_000_000)
         command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", str(mounted)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
@@ -58,6 +60,7 @@ def fill_small_file_systems(bench: FaultBench, number: int) -> list[FaultTally]:
                 if one % 2:
                     steps = _record_a_little(bench, path, child)
                     _fill(mounted)
+                    child.send_signal(signal.SIGCONT)
                 _judge(bench, path, child, tally, steps)
         finally:
             subprocess.run(["umount", str(mounted)], check=True)
@@ -78,13 +81,14 @@ def _fill(folder: Path) -> None:
 
 
 def _record_a_little(bench: FaultBench, path: Path, child: subprocess.Popen[str]) -> int:
-    """Wait until there are steps, and return their number."""
+    """Wait until there are steps, stop the process, and return their number."""
     deadline = time.monotonic() + PATIENCE
     while not path.exists():
         if time.monotonic() > deadline or child.poll() is not None:
             raise StepsLost(f"nothing was recorded: {child.communicate()[1]}")
         time.sleep(0.01)
     time.sleep(bench.drawn.uniform(0.0, 0.3))
+    child.send_signal(signal.SIGSTOP)
     try:
         return examine_session(path).steps
     except PdtuiError:
