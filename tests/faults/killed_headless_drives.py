@@ -46,7 +46,11 @@ def kill_starting_headless_drives(bench: FaultBench, number: int) -> list[FaultT
         with tally.try_fault(f"{path.name}, {ending.name}"):
             arguments = bench.drive_arguments(path, "--steps", "300")
             child = start_pdtui(bench, arguments)
-            time.sleep(bench.drawn.uniform(0.0, 4.0))
+            # Every other one at the moment at which the file appears, or soon after.
+            end = time.monotonic() + (bench.drawn.uniform(0.0, 4.0) if one % 2 else PATIENCE)
+            while time.monotonic() < end and not path.exists() and child.poll() is None:
+                time.sleep(0.001)
+            time.sleep(0.0 if one % 2 else bench.drawn.uniform(0.0, 0.02))
             child.send_signal(ending)
             child.communicate(timeout=PATIENCE)
             if not path.exists():
