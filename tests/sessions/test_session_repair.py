@@ -14,9 +14,11 @@ from rerun.chunk import RrdReader
 
 from pdtui.core.errors import SessionError
 from pdtui.sessions.rrd.message_framing import RrdMessageSpan, read_message_spans
+from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_activations, read_session
 from pdtui.sessions.session_repair import repair_session
+from pdtui.sessions.streams.step_block_reader import read_step_blocks
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded
 from tests.sessions.recorded_drives import make_loop, record_drive
@@ -174,6 +176,22 @@ def test_missing_last_steps_are_a_gap(weights: Path, tmp_path: Path) -> None:
     cut = tmp_path / "c.rrd"
     cut.write_bytes((tmp_path / "b.rrd").read_bytes()[:-100])
     assert repair_session(cut, cut).header.gaps == (gap,)
+
+
+@pytest.mark.parametrize("rows", [4, 16])
+@pytest.mark.parametrize("which", [0, 2, -1])
+def test_a_session_with_a_gap_is_read_block_by_block(
+    which: int, rows: int, weights: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.rrd"
+    record_drive(path, weights, rows_per_write=rows)
+    data = bytearray(path.read_bytes())
+    span = [span for span in spans(data)[:-1] if b"digest_episode" in data[span.start : span.end]][which]
+    data[span.start + span.length // 2] ^= 1
+    path.write_bytes(data)
+    header = repair_session(path, tmp_path / "b.rrd").header
+    blocks = list(read_step_blocks(read_session_header(tmp_path / "b.rrd"), poses=True, block_steps=10))
+    assert sum(len(block) for block in blocks) == header.steps - header.missing < 100
 
 
 def test_a_second_repair_keeps_the_gaps_of_the_first(weights: Path, tmp_path: Path) -> None:
