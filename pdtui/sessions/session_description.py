@@ -17,6 +17,7 @@ from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_header import SessionHeader, count_missing
 from pdtui.sessions.session_index import decode_event, decode_gaps
 from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, REPAIR, VERSIONS
+from pdtui.sessions.streams.step_numbers import number_steps
 
 
 def scan_session_header(path: Path) -> SessionHeader:
@@ -46,21 +47,21 @@ def decode_header(file: RrdContents, path: Path, rows: int) -> SessionHeader:
     return SessionHeader(path, info, versions, created, events, steps, endings, outcome, gaps)
 
 
-def find_gaps(steps: NDArray[np.int64]) -> tuple[tuple[int, int], ...]:
-    """Return the ranges of control steps that are missing before and between these, which are in order."""
-    before = np.concatenate([[-1], steps])[: len(steps)]
-    places = np.flatnonzero(steps - before > 1)
-    return tuple((int(before[place]) + 1, int(steps[place])) for place in places)
+def find_gaps(steps: NDArray[np.int64], total: int = 0) -> tuple[tuple[int, int], ...]:
+    """Return the ranges of control steps that are missing before, between and after these.
+
+    The steps are in order; `total` is the number of steps that there were, if it is known.
+    """
+    before, after = np.concatenate([[-1], steps]), np.concatenate([steps, [total]])
+    places = np.flatnonzero(after - before > 1)
+    return tuple((int(before[place]) + 1, int(after[place])) for place in places)
 
 
 def count_control_steps(drive: EntityTable, gaps: Sequence[tuple[int, int]] = ()) -> int:
     """Count the control steps that are there; one that is missing, except in gaps, is a `SessionError`."""
     steps = drive.steps
-    expected = np.arange(len(steps) + count_missing(gaps))
-    for first, end in reversed(gaps):
-        expected = np.delete(expected, slice(first, end))
-    expected = expected[: len(steps)]
-    wrong = np.flatnonzero(steps[: len(expected)] != expected)
+    expected = number_steps(0, len(steps), gaps)
+    wrong = np.flatnonzero(steps != expected)
     if wrong.size:
         raise SessionError(f"expected control step {expected[wrong[0]]}, found step {steps[wrong[0]]}")
     return len(steps)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -99,8 +100,8 @@ def examine_messages(path: Path) -> SessionIntegrity:
     file = RrdContents(path, only=(DIGEST_EPISODE,), damage=damage)
     index = _decode_end_index(path)
     try:
-        header, lost_events = _rescue_header(path, file, index)
         declared = read_gaps(file)
+        header, lost_events = _rescue_header(path, file, index, declared)
     except SessionError as error:
         raise SessionError(f"{path}: nothing can be rescued: {error}") from error
     known = header.gaps == declared and (not lost_events or bool(file.properties(REPAIR)))
@@ -116,8 +117,13 @@ def _decode_end_index(path: Path) -> dict[str, Any]:
         return {}
 
 
-def _rescue_header(path: Path, file: RrdContents, index: dict[str, Any]) -> tuple[SessionHeader, int]:
-    """Return what can be read of a session, and the number of events that are known to be missing."""
+def _rescue_header(
+    path: Path, file: RrdContents, index: dict[str, Any], declared: Sequence[tuple[int, int]]
+) -> tuple[SessionHeader, int]:
+    """Return what can be read of a session, and the number of events that are known to be missing.
+
+    The index and the gaps that an earlier repair has `declared` tell which last steps are missing.
+    """
     properties = file.properties(INFO)
     info, created = (
         (index["info"], index["created"]) if index and not properties else decode_drive_info(properties)
@@ -127,7 +133,7 @@ def _rescue_header(path: Path, file: RrdContents, index: dict[str, Any]) -> tupl
     events = read_events(table, complete=False)
     last = int(table.read_numbers("number", np.int64).max()) if events else -1
     steps = file.table(DRIVE).steps
-    total = int(steps[-1]) + 1 if len(steps) else 0
+    total = max(0, *(steps[-1:] + 1).tolist(), index.get("steps", 0), *(end for _, end in declared))
     lost_events = last + 1 - len(events)
     if index:
         versions = versions or index["versions"]
@@ -141,6 +147,6 @@ def _rescue_header(path: Path, file: RrdContents, index: dict[str, Any]) -> tupl
         total,
         read_endings(file.table(ENDINGS)),
         read_drive_outcome(file) or index.get("outcome", ""),
-        find_gaps(steps),
+        find_gaps(steps, total),
     )
     return header, lost_events

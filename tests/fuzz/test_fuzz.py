@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis.strategies import SearchStrategy
 
 from pdtui.sessions.writer.session_recorder import SessionRecorder
-from tests.fuzz.damage import Content, damaged, damaged_archive, damaged_session, damaged_weights
+from tests.fuzz.damage import Content, damaged, damaged_archive, damaged_session, damaged_weights, resealed
 from tests.fuzz.foreign_policies import write_foreign_files
 from tests.fuzz.reading import Reader
 from tests.sessions.recorded_drives import events_of, make_loop, random_weights
@@ -95,6 +95,11 @@ def test_damaged_files_are_read_or_refused(
 
 def test_good_files_are_read(good: dict[str, Path], reader: Reader) -> None:
     assert {kind: reader.read(kind, path) for kind, path in good.items()} == dict.fromkeys(SUITE, "'read'")
+
+
+def test_checksums_that_are_computed_again_are_those_of_the_recorder(good: dict[str, Path]) -> None:
+    content = good["session"].read_bytes()
+    assert resealed(content) == content
 
 
 def test_what_ends_the_reading_process_is_seen(reader: Reader, map_path: Path) -> None:
