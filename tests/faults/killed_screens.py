@@ -119,7 +119,7 @@ class _Screen(Terminal):
     def kill(self, place: int, ending: signal.Signals) -> int:
         """Signal a target, wait until screen and simulation are gone, and return the screen's exit code."""
         children = _list_descendants(self.pid)
-        simulation = children and max(children, key=_resident)
+        simulation = max(children, key=_resident) if children else 0
         targets = [pid for pid in ((self.pid,), (simulation,), (self.pid, simulation))[place] if pid]
         for pid in targets or [self.pid]:
             os.kill(pid, ending)
