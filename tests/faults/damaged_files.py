@@ -28,7 +28,7 @@ def flip_bits(bench: FaultBench, number: int) -> list[FaultTally]:
     """Flip single bits in sessions of small and of large batches."""
     paced = FaultTally("a flipped bit, batches of 4 steps, with keys")
     headless = FaultTally("a flipped bit, batches of 128 steps")
-    for tally, rows, steps in ((paced, 4, 60), (headless, 128, 400)):
+    for tally, rows, steps in ((paced, 4, 60), (headless, 128, 300)):
         for first in range(0, number // 2, _PER_SESSION):
             original = record_original(bench, f"flips{rows}-{first}", steps=steps, rows_per_write=rows)
             for one in range(first, min(number // 2, first + _PER_SESSION)):

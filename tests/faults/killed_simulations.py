@@ -16,18 +16,16 @@ PACED_LOSS = 3
 
 def kill_simulations(bench: FaultBench, number: int) -> list[FaultTally]:
     """End so many drives, by each signal in turn."""
-    return [
-        _kill(bench, ending, len(range(place, number, len(SIGNALS)))) for place, ending in enumerate(SIGNALS)
-    ]
+    tallies = {ending: FaultTally(f"{ending.name} of the simulation's process") for ending in SIGNALS}
 
-
-def _kill(bench: FaultBench, ending: signal.Signals, number: int) -> FaultTally:
-    tally = FaultTally(f"{ending.name} of the simulation's process")
-
-    def kill(drive: WatchedDrive) -> None:
-        os.kill(drive.client.pid, ending)
+    def begin(one: int) -> WatchedDrive:
+        ending = SIGNALS[one % len(SIGNALS)]
+        path = bench.folder / f"{ending.name}{one}.rrd"
+        return WatchedDrive(bench, path, lambda drive: os.kill(drive.client.pid, ending))
 
     def judge(drive: WatchedDrive) -> None:
+        ending = next(ending for ending in SIGNALS if drive.path.name.startswith(ending.name))
+        tally = tallies[ending]
         with tally.try_fault(drive.path.name):
             loss = PACED_LOSS if ending == signal.SIGKILL else 0
             whole, missing = bench.judge_ended_drive(drive.path, drive.driven, loss=loss)
@@ -40,7 +38,5 @@ def _kill(bench: FaultBench, ending: signal.Signals, number: int) -> FaultTally:
             else:
                 tally.mend(missing)
 
-    run_watched_drives(
-        number, lambda one: WatchedDrive(bench, bench.folder / f"{ending.name}{one}.rrd", kill), judge
-    )
-    return tally
+    run_watched_drives(number, begin, judge)
+    return list(tallies.values())

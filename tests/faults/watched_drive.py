@@ -73,7 +73,7 @@ class WatchedDrive:
         self.driven = message.step
         if message.notice and message.notice not in self.notices:
             self.notices.append(message.notice)
-        if self._moment is None and self.driven:
+        if self._moment is None and self.driven and self.path.exists():
             self._moment = now + self._lasts
             for _ in range(self._drawn.randrange(3)):
                 self.client.change_pace("faster")

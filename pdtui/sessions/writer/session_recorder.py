@@ -199,8 +199,6 @@ class SessionRecorder:
         records, self._rows = self._rows, []
         if not records:
             return
-        if not self._recording.created:
-            self._recording.create_file()
         self._write_events(records)
         self._count(records)
         steps = [record.step for record in records]
@@ -211,6 +209,9 @@ class SessionRecorder:
             self._viewer_data.write()
         if steps[0] < _DESCRIBED_AGAIN <= steps[-1] + 1:
             self._describe_drive()  # a second copy, in case the first is damaged
+        if not self._recording.created:
+            self._flush_rows()  # so that the first steps are in what the new file is created with
+            self._recording.create_file()
 
     def _count(self, records: Sequence[StepRecord]) -> None:
         self._summary.add(
