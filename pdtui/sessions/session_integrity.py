@@ -16,15 +16,15 @@ from pdtui.sessions.rrd.end_index import read_end_index
 from pdtui.sessions.rrd.file_check import check_file
 from pdtui.sessions.rrd.message_reader import DamagedSpan
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_description import (
+from pdtui.sessions.session_header import SessionHeader
+from pdtui.sessions.session_header_decoding import (
     find_gaps,
     read_drive_outcome,
-    read_endings,
+    read_episode_endings,
     read_events,
     read_gaps,
 )
-from pdtui.sessions.session_header import SessionHeader
-from pdtui.sessions.session_index import decode_session_index
+from pdtui.sessions.session_header_index import decode_session_index
 from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, ENDINGS, EVENTS, INFO, REPAIR, VERSIONS
 
 
@@ -62,7 +62,11 @@ class SessionIntegrity:
     def verdict(self) -> str:
         """Whether the session is whole, in one line."""
         if self.whole:
-            return "whole, checksums match" if self.sealed else "no checksums: replayed only"
+            return (
+                "whole, checksums match"
+                if self.sealed
+                else "no checksums, so that only a replay can check it"
+            )
         if self.damage:
             first = self.damage[0]
             return f"not whole: byte {first.start}: {first.reason}; {RESCUE}"
@@ -75,7 +79,8 @@ class SessionIntegrity:
             for first, end in self.header.gaps
         ]
         if self.lost_events:
-            lines.append(f"{self.lost_events} events are missing, so that a replay will differ")
+            what = "an event is" if self.lost_events == 1 else f"{self.lost_events} events are"
+            lines.append(f"{what} missing, so a replay will differ")
         return lines
 
 
@@ -91,10 +96,10 @@ def examine_session(path: Path) -> SessionIntegrity:
         if (index.get("messages"), index.get("checksum")) == there:
             header = SessionHeader(path, **decode_session_index(index))
             return SessionIntegrity(header, whole=bool(header.outcome), sealed=True)
-    return examine_messages(path)
+    return examine_session_by_decoding(path)
 
 
-def examine_messages(path: Path) -> SessionIntegrity:
+def examine_session_by_decoding(path: Path) -> SessionIntegrity:
     """Report what can be read of a session by decoding it, with the same errors as `examine_session`."""
     damage: list[DamagedSpan] = []
     file = RrdContents(path, only=(DIGEST_EPISODE,), damage=damage)
@@ -145,7 +150,7 @@ def _rescue_header(
         created,
         tuple(event for event in events if event.step < total),
         total,
-        read_endings(file.table(ENDINGS)),
+        read_episode_endings(file.table(ENDINGS)),
         read_drive_outcome(file) or index.get("outcome", ""),
         find_gaps(steps, total),
     )

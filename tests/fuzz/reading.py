@@ -76,7 +76,7 @@ def read_session_file(path: Path) -> None:
     """Everything that a command does with a session before it simulates."""
     from rich.console import Console
 
-    from pdtui.cli.session_tables import session_comparison_table, session_table
+    from pdtui.cli.session_tables import session_comparison_table, session_details
     from pdtui.driving.keystrokes import format_keystrokes
     from pdtui.driving.session_replay import config_from_session
     from pdtui.sessions.session_comparison import compare_sessions
@@ -100,7 +100,7 @@ def read_session_file(path: Path) -> None:
     examine_session(path)
     with Path("/dev/null").open("w") as nowhere:
         console = Console(file=nowhere)
-        console.print(session_table(session, summarise_session(session)))
+        console.print(session_details(session, summarise_session(session)))
         console.print(session_comparison_table(compare_sessions(session, session)))
     format_keystrokes(session.events)
     config_from_session(session, str(path))

@@ -31,11 +31,11 @@ _DEEPEST = 500
 
 
 def limit_this_process(memory: int, seconds: float) -> None:
-    """Let the system end this process when it takes more from now on than it may."""
+    """Have the system end this process if it exceeds these limits from now on."""
     with suppress(OSError, ValueError):  # where the system does not know such a limit
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-        # To the millisecond, and should the file have a way to switch that off, to the second.
+        # To the millisecond; to the second, too, in case the file can disable that timer.
         signal.setitimer(signal.ITIMER_PROF, seconds)
         used = resource.getrusage(resource.RUSAGE_SELF)
         processor = math.ceil(used.ru_utime + used.ru_stime + seconds)

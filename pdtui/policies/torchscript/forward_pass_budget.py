@@ -1,4 +1,4 @@
-"""What one forward pass of interpreted code may take, so that driving it never takes the machine."""
+"""Limits on work and memory of a forward pass of interpreted code, so that it cannot exhaust the machine."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class ForwardPassBudget:
         """Begin a forward pass."""
         self._expressions = self._work = self._bytes = 0
 
-    def count_expression(self) -> None:
+    def count_evaluated_expression(self) -> None:
         """Count an expression before it is evaluated."""
         self._expressions += 1
         if self._expressions > MAX_EXPRESSIONS:

@@ -77,12 +77,12 @@ def check_operator_cost(
 
 
 def _sizes(tensor: torch.Tensor) -> int:
-    """Return the product of a tensor's sizes, of which an empty one counts as 1: products may lose it."""
+    """Return the product of a tensor's sizes, counting an empty one as 1, because a product may drop it."""
     return math.prod(max(1, size) for size in tensor.shape)
 
 
 def _result_bound(name: str, tensors: list[torch.Tensor]) -> int:
-    """Return an upper bound on the elements of a result whose size no number chooses."""
+    """Return an upper bound on the elements of a result whose size depends on no numeric argument."""
     if name in _PRODUCTS and len(tensors) >= 2:
         first, second = tensors[_PRODUCTS[name] : _PRODUCTS[name] + 2]
         inner = _inner_size(first)

@@ -140,7 +140,7 @@ class _StackFrame:
 
     def _run_block(self, body: list[ast.stmt]) -> None:
         for node in body:
-            self._program.budget.count_expression()
+            self._program.budget.count_evaluated_expression()
             match node:
                 case ast.Return():
                     raise _Return(None if node.value is None else self._evaluate(node.value))
@@ -168,7 +168,7 @@ class _StackFrame:
             raise PolicyError("its code changes an attribute, which pdtui does not do for a file")
 
     def _evaluate(self, node: ast.expr) -> Any:  # noqa: PLR0912 - one case per kind of expression
-        self._program.budget.count_expression()
+        self._program.budget.count_evaluated_expression()
         match node:
             case ast.Constant():
                 return node.value

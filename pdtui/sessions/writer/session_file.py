@@ -1,4 +1,4 @@
-"""The file that a session is written into: created exclusively, locked, and never lost from sight."""
+"""The file of a session: created exclusively, locked, and found again if it is renamed or deleted."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class SessionFile:
             self._unsynchronised = False
             os.fdatasync(self._descriptor)
 
-    def follow(self) -> str:
+    def follow_renamed_file(self) -> str:
         """Find out whether the file is still where it was, and return one line if it is not.
 
         A file that was renamed is followed. One that was deleted is written again, under a new name, from

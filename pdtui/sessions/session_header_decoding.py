@@ -15,7 +15,7 @@ from pdtui.sessions.drive_info import decode_drive_info
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_header import SessionHeader, count_missing
-from pdtui.sessions.session_index import decode_event, decode_gaps
+from pdtui.sessions.session_header_index import decode_event, decode_gaps
 from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, REPAIR, VERSIONS
 from pdtui.sessions.streams.step_numbers import number_steps
 
@@ -28,12 +28,12 @@ def scan_session_header(path: Path) -> SessionHeader:
     """
     file = RrdContents(path, entities=(EVENTS, ENDINGS))
     try:
-        return decode_header(file, path, file.skipped_rows[DRIVE])
+        return decode_session_header(file, path, file.skipped_rows[DRIVE])
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
 
 
-def decode_header(file: RrdContents, path: Path, rows: int) -> SessionHeader:
+def decode_session_header(file: RrdContents, path: Path, rows: int) -> SessionHeader:
     """Return the header of a session of which properties, events and endings were read.
 
     `rows` is the number of control steps that are there.
@@ -42,7 +42,7 @@ def decode_header(file: RrdContents, path: Path, rows: int) -> SessionHeader:
     versions = {name: str(values[0]) for name, values in file.properties(VERSIONS).items() if values}
     gaps = read_gaps(file)
     events = read_events(file.table(EVENTS), complete=not file.properties(REPAIR))
-    endings, outcome = read_endings(file.table(ENDINGS)), read_drive_outcome(file)
+    endings, outcome = read_episode_endings(file.table(ENDINGS)), read_drive_outcome(file)
     steps = rows + count_missing(gaps)
     return SessionHeader(path, info, versions, created, events, steps, endings, outcome, gaps)
 
@@ -95,7 +95,7 @@ def read_events(table: EntityTable, *, complete: bool = True) -> tuple[DriveEven
         raise SessionError(f"an event is damaged: {error}") from error
 
 
-def read_endings(table: EntityTable) -> dict[int, str]:
+def read_episode_endings(table: EntityTable) -> dict[int, str]:
     if not len(table.steps):
         return {}
     return dict(zip(table.steps.tolist(), table.read_texts("TextLog:text"), strict=True))

@@ -17,7 +17,7 @@ from pdtui.sessions.viewer.link_shape_poses import VECTOR_LENGTHS, box_links, ro
 Poses = dict[str, NDArray[np.float32]]
 
 
-class PoseQueue:
+class RecordedPoses:
     """Keeps poses that were read until their control steps are taken.
 
     Args:
@@ -78,14 +78,14 @@ class PoseQueue:
             if (width := self._shapes[name.partition(":")[0]])
         }
 
-    def require_empty(self) -> None:
+    def require_all_poses_taken(self) -> None:
         """Check that all poses were taken; those of steps beyond the last are a `SessionError`."""
         for batch in self._batches:
             if batch.num_rows:
                 raise SessionError(f"poses of step {batch.column(STEP)[0]}, which is not recorded")
 
     def _drop_gaps(self, batch: pa.RecordBatch) -> pa.RecordBatch:
-        """Leave out the poses of steps that a repair could not rescue, for which there is nothing else."""
+        """Leave out the poses of steps that a repair could not rescue, of which only the poses survive."""
         for first, end in self._gaps:
             steps = batch.column(STEP)
             batch = batch.filter(pc.or_(pc.less(steps, first), pc.greater_equal(steps, end)))
