@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -23,13 +23,12 @@ from pdtui.driving.session_replay import replay_session
 from pdtui.policies.runtime.action_decoders import Decoder
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.torchscript import is_torchscript, read_torchscript
+from pdtui.policies.torchscript import build_torchscript
 from pdtui.policies.weights import policy_loading
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
-from pdtui.policies.weights.weights_file import hash_file
+from pdtui.policies.weights.weights_file import find_weights_file
 from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
-from pdtui.sessions.writer.session_file import ExistingFile
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_policy_lookup import resolve_map_policy
@@ -111,10 +110,12 @@ def load_policy(
     Raises:
         PdtuiError: The policy cannot be loaded, or is for another robot.
     """
-    sha256 = ""
-    if not isinstance(policy, nn.Module) and is_torchscript(Path(policy)):
-        name, sha256 = name or Path(policy).stem, hash_file(Path(policy))
-        policy = read_torchscript(Path(policy))
+    sha256, found = "", None
+    if not isinstance(policy, nn.Module):
+        path = find_weights_file(str(policy))
+        found = policy_loading.read_policy_of_another_program(path)
+        if found is not None and found.form == "torchscript":
+            policy, name, sha256 = build_torchscript(found), name or path.stem, found.sha256
     with nullcontext() if robot is None else open_robot(robot) as world:
         if not isinstance(policy, nn.Module):
             return policy_loading.load_policy(
@@ -122,6 +123,7 @@ def load_policy(
                 None if world is None else world.name,
                 import_options=import_options,
                 spaces=None if world is None else ObservationActionSpaces.of_world(world),
+                found=found,
             )
         return policy_from_network(
             policy,
@@ -189,8 +191,7 @@ def drive(
     Args:
         robot: The robot's name, or a `Robot`.
         stimulation_map: A map, or its name or file. By default, the map that has the robot's name.
-        policy: The policy to use instead of the map's. A network in memory has to be the one that the map
-            was made for.
+        policy: The policy to use instead of the map's; a network in memory has to be the map's own.
         import_options: Answers to what the weights file does not state, in preference to the map's.
         keys: One key or several for each control step before which they are pressed; or a keystroke file.
         steps: Control steps.
@@ -214,8 +215,8 @@ def drive(
     with open_robot(robot) as world:
         loop = build_control_loop(config, world, None if isinstance(policy, str | Path) else policy)
         presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
-        existing: ExistingFile = "replace" if overwrite else "refuse"
-        recorder = None if record is None else SessionRecorder(Path(record), loop.info, existing=existing)
+        open_recorder = partial(SessionRecorder, existing="replace" if overwrite else "refuse")
+        recorder = open_recorder(Path(record), loop.info) if record is not None else None
         return collect_drive_arrays(loop, presses, steps, recorder)
 
 

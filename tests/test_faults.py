@@ -1,43 +1,56 @@
-"""Recordings that are killed or cut, repaired, and replayed up to their end."""
+"""Recordings under faults: a few of each kind, and the whole table of `python -m tests.faults`."""
 
 from __future__ import annotations
 
-import random
-import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from tests.faults import SIGNALS, cut_files, kill_drives
+from tests.faults.__main__ import KINDS
+from tests.faults.damaged_files import cut_ends, flip_bits
+from tests.faults.fault_bench import FaultBench
+from tests.faults.fault_tally import FalseReport, FaultTally, StepsLost
+from tests.faults.killed_simulations import kill_simulations
+from tests.faults.rival_drives import drive_into_one_file
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads /proc")
 
 
-def test_a_few_cut_files_are_repaired(map_path: Path, tmp_path: Path) -> None:
-    tally, troubles = cut_files(tmp_path, map_path, 12, random.Random(1))
-    assert not troubles
-    assert (tally.broken, tally.repaired, tally.lost) == (12, 12, 0)
+@pytest.fixture
+def bench(map_path: Path, tmp_path: Path) -> FaultBench:
+    return FaultBench(tmp_path, map_path, seed=1)
 
 
-@pytest.mark.parametrize("number", SIGNALS)
-def test_drives_that_are_ended_at_random_moments(
-    number: signal.Signals, map_path: Path, tmp_path: Path
+@pytest.mark.parametrize(
+    ("faults", "number"), [(flip_bits, 12), (cut_ends, 6), (kill_simulations, 3), (drive_into_one_file, 3)]
+)
+def test_nothing_is_lost_in_a_few_faults(
+    faults: Callable[[FaultBench, int], list[FaultTally]], number: int, bench: FaultBench
 ) -> None:
-    tally, troubles = kill_drives(tmp_path, map_path, number, 2, random.Random(2), at_once=2)
-    assert not troubles
-    assert (tally.broken, tally.repaired, tally.lost) == (2, 2, 0)
+    for tally in faults(bench, number):
+        assert not tally.troubles
+        assert (tally.lost, tally.lied) == (0, 0)
+        assert tally.whole + tally.refused + tally.mended >= tally.tried > 0
 
 
 @pytest.mark.slow
-def test_two_hundred_cut_files_are_repaired(map_path: Path, tmp_path: Path) -> None:
-    tally, troubles = cut_files(tmp_path, map_path, 200, random.Random(3))
-    assert not troubles
-    assert (tally.broken, tally.repaired, tally.lost) == (200, 200, 0)
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_is_lost_in_many_faults(kind: str, bench: FaultBench) -> None:
+    faults, number = KINDS[kind]
+    for tally in faults(bench, number):
+        print(tally.format_row())
+        assert not tally.troubles
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", SIGNALS)
-def test_fifty_drives_that_are_ended_by_each_signal(
-    number: signal.Signals, map_path: Path, tmp_path: Path
-) -> None:
-    tally, troubles = kill_drives(tmp_path, map_path, number, 50, random.Random(4))
-    assert not troubles
-    assert (tally.broken, tally.repaired, tally.lost) == (50, 50, 0)
+def test_what_goes_wrong_is_counted() -> None:
+    tally = FaultTally("a kind of fault")
+    for error in (StepsLost("steps 3… are missing"), FalseReport("is reported as whole"), OSError("broken")):
+        with tally.try_fault("a.rrd"):
+            raise error
+    assert (tally.tried, tally.lost, tally.lied, tally.bad) == (3, 2, 1, 3)
+    assert tally.format_row().splitlines()[1:] == [
+        "  a.rrd: steps 3… are missing",
+        "  a.rrd: is reported as whole",
+        "  a.rrd: OSError: broken",
+    ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import resource
 from collections.abc import Mapping
 from pkgutil import resolve_name
 from typing import Any
@@ -13,6 +15,11 @@ from pdtui.core.printable_text import make_printable
 
 OPTIONAL_ROOMS = ("pdtui.benchmarks", "pdtui.paper", "pdtui.training")
 """Packages that an installation may leave out; only the commands that need one stop working."""
+
+
+LEAST_FILES = 64
+"""Files that a command may have to hold open; libraries fail in their own ways where fewer are allowed."""
+_NAMES_NO_FILE = (errno.ENAMETOOLONG, errno.ELOOP)
 
 
 class LazyCommandGroup(click.Group):
@@ -43,12 +50,28 @@ class LazyCommandGroup(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; a `PdtuiError` becomes one line and exit code 1, a traceback means a bug."""
         try:
+            _check_open_files()
             return super().invoke(ctx)
         except PdtuiError as error:
             message = str(error)
+        except OSError as error:
+            if error.errno not in _NAMES_NO_FILE:
+                raise
+            message = f"{error.filename}: {error.strerror}"
         except ModuleNotFoundError as error:
             if error.name not in OPTIONAL_ROOMS:
                 raise
             message = f"{error.name} is not part of this installation, and the command needs it"
         click.echo(f"pdtui: {make_printable(message)}", err=True)  # it may quote a file
         return ctx.exit(1)
+
+
+def _check_open_files() -> None:
+    allowed, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if allowed == resource.RLIM_INFINITY or allowed >= LEAST_FILES:
+        return
+    if most != resource.RLIM_INFINITY and most < LEAST_FILES:
+        raise PdtuiError(
+            f"expected at least {LEAST_FILES} open files to be allowed (ulimit -n), found {allowed}"
+        )
+    resource.setrlimit(resource.RLIMIT_NOFILE, (LEAST_FILES, most))

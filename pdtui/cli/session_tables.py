@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pdtui.sessions.session_comparison import SessionComparison
     from pdtui.sessions.session_header import SessionHeader
     from pdtui.sessions.session_summary import SessionSummary
-    from pdtui.sessions.streams.attribute_deviations import ReplayDeviation
+    from pdtui.sessions.streams.run_deviations import AttributeDeviation
 
 _KEPT = {
     "all": "every unit, every step",
@@ -53,7 +53,7 @@ def session_list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
     return table
 
 
-def session_table(session: SessionHeader, summary: SessionSummary) -> Any:
+def session_details(session: SessionHeader, summary: SessionSummary) -> Any:
     """Return everything about a session: facts, figures, attributes, episodes and events."""
     from pdtui.sessions.streams.step_numbers import describe_step_ranges
 
@@ -123,7 +123,7 @@ def _happened(session: SessionHeader) -> Table:
     return table
 
 
-def attribute_deviation_table(deviations: Sequence[ReplayDeviation]) -> Table:
+def attribute_deviation_table(deviations: Sequence[AttributeDeviation]) -> Table:
     """Return one row per attribute that differs."""
     table = new_table("", "attribute", "first", "mean", "largest", "step", "unit", left=("attribute", "unit"))
     for row in deviations:

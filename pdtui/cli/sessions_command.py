@@ -91,7 +91,7 @@ def show_command(file: Path, as_json: bool) -> None:
         "events": [asdict(event) for event in session.events],
         "endings": session.endings,
     }
-    print_result(data, as_json, lambda: session_tables.session_table(session, summary))
+    print_result(data, as_json, lambda: session_tables.session_details(session, summary))
 
 
 @sessions_command.command()

@@ -22,7 +22,7 @@ from pdtui.driving.drive_snapshot import DriveFacts
 from pdtui.driving.keystrokes import interpret_keys
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.pacer import Pacer
-from pdtui.driving.replays.watched_session import WatchedSession
+from pdtui.driving.replays.step_by_step_comparison import StepByStepComparison
 from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
@@ -69,7 +69,9 @@ class DriveServer:
         self._closing = ""
         self._finished = ""
         self.failed = False
-        self._watched = None if config.watched is None else WatchedSession(config.watched, self._loop.info)
+        self._watched = (
+            None if config.watched is None else StepByStepComparison(config.watched, self._loop.info)
+        )
 
     def send_facts(self) -> None:
         """Send the facts of the drive."""
@@ -177,7 +179,7 @@ class DriveServer:
         self._pressed_keys = []
         return events
 
-    def _compare(self, watched: WatchedSession, record: StepRecord) -> None:
+    def _compare(self, watched: StepByStepComparison, record: StepRecord) -> None:
         if difference := watched.compare(record):
             self._finished, self.failed = difference, True
         elif watched.ended:

@@ -10,11 +10,14 @@ from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import KeystrokeError
 from pdtui.core.reserved_keys import RUN_KEYS, ReservedKey
 from pdtui.core.step_record import ActiveBehavior
+from pdtui.core.untrusted_file import KEYSTROKES_BUDGET, describe_bytes
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.stimulation.stimulation_map import StimulationMap
 
-MAX_BYTES = 10_000_000
-"""Largest keystroke file; a key in every step of an hour takes about 2 million bytes."""
+MAX_PRESSES = 200_000
+"""Key presses of a file: a key in every step of an hour, at 50 Hz, is 180,000."""
+MAX_PRESSES_PER_STEP = 100
+"""Key presses before one step."""
 FACTOR_STEP = 1.25  # by which a key strengthens or weakens a behavior
 REWIND_SECONDS = 3.0
 _LINE = re.compile(r"(\d{1,9})\s+(\S+)")
@@ -99,13 +102,16 @@ def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, li
     """
     try:
         with path.open("rb") as file:  # it may be a pipe
-            read = file.read(MAX_BYTES + 1)
-        if len(read) > MAX_BYTES:
-            raise KeystrokeError(f"{path}: expected at most {MAX_BYTES} bytes of keystrokes, there are more")
+            read = file.read(KEYSTROKES_BUDGET.bytes + 1)
+        if len(read) > KEYSTROKES_BUDGET.bytes:
+            limit = describe_bytes(KEYSTROKES_BUDGET.bytes)
+            raise KeystrokeError(f"{path}: expected keystrokes of at most {limit}, found more")
         lines = read.decode("utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise KeystrokeError(f"{path}: cannot be read as keystrokes: {error}") from error
-    known = list_drive_keys(stimulation_map)
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise KeystrokeError(f"{path}: cannot be read as keystrokes: {reason}") from error
+    keys = list_drive_keys(stimulation_map)
+    known, count = frozenset(keys), 0
     presses: dict[int, list[str]] = {}
     last = 0
     for number, line in enumerate(lines, start=1):
@@ -118,14 +124,20 @@ def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, li
         step, key = int(match[1]), match[2]
         if key not in known:
             raise KeystrokeError(
-                f"{path}:{number}: key '{key[:40]}' does nothing; keys are {', '.join(known)}"
+                f"{path}:{number}: key '{key[:40]}' does nothing; keys are {', '.join(keys)[:1000]}"
             )
         if step < last:
             raise KeystrokeError(
                 f"{path}:{number}: step {step} comes after step {last}; steps must not go back"
             )
-        last = step
-        presses.setdefault(step, []).append(key)
+        last, count = step, count + 1
+        pressed = presses.setdefault(step, [])
+        pressed.append(key)
+        if len(pressed) > MAX_PRESSES_PER_STEP or count > MAX_PRESSES:
+            raise KeystrokeError(
+                f"{path}:{number}: expected at most {MAX_PRESSES_PER_STEP} keys in a step and "
+                f"{MAX_PRESSES} in all, found more"
+            )
     return presses
 
 

@@ -21,7 +21,7 @@ from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
 from pdtui.sessions.environment_versions import collect_versions, list_version_differences
 from pdtui.sessions.session_header import SessionHeader, read_session_header
-from pdtui.sessions.streams.attribute_deviations import ReplayDeviation
+from pdtui.sessions.streams.run_deviations import AttributeDeviation
 from pdtui.sessions.streams.step_block_reader import read_step_blocks
 from pdtui.sessions.streams.value_differences import StreamDifference
 from pdtui.stimulation.map_policy_lookup import locate_map_policy
@@ -183,7 +183,7 @@ def _is_damage(comparison: ReplayComparison, *, elsewhere: bool) -> bool:
 
 
 def _detail(
-    difference: StreamDifference | None, deviations: Sequence[ReplayDeviation], state_differs: bool
+    difference: StreamDifference | None, deviations: Sequence[AttributeDeviation], state_differs: bool
 ) -> str:
     if difference is None:
         return ""

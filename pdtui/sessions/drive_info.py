@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from pdtui.core.attributes import Attribute
 from pdtui.core.errors import SessionError
 from pdtui.core.robot_links_and_state import Link
+from pdtui.core.untrusted_file import MAP_BUDGET
 from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, SCHEMA, ActivationsKept
 
 
@@ -104,11 +105,11 @@ def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, s
         known = ", ".join(ACTIVATIONS_KEPT)
         raise SessionError(f"property 'activations': expected one of {known}, found '{kept[:40]}'")
     info = DriveInfo(
-        robot=_read_value(properties, "robot", str),
+        robot=_read_text(properties, "robot"),
         seed=int(seed),
-        policy=_read_value(properties, "policy", str),
-        policy_hash=_read_value(properties, "policy_hash", str),
-        map_text=_read_value(properties, "map", str),
+        policy=_read_text(properties, "policy"),
+        policy_hash=_read_text(properties, "policy_hash"),
+        map_text=_read_text(properties, "map", MAP_BUDGET.bytes),
         stochastic=_read_value(properties, "stochastic", bool),
         dt=dt,
         attributes=_read_list(properties, "attributes", _decode_attribute),
@@ -116,10 +117,10 @@ def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, s
         layers=tuple(layers),
         activations=kept,
         # Older sessions lack the following properties.
-        start=_read_value(properties, "start", str, ""),
+        start=_read_text(properties, "start", default=""),
         obstacles=_read_value(properties, "obstacles", bool, False),
     )
-    return info, _read_value(properties, "created", str)
+    return info, _read_text(properties, "created")
 
 
 def _read_value(properties: Mapping[str, list[Any]], name: str, kind: type[T], default: T | None = None) -> T:
@@ -131,10 +132,19 @@ def _read_value(properties: Mapping[str, list[Any]], name: str, kind: type[T], d
     return values[0]
 
 
+def _read_text(
+    properties: Mapping[str, list[Any]], name: str, limit: int = _MAX_TEXT, default: str | None = None
+) -> str:
+    text = _read_value(properties, name, str, default)
+    if len(text) > limit:
+        raise SessionError(f"property '{name}': expected at most {limit} characters, found {len(text)}")
+    return text
+
+
 def _read_list(
     properties: Mapping[str, list[Any]], name: str, build: Callable[[dict[str, Any]], T]
 ) -> tuple[T, ...]:
-    text = _read_value(properties, name, str)
+    text = _read_text(properties, name, _MAX_LINKS * _MAX_TEXT)
     try:
         items = json.loads(text)
         if not isinstance(items, list) or len(items) > _MAX_LINKS:

@@ -12,10 +12,10 @@ from pdtui.core.drive_events import DriveEvent, describe_event
 from pdtui.core.errors import SessionError
 from pdtui.sessions.environment_versions import version_differences
 from pdtui.sessions.session_header import SessionHeader
-from pdtui.sessions.streams.attribute_deviations import AttributeDeviationCounter, ReplayDeviation
 from pdtui.sessions.streams.block_pairs import pair_blocks
+from pdtui.sessions.streams.run_deviations import AttributeDeviation, RunDeviationCounter
 from pdtui.sessions.streams.step_block_reader import read_step_blocks
-from pdtui.sessions.streams.stream_differences import find_stream_difference
+from pdtui.sessions.streams.stream_differences import find_first_stream_difference
 from pdtui.sessions.streams.value_differences import StreamDifference
 
 
@@ -36,7 +36,7 @@ class SessionComparison:
     steps: int
     lengths: tuple[int, int]
     first_difference: int | None
-    deviations: tuple[ReplayDeviation, ...]
+    deviations: tuple[AttributeDeviation, ...]
     first_event: str
     circumstances: tuple[str, ...]
     difference: StreamDifference | None = None
@@ -54,7 +54,7 @@ def compare_sessions(a: SessionHeader, b: SessionHeader) -> SessionComparison:
     if a.info.attributes != b.info.attributes:
         why = "cannot be compared: their robots have different attributes"
         raise SessionError(f"{a.path} and {b.path}: {why}")
-    counter = AttributeDeviationCounter(a.info.attributes)
+    counter = RunDeviationCounter(a.info.attributes)
     steps = end = 0
     first: StreamDifference | None = None
     blocks_a, blocks_b = (
@@ -66,7 +66,7 @@ def compare_sessions(a: SessionHeader, b: SessionHeader) -> SessionComparison:
         steps, end = steps + len(one), int(one.steps[-1]) + 1
         start = 0
         if first is None:
-            first = find_stream_difference(one, other, a.info)
+            first = find_first_stream_difference(one, other, a.info)
             start = len(one) if first is None else int(np.searchsorted(one.steps, first.step))
         counter.add(one.steps[start:].tolist(), one.attributes[start:], other.attributes[start:])
     return SessionComparison(

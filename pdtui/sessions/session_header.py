@@ -10,7 +10,7 @@ from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.rrd.end_index import read_end_index
-from pdtui.sessions.session_index import decode_session_index
+from pdtui.sessions.session_header_index import decode_session_index
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def read_session_header(path: Path | str) -> SessionHeader:
         except SessionError:
             pass  # the file itself says the same, or what is wrong
     # What a session with an index does without takes longer to load than the index takes to read.
-    from pdtui.sessions.session_description import scan_session_header
+    from pdtui.sessions.session_header_decoding import scan_session_header
 
     return scan_session_header(path)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,15 +16,15 @@ from pdtui.sessions.rrd.end_index import read_end_index
 from pdtui.sessions.rrd.file_check import check_file
 from pdtui.sessions.rrd.message_reader import DamagedSpan
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_description import (
+from pdtui.sessions.session_header import SessionHeader
+from pdtui.sessions.session_header_decoding import (
     find_gaps,
     read_drive_outcome,
-    read_endings,
+    read_episode_endings,
     read_events,
     read_gaps,
 )
-from pdtui.sessions.session_header import SessionHeader
-from pdtui.sessions.session_index import decode_session_index
+from pdtui.sessions.session_header_index import decode_session_index
 from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, ENDINGS, EVENTS, INFO, REPAIR, VERSIONS
 
 
@@ -61,7 +62,11 @@ class SessionIntegrity:
     def verdict(self) -> str:
         """Whether the session is whole, in one line."""
         if self.whole:
-            return "whole, checksums match" if self.sealed else "no checksums: replayed only"
+            return (
+                "whole, checksums match"
+                if self.sealed
+                else "no checksums, so that only a replay can check it"
+            )
         if self.damage:
             first = self.damage[0]
             return f"not whole: byte {first.start}: {first.reason}; {RESCUE}"
@@ -74,7 +79,8 @@ class SessionIntegrity:
             for first, end in self.header.gaps
         ]
         if self.lost_events:
-            lines.append(f"{self.lost_events} events are missing, so that a replay will differ")
+            what = "an event is" if self.lost_events == 1 else f"{self.lost_events} events are"
+            lines.append(f"{what} missing, so a replay will differ")
         return lines
 
 
@@ -90,17 +96,17 @@ def examine_session(path: Path) -> SessionIntegrity:
         if (index.get("messages"), index.get("checksum")) == there:
             header = SessionHeader(path, **decode_session_index(index))
             return SessionIntegrity(header, whole=bool(header.outcome), sealed=True)
-    return examine_messages(path)
+    return examine_session_by_decoding(path)
 
 
-def examine_messages(path: Path) -> SessionIntegrity:
+def examine_session_by_decoding(path: Path) -> SessionIntegrity:
     """Report what can be read of a session by decoding it, with the same errors as `examine_session`."""
     damage: list[DamagedSpan] = []
     file = RrdContents(path, only=(DIGEST_EPISODE,), damage=damage)
     index = _decode_end_index(path)
     try:
-        header, lost_events = _rescue_header(path, file, index)
         declared = read_gaps(file)
+        header, lost_events = _rescue_header(path, file, index, declared)
     except SessionError as error:
         raise SessionError(f"{path}: nothing can be rescued: {error}") from error
     known = header.gaps == declared and (not lost_events or bool(file.properties(REPAIR)))
@@ -116,8 +122,13 @@ def _decode_end_index(path: Path) -> dict[str, Any]:
         return {}
 
 
-def _rescue_header(path: Path, file: RrdContents, index: dict[str, Any]) -> tuple[SessionHeader, int]:
-    """Return what can be read of a session, and the number of events that are known to be missing."""
+def _rescue_header(
+    path: Path, file: RrdContents, index: dict[str, Any], declared: Sequence[tuple[int, int]]
+) -> tuple[SessionHeader, int]:
+    """Return what can be read of a session, and the number of events that are known to be missing.
+
+    The index and the gaps that an earlier repair has `declared` tell which last steps are missing.
+    """
     properties = file.properties(INFO)
     info, created = (
         (index["info"], index["created"]) if index and not properties else decode_drive_info(properties)
@@ -127,7 +138,7 @@ def _rescue_header(path: Path, file: RrdContents, index: dict[str, Any]) -> tupl
     events = read_events(table, complete=False)
     last = int(table.read_numbers("number", np.int64).max()) if events else -1
     steps = file.table(DRIVE).steps
-    total = int(steps[-1]) + 1 if len(steps) else 0
+    total = max(0, *(steps[-1:] + 1).tolist(), index.get("steps", 0), *(end for _, end in declared))
     lost_events = last + 1 - len(events)
     if index:
         versions = versions or index["versions"]
@@ -139,8 +150,8 @@ def _rescue_header(path: Path, file: RrdContents, index: dict[str, Any]) -> tupl
         created,
         tuple(event for event in events if event.step < total),
         total,
-        read_endings(file.table(ENDINGS)),
+        read_episode_endings(file.table(ENDINGS)),
         read_drive_outcome(file) or index.get("outcome", ""),
-        find_gaps(steps),
+        find_gaps(steps, total),
     )
     return header, lost_events

@@ -13,8 +13,8 @@ from pdtui.core.errors import SessionError
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.core.units import Stimulation
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_description import count_control_steps, decode_header, read_gaps
 from pdtui.sessions.session_header import SessionHeader
+from pdtui.sessions.session_header_decoding import count_control_steps, decode_session_header, read_gaps
 from pdtui.sessions.session_schema import DRIVE
 from pdtui.sessions.streams.step_block_decoding import decode_activations, decode_step_block
 
@@ -61,7 +61,7 @@ def read_session(path: Path | str) -> Session:
     file = RrdContents(path, skip=("activations",))
     try:
         drive = file.table(DRIVE)
-        header = decode_header(file, path, count_control_steps(drive, read_gaps(file)))
+        header = decode_session_header(file, path, count_control_steps(drive, read_gaps(file)))
         block = decode_step_block(drive, header.info)
         return Session(
             **vars(header),
@@ -91,7 +91,7 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
     file = RrdContents(path, only=("activations",))
     try:
         drive = file.table(DRIVE)
-        header = decode_header(file, path, count_control_steps(drive, read_gaps(file)))
+        header = decode_session_header(file, path, count_control_steps(drive, read_gaps(file)))
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
     require_activations(header)

@@ -19,8 +19,8 @@ from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import encode_drive_info
 from pdtui.sessions.rrd.chunk_stream import ChunkStream
 from pdtui.sessions.rrd.rrd_contents import PROPERTIES
-from pdtui.sessions.session_index import encode_session_index
-from pdtui.sessions.session_integrity import SessionIntegrity, examine_messages, examine_session
+from pdtui.sessions.session_header_index import build_session_index
+from pdtui.sessions.session_integrity import SessionIntegrity, examine_session, examine_session_by_decoding
 from pdtui.sessions.session_schema import EVENTS, INFO, OUTCOME, REPAIR, STEP, VERSIONS
 from pdtui.sessions.writer.arrow_columns import time_columns
 from pdtui.sessions.writer.rerun_recording import RerunRecording, name_file_in_errors, send_property_group
@@ -48,7 +48,7 @@ def repair_session(path: Path, output: Path) -> SessionIntegrity:
     Raises:
         SessionError: nothing can be rescued, or the output cannot be written.
     """
-    found = examine_messages(path)
+    found = examine_session_by_decoding(path)
     if not output.parent.is_dir():
         raise SessionError(f"{output}: cannot be written: the folder does not exist")
     if output.exists() and is_being_recorded(output):
@@ -88,7 +88,7 @@ def _rewrite(path: Path, output: Path, found: SessionIntegrity) -> None:
             if number % _CHUNKS_PER_FLUSH == 0:
                 recording.flush()
         recording.flush()
-        index = encode_session_index(
+        index = build_session_index(
             drive,
             header.versions,
             steps=header.steps,

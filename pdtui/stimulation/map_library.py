@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pdtui.core.errors import MapError
+from pdtui.policies.weights.policy_file_lookup import is_file
 from pdtui.stimulation.map_reader import load_map, parse_map
 from pdtui.stimulation.map_writer import compose_map
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -31,11 +32,11 @@ def find_map(name: str) -> Path:
     If there is none, a `MapError` lists those that exist.
     """
     if name.endswith(".toml"):
-        if Path(name).is_file():
+        if is_file(Path(name)):
             return Path(name)
         raise MapError(f"{name}: no such map")
     for folder in search_folders("maps"):
-        if (folder / f"{name}.toml").is_file():
+        if is_file(folder / f"{name}.toml"):
             return folder / f"{name}.toml"
     known = ", ".join(sorted({path.stem for path in _all_paths()})) or "none"
     raise MapError(f"no map '{name}'; available: {known}")

@@ -11,7 +11,7 @@ from pdtui.core.attributes import AimDirection, BehaviorAim
 from pdtui.core.errors import MapError, SeedError
 from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.core.units import ADDRESS
-from pdtui.core.untrusted_file import read_bounded_file
+from pdtui.core.untrusted_file import MAP_BUDGET, describe_bytes, read_bounded_file
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions
 from pdtui.stimulation.map_table_reader import MapTableReader
 from pdtui.stimulation.seed_ranges import merge_seed_ranges, parse_seed_range
@@ -25,8 +25,10 @@ from pdtui.stimulation.stimulation_map import (
     StimulationMap,
 )
 
-MAX_BYTES = 1_000_000
-"""Largest size of a map's text; 100 behaviors of 60 units take 200,000 bytes."""
+MAX_BEHAVIORS = 1000
+"""Largest number of behaviors, and of primitives."""
+MAX_PERIOD = 1e6
+"""Longest activation period, s: eleven days."""
 _MAX_DOTS = 64
 _BETWEEN = re.compile(r"[=,{}\[\]\n#]")
 
@@ -38,7 +40,7 @@ def load_map(path: Path) -> StimulationMap:
         MapError: The file cannot be read, is not TOML, or has a wrong field; the message names its line.
     """
     try:
-        text = read_bounded_file(path, MAX_BYTES).decode("utf-8")
+        text = read_bounded_file(path, MAP_BUDGET.bytes).decode("utf-8")
     except OSError as error:
         raise MapError(f"{path}: cannot be read as a map: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -48,8 +50,8 @@ def load_map(path: Path) -> StimulationMap:
 
 def parse_map(text: str, source: str) -> StimulationMap:
     """Read a map from its text, as `load_map` does from a file; messages call it `source`."""
-    if len(text) > MAX_BYTES:
-        raise MapError(f"{source}: expected a map of at most {MAX_BYTES} characters")
+    if len(text) > MAP_BUDGET.bytes:
+        raise MapError(f"{source}: expected a map of at most {describe_bytes(MAP_BUDGET.bytes)}, found more")
     if _has_long_key(text):
         raise MapError(f"{source}: not a map: a key has more than {_MAX_DOTS} parts")
     try:
@@ -80,6 +82,9 @@ def parse_map(text: str, source: str) -> StimulationMap:
     }
     seeds = _read_seeds(top)
     top.done()
+    for kind, entries in tables.items():
+        if len(entries) > MAX_BEHAVIORS:
+            raise top.error(kind, f"expected at most {MAX_BEHAVIORS} {kind}, found {len(entries)}")
     primitives = {p.name: p for p in (_read_primitive(table) for table in tables["primitives"])}
     behaviors: dict[str, Behavior] = {}
     for table in tables["behaviors"]:
@@ -155,8 +160,8 @@ def _read_behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive])
     if not magnitudes and not commands:
         raise table.error("magnitudes", "expected at least one unit")
     period = table.number("period", None)
-    if period is not None and period <= 0:
-        raise table.error("period", f"expected more than 0 s, found {period}")
+    if period is not None and not 0 < period <= MAX_PERIOD:
+        raise table.error("period", f"expected more than 0 and at most {MAX_PERIOD:g} s, found {period}")
     together = table.take("together", list, [])
     if not all(isinstance(other, str) for other in together):
         raise table.error("together", "expected names of behaviors")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from typing import Any
 
@@ -15,6 +14,9 @@ MAX_ENTRIES = 4096
 """Largest number of entries in a list or a table of numbers."""
 _MAX_WHOLE = 2**53
 """Largest whole number; beyond, floating point no longer represents every one."""
+_MAX_NUMBER = 1e30
+"""Largest magnitude of a number, which products and float32 can still represent."""
+_IN_LIMITS = f"a finite number, at most {_MAX_NUMBER:g}, or {_MAX_WHOLE} for whole numbers"
 
 
 class MapTableReader:
@@ -46,7 +48,7 @@ class MapTableReader:
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
             raise self.error(name, f"expected {_type_in_words(kind)}, found {_type_of_value(value)}")
         if isinstance(value, NUMBER) and not _is_usable(value):
-            raise self.error(name, f"expected a finite number; whole numbers are at most {_MAX_WHOLE}")
+            raise self.error(name, f"expected {_IN_LIMITS}")
         if isinstance(value, list | dict) and len(value) > MAX_ENTRIES:
             raise self.error(name, f"expected at most {MAX_ENTRIES} entries, found {len(value)}")
         return value
@@ -86,7 +88,7 @@ class MapTableReader:
         data = self.take(name, dict, default)
         for key, value in data.items():
             if isinstance(value, bool) or not isinstance(value, NUMBER) or not _is_usable(value):
-                raise self.error(name, f"'{key[:80]}': expected a finite number, found {_describe(value)}")
+                raise self.error(name, f"'{key[:80]}': expected {_IN_LIMITS}, found {_describe(value)}")
         return {key: float(value) for key, value in data.items()}
 
     def done(self) -> None:
@@ -102,7 +104,7 @@ class MapTableReader:
 
 def _is_usable(value: float) -> bool:
     """Return whether a number is finite; TOML's whole numbers have no limit of their own."""
-    return abs(value) <= _MAX_WHOLE if isinstance(value, int) else math.isfinite(value)
+    return abs(value) <= (_MAX_WHOLE if isinstance(value, int) else _MAX_NUMBER)  # NaN is not
 
 
 def _line_of(text: str, header: str, number: int, field: str) -> int:

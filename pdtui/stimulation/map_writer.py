@@ -6,8 +6,10 @@ as `source` and says what is wrong.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -31,6 +33,10 @@ from pdtui.stimulation.stimulation_map import (
 )
 
 Value = TypeVar("Value")
+_HEADER = re.compile(r"^[ \t]*\[", re.MULTILINE)
+_POLICY_HEADER = re.compile(r"[ \t]*\[[ \t]*[\"']?policy[\"']?[ \t]*\]")
+_MAX_POLICY_PART = 20_000
+"""Characters of the table of the policy, or of the map up to its first table."""
 _MAX_INLINE = 5
 """Units that are written on one line; more of them get a line each."""
 _OPTIONAL_FIELDS = "says mode period task magnitudes base commands together pid aim measured"
@@ -85,11 +91,22 @@ def replace_gains(text: str, gains: Mapping[str, PidGains], source: str) -> str:
 def replace_policy(text: str, name: str, import_options: ImportOptions, source: str) -> str:
     """Return the text of a map that names another weights file or shipped policy. The hash stays."""
 
-    def replace(document: Any) -> None:
-        policy = document["policy"]
+    parse_map(text, source)
+    # Only the part with the policy is parsed by tomlkit, which takes seconds for a large map.
+    headers = [match.start() for match in _HEADER.finditer(text)]
+    parts = list(pairwise([0, *headers, len(text)]))
+    start, end = next((one for one in parts if _POLICY_HEADER.match(text, *one)), parts[0])
+    try:
+        if end - start > _MAX_POLICY_PART:
+            raise KeyError("policy")
+        part = tomlkit.parse(text[start:end])
+        policy: Any = part["policy"]
         policy.update(_policy_fields(name, policy["sha256"], import_options))
-
-    return _edit(text, source, replace)
+    except (TOMLKitError, KeyError, AttributeError) as error:
+        raise MapError(f"{source}: expected the policy in a table [policy] of its own") from error
+    changed = f"{text[:start]}{tomlkit.dumps(part)}{text[end:]}"
+    parse_map(changed, source)
+    return changed
 
 
 def add_behavior(text: str, behavior: Behavior, source: str) -> str:

@@ -32,7 +32,7 @@ class TerminalDriver(LinuxDriver):
     def run_input_thread(self) -> None:
         """Read input until the application ends, and send it keys, clicks and pasted text."""
         decode = getincrementaldecoder("utf-8")(errors="replace").decode
-        reader = TerminalReader(self.process_message)
+        reader = TerminalInputParser(self.process_message)
         while not self.exit_event.is_set():
             if select.select([self.fileno], [], [], _WAIT)[0]:
                 try:
@@ -45,7 +45,7 @@ class TerminalDriver(LinuxDriver):
             reader.tick()
 
 
-class TerminalReader:
+class TerminalInputParser:
     """Turns what a terminal sends into messages, and goes on after what is no message.
 
     Args:

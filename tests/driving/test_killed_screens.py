@@ -14,8 +14,8 @@ from pdtui.driving.drive_client import DriveClient
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.driving.session_replay import replay_session
+from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session
-from pdtui.sessions.session_repair import examine_session
 from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.core.test_worker_pool import is_alive
 

@@ -16,7 +16,7 @@ from pdtui.core.step_record import StepRecord
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.replays.replay_result import ReplayResult
-from pdtui.driving.replays.watched_session import WatchedSession
+from pdtui.driving.replays.step_by_step_comparison import StepByStepComparison
 from pdtui.driving.session_replay import replay_session
 from pdtui.sessions import environment_versions
 from pdtui.sessions.drive_info import DriveInfo
@@ -214,14 +214,14 @@ def test_steps_that_a_session_lacks_are_run_but_not_compared(drive: Drive, tmp_p
                 recorder.write(one)
         recorder.close("finished")
     header = replace(read_session_header(path), steps=40, gaps=((10, 15),))
-    watched = WatchedSession(header, info)
+    watched = StepByStepComparison(header, info)
     assert [watched.compare(one) for one in records] == [""] * 40
     assert (watched.ended, watched.steps) == (True, 35)
 
 
 def test_who_watches_is_told_what_differs_at_once(drive: Drive, tmp_path: Path) -> None:
     path = record(drive, tmp_path / "a.rrd", CHANGES["rewards is "], range(12, 13))
-    watched = WatchedSession(read_session_header(path), drive[0])
+    watched = StepByStepComparison(read_session_header(path), drive[0])
     found = [watched.compare(one) for one in drive[1][:13]]
     assert found[:12] == [""] * 12
     assert found[12].startswith("step 12 differs from the session: rewards is ")
@@ -230,7 +230,7 @@ def test_who_watches_is_told_what_differs_at_once(drive: Drive, tmp_path: Path) 
 def test_who_watches_a_session_of_another_description_is_told_so(drive: Drive, tmp_path: Path) -> None:
     path = record(drive, tmp_path / "a.rrd", dt=0.1)
     with pytest.raises(SessionError, match=r"a\.rrd: differs: description: dt is 0\.05, recorded 0\.1"):
-        WatchedSession(read_session_header(path), drive[0])
+        StepByStepComparison(read_session_header(path), drive[0])
 
 
 def test_another_number_of_actions_is_a_difference(drive: Drive, tmp_path: Path) -> None:

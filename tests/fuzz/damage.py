@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import struct
+import zipfile
 
 import pyarrow as pa
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
+from pdtui.sessions.rrd.message_checksum import SEAL_BYTES, read_message_seal, seal_message
+from pdtui.sessions.rrd.message_framing import HEADER_BYTES, LAST, START_BYTES, encode_last_message
 from pdtui.sessions.rrd.protobuf_wire import protobuf_bytes_field, protobuf_number_field, read_fields
 
 _LENGTHS = (0, 1, 7, 16, 255, 2**16, 2**31 - 1, 2**31, 2**32, 2**48, 2**62, 2**63, 2**64 - 1)
@@ -56,7 +60,10 @@ def _damage(draw: DrawFn, data: bytearray, place: int) -> None:
 
 @st.composite
 def damaged_session(draw: DrawFn, content: Content) -> bytes:
-    """As `damaged`; or with another length of a message, or with a message whose rows are damaged."""
+    """As `damaged`; or with another length of a message, or with a message whose rows are damaged.
+
+    Mostly with checksums that match all the same: they find accidents, and anyone can compute them.
+    """
     kind = draw(st.integers(0, 3))
     if kind == 0:
         return draw(damaged(content))
@@ -69,10 +76,36 @@ def damaged_session(draw: DrawFn, content: Content) -> bytes:
         return bytes(data)
     length = struct.unpack_from("<QQ", content, start)[1]
     end = start + 16 + length
-    payload = _damaged_inside(draw, content[start + 16 : end])
+    payload = content[start + 16 : end]
+    payload = _damaged_inside(draw, payload if read_message_seal(payload) is None else payload[:-SEAL_BYTES])
     kind_of_it = content[start : start + 8]
     rest = content[end:] if draw(st.booleans()) else b""
-    return content[:start] + kind_of_it + struct.pack("<Q", len(payload)) + payload + rest
+    changed = content[:start] + kind_of_it + struct.pack("<Q", len(payload)) + payload + rest
+    return resealed(changed, start) if draw(st.integers(0, 3)) else changed
+
+
+def resealed(content: bytes, bare: int = -1) -> bytes:
+    """The session with checksums that match, so that what was damaged is read like what was recorded.
+
+    The message at the byte `bare` has no checksum yet.
+    """
+    parts, place = [content[:START_BYTES]], START_BYTES
+    previous: int | None = None
+    while place + HEADER_BYTES <= len(content):
+        kind, length = struct.unpack_from("<QQ", content, place)
+        payload = content[place + HEADER_BYTES : place + HEADER_BYTES + length]
+        if kind == LAST:
+            parts.append(encode_last_message(payload, sum(map(len, parts))))
+            break
+        seal = read_message_seal(payload)
+        if previous is None:
+            previous = 0 if seal is None else seal.link
+        if place != bare and seal is not None:
+            payload = payload[:-SEAL_BYTES]
+        header, end, previous = seal_message(kind, payload, previous)
+        parts += [header, payload, end]
+        place += HEADER_BYTES + length
+    return b"".join(parts)
 
 
 def damaged_weights(content: Content) -> SearchStrategy[bytes]:
@@ -83,6 +116,23 @@ def damaged_weights(content: Content) -> SearchStrategy[bytes]:
     return st.one_of(
         damaged(content), repacked, damaged(Content(content[: 8 + length])).map(lambda some: some + rest)
     )
+
+
+@st.composite
+def damaged_archive(draw: DrawFn, content: Content) -> bytes:
+    """As `damaged`; mostly one entry inside the archive, so that the archive itself is whole."""
+    if draw(st.integers(0, 4)) == 0:
+        return draw(damaged(content))
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    name = draw(st.sampled_from(sorted(entries)))
+    inner = Content(entries[name])
+    entries[name] = draw(damaged_archive(inner) if inner.startswith(b"PK\3\4") else damaged(inner))
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name, changed in entries.items():
+            archive.writestr(name, changed)
+    return stream.getvalue()
 
 
 def _starts(content: bytes) -> list[int]:

@@ -10,8 +10,14 @@ import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
 
 from pdtui.core.errors import PdtuiError
+
+if TYPE_CHECKING:
+    from pdtui.policies.foreign.reader_process import ForeignFile
 
 SECONDS = 30
 """What reads so long hangs."""
@@ -70,7 +76,7 @@ def read_session_file(path: Path) -> None:
     """Everything that a command does with a session before it simulates."""
     from rich.console import Console
 
-    from pdtui.cli.session_tables import session_comparison_table, session_table
+    from pdtui.cli.session_tables import session_comparison_table, session_details
     from pdtui.driving.keystrokes import format_keystrokes
     from pdtui.driving.session_replay import config_from_session
     from pdtui.sessions.session_comparison import compare_sessions
@@ -94,10 +100,44 @@ def read_session_file(path: Path) -> None:
     examine_session(path)
     with Path("/dev/null").open("w") as nowhere:
         console = Console(file=nowhere)
-        console.print(session_table(session, summarise_session(session)))
+        console.print(session_details(session, summarise_session(session)))
         console.print(session_comparison_table(compare_sessions(session, session)))
     format_keystrokes(session.events)
     config_from_session(session, str(path))
+
+
+def _read_policy(path: Path) -> None:
+    """Read a policy of another program as its own process does, here, where a fault in it is seen."""
+    from pdtui.policies.importers import import_network
+    from pdtui.policies.weights.import_options import ImportOptions
+
+    import_network(_read_content(path, "policy"), ImportOptions("tanh", "none"))
+
+
+def _read_torchscript(path: Path) -> None:
+    from pdtui.policies.runtime.policy import Policy
+    from pdtui.policies.torchscript import build_torchscript
+
+    Policy(build_torchscript(_read_content(path, "policy")), 3).act(np.zeros(3))
+
+
+def _read_statistics(path: Path) -> None:
+    from pdtui.policies.foreign.reader_process import ForeignFile
+
+    found = _read_content(path, "statistics")
+    assert isinstance(found, ForeignFile)
+
+
+def _read_content(path: Path, content: Literal["policy", "statistics"]) -> ForeignFile:
+    from pdtui.core.untrusted_file import FOREIGN_POLICY_BUDGET, STATISTICS_BUDGET
+    from pdtui.policies.foreign.__main__ import READERS, pack_content
+    from pdtui.policies.foreign.reader_process import unpack_content
+
+    limit = (FOREIGN_POLICY_BUDGET if content == "policy" else STATISTICS_BUDGET).bytes
+    try:
+        return unpack_content(pack_content(READERS[content](path.read_bytes(), limit), "", limit), str(path))
+    except RecursionError as error:  # refused by the process, too
+        raise PdtuiError("too deeply nested") from error
 
 
 def _reads(map_path: Path) -> dict[str, Callable[[Path], object]]:
@@ -112,6 +152,10 @@ def _reads(map_path: Path) -> dict[str, Callable[[Path], object]]:
         "map": lambda path: resolve_map_policy(load_map(path)),
         "keys": lambda path: read_keystrokes(path, known),
         "weights": load_policy,
+        "npz": _read_policy,
+        "sb3": _read_policy,
+        "torchscript": _read_torchscript,
+        "statistics": _read_statistics,
     }
 
 

@@ -15,13 +15,15 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis.strategies import SearchStrategy
 
 from pdtui.sessions.writer.session_recorder import SessionRecorder
-from tests.fuzz.damage import Content, damaged, damaged_session, damaged_weights
+from tests.fuzz.damage import Content, damaged, damaged_archive, damaged_session, damaged_weights, resealed
+from tests.fuzz.foreign_policies import write_foreign_files
 from tests.fuzz.reading import Reader
 from tests.sessions.recorded_drives import events_of, make_loop, random_weights
 
 KEYS = "# a drive\n3 w\n10 t\n20 space\n25 h\n25 left\n40 r\n"
 SUITE = {"session": 200, "map": 150, "keys": 75, "weights": 75}
-LONG = {"session": 4000, "map": 3000, "keys": 1500, "weights": 1500}
+SUITE |= dict.fromkeys(("npz", "sb3", "torchscript", "statistics"), 15)
+LONG = {kind: 20 * max(75, count) for kind, count in SUITE.items()}
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +34,7 @@ def good(map_text: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str, P
     paths["map"].write_text(map_text)
     paths["keys"].write_text(KEYS)
     random_weights(paths["weights"])
+    write_foreign_files(paths)
     loop = make_loop(paths["weights"])
     info = replace(loop.info, map_text=map_text)
     with SessionRecorder(paths["session"], info, rows_per_write=8) as recorder:
@@ -94,6 +97,11 @@ def test_good_files_are_read(good: dict[str, Path], reader: Reader) -> None:
     assert {kind: reader.read(kind, path) for kind, path in good.items()} == dict.fromkeys(SUITE, "'read'")
 
 
+def test_checksums_that_are_computed_again_are_those_of_the_recorder(good: dict[str, Path]) -> None:
+    content = good["session"].read_bytes()
+    assert resealed(content) == content
+
+
 def test_what_ends_the_reading_process_is_seen(reader: Reader, map_path: Path) -> None:
     assert "KeyError" in reader.read("no such kind", map_path)
     reader.close()
@@ -103,4 +111,6 @@ def test_what_ends_the_reading_process_is_seen(reader: Reader, map_path: Path) -
 def _strategy(kind: str, content: Content) -> SearchStrategy[bytes]:
     if kind == "session":
         return damaged_session(content)
+    if kind in ("npz", "sb3", "torchscript"):
+        return damaged_archive(content)
     return damaged_weights(content) if kind == "weights" else damaged(content)

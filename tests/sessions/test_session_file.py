@@ -70,6 +70,31 @@ def test_a_file_is_replaced_only_by_a_whole_one(recorded: Recorded, tmp_path: Pa
     assert [one.name for one in tmp_path.iterdir()] == ["a.rrd"]
 
 
+def test_of_two_that_replace_one_file_the_second_is_refused(recorded: Recorded, tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    path.write_text("the old one")
+    first = SessionRecorder(path, recorded[1].info, existing="replace", rows_per_write=4)
+    for _ in range(2):
+        with pytest.raises(SessionError, match=r"a\.rrd: cannot be replaced: it is being recorded"):
+            SessionRecorder(path, recorded[1].info, existing="replace")
+        record(recorded, first, 0, 50)
+    first.close("done")
+    SessionRecorder(path, recorded[1].info, existing="replace").close("no steps")
+    second = SessionRecorder(path, recorded[1].info, existing="replace")
+    second.close("no steps")
+    assert examine_session(path).steps == 100
+
+
+def test_a_file_that_appears_after_the_start_is_not_replaced(recorded: Recorded, tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    recorder = SessionRecorder(path, recorded[1].info, existing="replace", rows_per_write=4)
+    path.write_text("mine")
+    with pytest.raises(SessionError, match=r"a\.rrd: cannot be written: File exists"):
+        record(recorded, recorder)
+    recorder.close("stopped")
+    assert path.read_text() == "mine"
+
+
 def test_a_file_that_is_being_recorded_is_locked(recorded: Recorded, tmp_path: Path) -> None:
     path = tmp_path / "a.rrd"
     recorder = SessionRecorder(path, recorded[1].info, rows_per_write=4)

@@ -14,9 +14,11 @@ from rerun.chunk import RrdReader
 
 from pdtui.core.errors import SessionError
 from pdtui.sessions.rrd.message_framing import RrdMessageSpan, read_message_spans
+from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_activations, read_session
 from pdtui.sessions.session_repair import repair_session
+from pdtui.sessions.streams.step_block_reader import read_step_blocks
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded
 from tests.sessions.recorded_drives import make_loop, record_drive
@@ -85,7 +87,7 @@ def test_a_whole_session_is_whole(recorded: Recorded) -> None:
     assert examine_session(recorded[0]).outcome == "the operator quit"
 
 
-def spans(data: bytes) -> list[RrdMessageSpan]:
+def spans(data: bytes | bytearray) -> list[RrdMessageSpan]:
     with io.BytesIO(data) as file:
         return list(read_message_spans(file, len(data)))
 
@@ -156,6 +158,40 @@ def test_two_damaged_places_are_two_gaps(weights: Path, tmp_path: Path) -> None:
     assert session.missing == sum(end - first for first, end in session.gaps)
     assert session.steps == 100
     assert all("missing" in line for line in repaired.describe_losses())
+
+
+def test_missing_last_steps_are_a_gap(weights: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    record_drive(path, weights, rows_per_write=4)
+    data = bytearray(path.read_bytes())
+    last = [span for span in spans(data)[:-1] if b"digest_episode" in data[span.start : span.end]][-1]
+    data[last.start + last.length // 2] ^= 1
+    path.write_bytes(data)
+    repaired = repair_session(path, tmp_path / "b.rrd")
+    (gap,) = repaired.header.gaps
+    assert gap[0] in range(96, 100)
+    assert gap[1] == 100
+    session = read_session(tmp_path / "b.rrd")
+    assert (session.steps, session.gaps, len(session.digests)) == (100, (gap,), gap[0])
+    cut = tmp_path / "c.rrd"
+    cut.write_bytes((tmp_path / "b.rrd").read_bytes()[:-100])
+    assert repair_session(cut, cut).header.gaps == (gap,)
+
+
+@pytest.mark.parametrize("rows", [4, 16])
+@pytest.mark.parametrize("which", [0, 2, -1])
+def test_a_session_with_a_gap_is_read_block_by_block(
+    which: int, rows: int, weights: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.rrd"
+    record_drive(path, weights, rows_per_write=rows)
+    data = bytearray(path.read_bytes())
+    span = [span for span in spans(data)[:-1] if b"digest_episode" in data[span.start : span.end]][which]
+    data[span.start + span.length // 2] ^= 1
+    path.write_bytes(data)
+    header = repair_session(path, tmp_path / "b.rrd").header
+    blocks = list(read_step_blocks(read_session_header(tmp_path / "b.rrd"), poses=True, block_steps=10))
+    assert sum(len(block) for block in blocks) == header.steps - header.missing < 100
 
 
 def test_a_second_repair_keeps_the_gaps_of_the_first(weights: Path, tmp_path: Path) -> None:

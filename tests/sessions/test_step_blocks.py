@@ -14,7 +14,7 @@ from pdtui.sessions.session_reader import read_activations, read_session
 from pdtui.sessions.session_summary import SessionSummaryCounter, summarise_session
 from pdtui.sessions.streams.step_block import StepBlock, step_block_of_records
 from pdtui.sessions.streams.step_block_reader import read_step_blocks
-from pdtui.sessions.streams.stream_differences import find_stream_difference
+from pdtui.sessions.streams.stream_differences import find_first_stream_difference
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded
 
@@ -59,7 +59,7 @@ def test_what_is_read_is_what_was_recorded(rows_per_write: int, recorded: Record
         same = step_block_of_records(
             many[int(block.steps[0]) : int(block.steps[-1]) + 1], loop.info, block.pose_steps
         )
-        assert find_stream_difference(same, block, loop.info) is None
+        assert find_first_stream_difference(same, block, loop.info) is None
         assert same.poses.keys() == block.poses.keys() != set()
         drawn += block.pose_steps.tolist()
     assert drawn == list(range(1500))
@@ -70,7 +70,7 @@ def test_a_part_of_a_block_is_the_block_of_the_part(recorded: Recorded) -> None:
     (block,) = read_blocks(path)
     part = block.part(3, 50)
     same = step_block_of_records(records[3:50], loop.info, block.pose_steps)
-    assert find_stream_difference(same, part, loop.info) is None
+    assert find_first_stream_difference(same, part, loop.info) is None
     assert part.active == block.active[3:50]
     assert part.stimulations == block.stimulations[3:50]
     np.testing.assert_array_equal(part.pose_steps, same.pose_steps)
@@ -90,7 +90,7 @@ def test_rows_in_another_order_are_put_right(recorded: Recorded, tmp_path: Path)
     for block in blocks:
         first, last = int(block.steps[0]), int(block.steps[-1])
         same = step_block_of_records(whole[first : last + 1], loop.info)
-        assert find_stream_difference(same, block, loop.info) is None
+        assert find_first_stream_difference(same, block, loop.info) is None
 
 
 def test_a_missing_step_is_an_error_unless_it_is_a_known_gap(recorded: Recorded, tmp_path: Path) -> None:

@@ -40,7 +40,11 @@ def test_a_map_is_read_whole(small_map: StimulationMap, map_text: str) -> None:
             "swat = 4.0",
             r"m\.toml:23: behavior 1: field 'magnitudes': 'swat' is neither .*; available: sway",
         ),
-        ("period = 0.5", "period = 0", r"m\.toml:31: behavior 2: field 'period': expected more than 0 s"),
+        (
+            "period = 0.5",
+            "period = 0",
+            r"m\.toml:31: behavior 2: field 'period': expected more than 0 and at most",
+        ),
         ("period = 0.5", "perod = 0.5", r"m\.toml:31: behavior 2: field 'perod': not a field"),
         (
             'key = "t"',
@@ -118,7 +122,7 @@ def test_a_controller_may_start_from_a_base(map_text: str) -> None:
 def test_mistakes_in_a_table_of_its_own_lines_are_named(map_text: str) -> None:
     lines = '[behaviors.magnitudes]\n"0:1" = 1.0\n"0:2" = "x"\n'
     text = map_text.replace('magnitudes = { "1:2" = -3.0 }\nperiod = 0.5\ntogether = ["push"]\n', lines)
-    with pytest.raises(MapError, match="'0:2': expected a finite number, found 'x'"):
+    with pytest.raises(MapError, match="'0:2': expected a finite number, .*found 'x'"):
         parse_map(text, "m")
 
 

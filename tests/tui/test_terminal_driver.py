@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from textual.events import Key, MouseDown, Paste
 from textual.message import Message
 
-from pdtui.tui.terminal_driver import TerminalReader
+from pdtui.tui.terminal_driver import TerminalInputParser
 
 
 def read(*texts: str) -> list[Message]:
     messages: list[Message] = []
-    reader = TerminalReader(messages.append)
+    reader = TerminalInputParser(messages.append)
     for text in texts:
         reader.feed(text)
     return messages

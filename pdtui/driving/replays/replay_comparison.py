@@ -8,9 +8,9 @@ import numpy as np
 
 from pdtui.core.step_record import StepRecord
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.streams.attribute_deviations import AttributeDeviationCounter
+from pdtui.sessions.streams.run_deviations import RunDeviationCounter
 from pdtui.sessions.streams.step_block import StepBlock, step_block_of_records
-from pdtui.sessions.streams.stream_differences import find_stream_difference
+from pdtui.sessions.streams.stream_differences import find_first_stream_difference
 from pdtui.sessions.streams.value_differences import StreamDifference
 
 STREAM_TOLERANCE = 1e-4
@@ -48,7 +48,7 @@ class ReplayComparison:
         self.difference: StreamDifference | None = None
         self.beyond_rounding: StreamDifference | None = None
         self.first_digest: int | None = None
-        self.deviations = AttributeDeviationCounter(info.attributes)
+        self.deviations = RunDeviationCounter(info.attributes)
 
     def add(self, records: Sequence[StepRecord], recorded: StepBlock) -> None:
         """Compare control steps with the same steps of the session."""
@@ -58,7 +58,7 @@ class ReplayComparison:
         self.deviations.add_spread(here.attributes, recorded.attributes)
         first = 0
         if self.difference is None:
-            self.difference = find_stream_difference(here, recorded, self._info)
+            self.difference = find_first_stream_difference(here, recorded, self._info)
             if self.difference is None:
                 first = len(here)
             else:
@@ -78,7 +78,7 @@ class ReplayComparison:
             self.first_digest = int(here.steps[wrong[0]])
         until = max(same, min(self._judged - self.steps, len(here)))
         if self.beyond_rounding is None and until > 0:
-            self.beyond_rounding = find_stream_difference(
+            self.beyond_rounding = find_first_stream_difference(
                 here.part(0, until), recorded.part(0, until), self._info, STREAM_TOLERANCE
             )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pdtui.sessions.streams.attribute_deviations import ReplayDeviation
+from pdtui.sessions.streams.run_deviations import AttributeDeviation
 from pdtui.sessions.streams.step_numbers import describe_step_ranges
 from pdtui.sessions.streams.value_differences import StreamDifference
 
@@ -27,8 +27,8 @@ class ReplayResult:
         judged: number of first control steps that must be within the tolerance.
         stopped: why the replay could not go on after it differed from the session; empty if it could.
         difference: the first value that differs, and where: step, stream and column; None if none does.
-        damaged: whether that is more than rounding although the state of the simulator is the same, so that
-            the recording must have been changed.
+        damaged: whether the difference exceeds rounding although the simulator's state is the same, so that
+            the recording must have been altered.
         beyond_rounding: the first value that differs by more than rounding can explain in the judged steps.
         description: what differs between robot and policy and the session's description of them, in words;
             if anything does, no step is run.
@@ -42,7 +42,7 @@ class ReplayResult:
     environment: tuple[str, ...]
     total: int = 0
     dt: float = 0.0
-    deviations: tuple[ReplayDeviation, ...] = ()
+    deviations: tuple[AttributeDeviation, ...] = ()
     agreed: int = 0
     tolerance: float | None = None
     judged: int = 0
@@ -87,7 +87,7 @@ class ReplayResult:
         if self.agreed >= self.judged and self.beyond_rounding is not None:
             found = self.beyond_rounding
             return f"differs: step {found.step} of {self.total}: {found}, which is more than rounding"
-        return f"differs: {where}: {self.detail}; only the first {kept}, but {self.judged} have to be"
+        return f"differs: {where}: {self.detail}; the first {kept}, but {self.judged} have to be"
 
     def _damage(self, where: str) -> str:
         if not self.damaged:
@@ -99,4 +99,4 @@ class ReplayResult:
     def _missing_steps(self) -> str:
         if not self.missing:
             return ""
-        return f"; {self.steps} steps were compared, missing are {describe_step_ranges(self.missing)}"
+        return f"; {self.steps} steps compared; the session lacks {describe_step_ranges(self.missing)}"

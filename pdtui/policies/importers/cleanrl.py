@@ -13,12 +13,12 @@ from dataclasses import replace
 from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.partial_policy import (
     PartialPolicy,
+    Tensors,
     check_layer_chain,
     join_mean_and_deviation,
     read_layer_sequence,
     read_linear_layer,
 )
-from pdtui.policies.importers.tensor_files import Tensors
 
 _FIRST = re.compile(r"(?:(0|actor)\.)?(?=(?:actor_mean|fc1)\.)")
 

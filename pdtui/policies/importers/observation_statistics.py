@@ -7,38 +7,26 @@ VecNormalize of Stable-Baselines3. A file may hold ``std`` instead of ``var``; t
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
 import torch
 
 from pdtui.core.errors import PolicyError
-from pdtui.policies.importers.partial_policy import ObservationStatistics
-from pdtui.policies.importers.tensor_files import (
-    FileKind,
-    Tensors,
-    detect_file_kind,
-    flatten_tensors,
-    read_npz_tensors,
-    read_safetensors_tensors,
-)
-from pdtui.policies.importers.zip_archive import ZipArchive, read_file_bytes
+from pdtui.policies.foreign.reader_process import read_foreign_file
+from pdtui.policies.foreign.zip_archive import shorten_name_list
+from pdtui.policies.importers.partial_policy import ObservationStatistics, Tensors
 
 _EPSILON = 1e-8
 """The default of VecNormalize."""
-HOW_TO_CONVERT = (
-    "in the Python that trained it: v = VecNormalize.load(FILE, env); numpy.savez('normaliser.npz', "
-    "mean=v.obs_rms.mean, var=v.obs_rms.var, clip_obs=v.clip_obs, epsilon=v.epsilon)"
-)
 
 
 def read_observation_statistics(path: Path, observations: int) -> ObservationStatistics:
     """Read the statistics of observations of this length."""
-    tensors = _read_tensors(path)
+    tensors = read_foreign_file(path, "statistics").tensors
     if "mean" not in tensors or not {"var", "std"} & tensors.keys():
         raise PolicyError(
-            f"{path}: expected 'mean' and 'var' of the observation, found {', '.join(tensors) or 'nothing'}"
+            f"{path}: expected 'mean' and 'var' of the observation, found {shorten_name_list(list(tensors))}"
         )
     spread_name = "var" if "var" in tensors else "std"
     mean, spread = tensors["mean"].double(), tensors[spread_name].double()
@@ -52,33 +40,6 @@ def read_observation_statistics(path: Path, observations: int) -> ObservationSta
     epsilon = _read_number(tensors, "epsilon", _EPSILON, path)
     std = torch.sqrt(spread + epsilon) if "var" in tensors else spread
     return ObservationStatistics(mean.float(), std.float(), clip)
-
-
-def _read_tensors(path: Path) -> Tensors:
-    content = read_file_bytes(path)
-    match detect_file_kind(content):
-        case FileKind.ZIP:
-            return read_npz_tensors(ZipArchive(content, str(path)))
-        case FileKind.SAFETENSORS:
-            return flatten_tensors(read_safetensors_tensors(content, str(path)))
-        case FileKind.PICKLE:
-            raise PolicyError(
-                f"{path}: a pickle, which can run any code when it is read, so pdtui refuses it. "
-                f"{HOW_TO_CONVERT}"
-            )
-        case _:
-            return _read_json(content, path)
-
-
-def _read_json(content: bytes, path: Path) -> Tensors:
-    try:
-        data = json.loads(content)
-        if not isinstance(data, dict):
-            raise ValueError(f"expected an object, found {type(data).__name__}")
-        numbers = {name: value for name, value in data.items() if isinstance(value, list | int | float)}
-        return {name: torch.tensor(value, dtype=torch.float64) for name, value in numbers.items()}
-    except (ValueError, TypeError, RecursionError, RuntimeError) as error:
-        raise PolicyError(f"{path}: expected statistics as .npz, .json or .safetensors: {error}") from error
 
 
 def _read_number(tensors: Tensors, name: str, default: float, path: Path) -> float:

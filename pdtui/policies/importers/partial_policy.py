@@ -14,9 +14,9 @@ from typing import Literal
 import torch
 
 from pdtui.core.errors import PolicyError
-from pdtui.policies.importers.tensor_files import Tensors
-from pdtui.policies.importers.zip_archive import shorten_name_list
+from pdtui.policies.foreign.zip_archive import shorten_name_list
 
+Tensors = dict[str, torch.Tensor]
 MAX_WIDTH = 1_000_000
 """Inputs or outputs of a layer, beyond which a file is damaged or hostile."""
 OutputKind = Literal["action", "categorical", "gaussian pair", "unknown pair"]
@@ -78,6 +78,13 @@ class PartialPolicy:
     log_std_rule: Literal["clip", "tanh"] = "clip"
     mean_limit: float = 0.0
     statistics: ObservationStatistics | None = None
+
+
+def to_single_precision(tensors: Tensors) -> Tensors:
+    """Return the tensors with floating-point ones as float32, as policies compute."""
+    return {
+        name: tensor.float() if tensor.is_floating_point() else tensor for name, tensor in tensors.items()
+    }
 
 
 def read_linear_layer(tensors: Tensors, prefix: str) -> LinearLayer:

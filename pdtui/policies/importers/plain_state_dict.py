@@ -10,11 +10,11 @@ from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.partial_policy import (
     LinearLayer,
     PartialPolicy,
+    Tensors,
     check_layer_chain,
     describe_tensors,
     read_linear_layer,
 )
-from pdtui.policies.importers.tensor_files import Tensors
 
 _ACTOR = re.compile(r"actor|policy|(^|[._/])pi([._/]|$)|action")
 _OTHER = re.compile(r"critic|value|(^|[._/])[qv]f?\d?([._/]|$)|target|optim")

@@ -14,10 +14,10 @@ from pdtui.core.errors import PolicyError
 from pdtui.policies.importers.partial_policy import (
     LinearLayer,
     PartialPolicy,
+    Tensors,
     check_layer_chain,
     read_linear_layer,
 )
-from pdtui.policies.importers.tensor_files import Tensors
 
 _SAC = re.compile(r"(.*?/?)(?:sequential/)?(action)_(\d{1,4}|out)/kernel")
 _PPO = re.compile(r"(.*?/?)(fc)_(\d{1,4}|out)/kernel")

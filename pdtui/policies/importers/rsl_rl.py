@@ -12,8 +12,12 @@ from itertools import chain
 
 import torch
 
-from pdtui.policies.importers.partial_policy import ObservationStatistics, PartialPolicy, read_layer_sequence
-from pdtui.policies.importers.tensor_files import Tensors
+from pdtui.policies.importers.partial_policy import (
+    ObservationStatistics,
+    PartialPolicy,
+    Tensors,
+    read_layer_sequence,
+)
 
 # rsl_rl's EmpiricalNormalization divides by std + 0.01, a constant that it does not store.
 _EPSILON = 1e-2

@@ -7,7 +7,6 @@ the activation function and the bounds of the action are read from there.
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from typing import Any
@@ -15,38 +14,33 @@ from typing import Any
 from torch import nn
 
 from pdtui.core.errors import PolicyError
+from pdtui.policies.foreign.reader_process import ForeignFile
 from pdtui.policies.importers.partial_policy import (
     PartialPolicy,
+    Tensors,
     check_layer_chain,
     describe_tensors,
     join_mean_and_deviation,
     read_layer_sequence,
     read_linear_layer,
+    to_single_precision,
 )
-from pdtui.policies.importers.tensor_files import Tensors, flatten_tensors, read_torch_archive
-from pdtui.policies.importers.zip_archive import ZipArchive
 from pdtui.policies.weights.import_options import NO_NORMALISER, ImportOptions
 from pdtui.policies.weights.policy_network import ACTIVATIONS
 
 _ORIGIN = "Stable-Baselines3 "
-_MAX_DATA = 64 << 20
 _CLASS = re.compile(r"<class '([\w.]+)'>")
 _FUNCTION = re.compile(r"<function ([\w.<>]+)\.__init__ at")
 OTHER_NETWORKS = "export such a network as TorchScript, or load it from Python"
 
 
-def is_sb3_archive(names: tuple[str, ...]) -> bool:
-    """Return whether these are the entries of a Stable-Baselines3 archive."""
-    return "data" in names and "policy.pth" in names
-
-
-def import_sb3(archive: ZipArchive, import_options: ImportOptions) -> PartialPolicy:
+def import_sb3(found: ForeignFile, import_options: ImportOptions) -> PartialPolicy:
     """Return the policy of a Stable-Baselines3 archive.
 
     The options tell whether the user gave the statistics of VecNormalize, which the archive lacks.
     """
-    source, data = archive.source, _read_data(archive)
-    tensors = flatten_tensors(read_torch_archive(archive.read("policy.pth"), f"{source}: policy.pth"))
+    source, data = found.source, found.facts
+    tensors = to_single_precision(found.tensors)
     _check_flat(tensors, data, source)
     if _is_normalised(data) and not import_options.normaliser:
         raise PolicyError(
@@ -66,8 +60,8 @@ def _is_normalised(data: dict[str, Any]) -> bool:
     own, seen = data.get("_last_original_obs"), data.get("_last_obs")
     if not isinstance(own, dict) or "buffer_size" not in data:
         return own is not None
-    texts = [part.get(":serialized:", "") if isinstance(part, dict) else "" for part in (own, seen)]
-    return len(texts[0]) != len(texts[1])
+    lengths = [part.get(":serialized:", 0) if isinstance(part, dict) else 0 for part in (own, seen)]
+    return bool(lengths[0] != lengths[1])
 
 
 class _ArchiveReader:
@@ -123,7 +117,7 @@ class _ArchiveReader:
             return PartialPolicy(_ORIGIN + "SAC", layers, "gaussian pair", *rest, log_std_high=2.0)
         limited = "actor.mu.0.weight" in self._tensors
         mean = read_linear_layer(self._tensors, "actor.mu.0" if limited else "actor.mu")
-        limit = float(self._kwargs.get("clip_mean", 2.0)) if limited else 0.0
+        limit = next(iter(_parse_numbers(self._kwargs.get("clip_mean"))), 2.0) if limited else 0.0
         layers = check_layer_chain([*hidden, mean], "actor")
         return PartialPolicy(_ORIGIN + "SAC", layers, "action", *rest, mean_limit=limit)
 
@@ -150,21 +144,6 @@ class _ArchiveReader:
 def _policy_class(data: dict[str, Any]) -> str:
     match = _FUNCTION.search(str(_readable_parts(data, "policy_class").get("__init__", "")))
     return match[1] if match else "a policy of unknown class"
-
-
-def _read_data(archive: ZipArchive) -> dict[str, Any]:
-    content = archive.read("data")
-    if len(content) > _MAX_DATA:
-        raise PolicyError(f"{archive.source}: entry 'data': expected at most {_MAX_DATA >> 20} MiB")
-    try:
-        data = json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise PolicyError(f"{archive.source}: entry 'data': expected JSON: {error}") from error
-    if not isinstance(data, dict):
-        raise PolicyError(
-            f"{archive.source}: entry 'data': expected a JSON object, found {type(data).__name__}"
-        )
-    return data
 
 
 def _check_flat(tensors: Tensors, data: dict[str, Any], source: str) -> None:

@@ -149,7 +149,7 @@ class Policy:
             self._run_network(np.zeros(self.shape))
             recurrent_state.check_recurrent_state(self._initial, self._state)
         except PolicyError as error:
-            raise PolicyError(f"{self.name}: {error}") from error
+            raise type(error)(f"{self.name}: {error}") from error
         except (RuntimeError, TypeError, ValueError, IndexError) as error:
             reason = str(error).strip().split("\n")[0]
             raise PolicyError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import operator
 from collections.abc import Callable
 from typing import Any
@@ -10,6 +9,8 @@ from typing import Any
 import torch
 
 from pdtui.core.errors import PolicyError
+from pdtui.policies.torchscript.forward_pass_budget import ForwardPassBudget
+from pdtui.policies.torchscript.operator_costs import check_operator_cost
 
 _LISTED = """
     linear matmul mm addmm bmm mv addmv einsum conv1d conv2d conv3d _convolution
@@ -29,15 +30,6 @@ _LISTED = """
 """
 TENSOR_OPERATORS = frozenset(_LISTED.split())
 
-_RESIZING_LISTED = """
-    zeros ones full arange scalar_tensor one_hot expand expand_as repeat unflatten
-    conv1d conv2d conv3d _convolution max_pool1d max_pool2d avg_pool1d avg_pool2d adaptive_avg_pool2d
-    adaptive_max_pool2d
-"""
-_RESIZING = frozenset(_RESIZING_LISTED.split())
-"""Operators whose result may exceed the product of their tensors' sizes, since numbers choose its size."""
-MAX_ELEMENTS = 1 << 26
-"""Elements that an operator may create: 256 MiB of float32, far more than a control step needs."""
 _MAX_INTEGER = (1 << 63) - 1
 """TorchScript's integers have 64 bits."""
 
@@ -52,26 +44,36 @@ _ANY = ("__is__", "__isnot__", "__not__", "len", "list", "__contains__")
 _UNARY = ("neg", "__not__", "len", "list")
 
 
-def apply_torch_operator(name: str, arguments: list[Any], keywords: dict[str, Any]) -> Any:
+def apply_torch_operator(
+    name: str, arguments: list[Any], keywords: dict[str, Any], budget: ForwardPassBudget
+) -> Any:
     """Apply TorchScript's operator ``torch.NAME``.
 
-    One that is not listed, cannot be computed, or has too large a result is a `PolicyError`.
+    One that is not listed, cannot be computed, or takes more than the budget of the pass is a `PolicyError`.
     """
     tensors = [one for one in _flatten(arguments) if isinstance(one, torch.Tensor)]
     if name in _PLAIN and (name in _ANY or not tensors):
         return _call_on_numbers(name, arguments)
     if name == "format":
-        return " ".join(str(one)[:80] for one in arguments)
+        return " ".join(str(one)[:80] for one in arguments if isinstance(one, str | int | float))
     if name not in TENSOR_OPERATORS:
         raise PolicyError(f"uses the operator '{name[:80]}', which is not on pdtui's list")
-    if name in _RESIZING or _largest_result(name, tensors) > MAX_ELEMENTS:
-        _check_result_size(name, arguments, keywords)
-    return getattr(torch.ops.aten, name)(*arguments, **keywords)
+    check_operator_cost(name, arguments, keywords, tensors, budget)
+    result = getattr(torch.ops.aten, name)(*arguments, **keywords)
+    results = [one for one in _flatten([result]) if isinstance(one, torch.Tensor)]
+    budget.count_results(results, tensors)
+    return result
 
 
 def _call_on_numbers(name: str, arguments: list[Any]) -> Any:
     if name in ("add", "mul") and not all(isinstance(one, int | float) for one in arguments):
         raise PolicyError(f"uses torch.{name} on something other than numbers and tensors")
+    if name not in _ANY or name == "__contains__":
+        # Comparing lists of lists may take forever.
+        if any(isinstance(one, list | tuple | dict) for one in _flatten(arguments)):
+            raise PolicyError(f"uses torch.{name} on lists in lists")
+        if any(isinstance(one, torch.Tensor) for one in _flatten(arguments)):
+            raise PolicyError(f"uses torch.{name} on lists of tensors")
     try:
         result = _PLAIN[name](*arguments[: 1 if name in _UNARY else 2])
     except (ArithmeticError, TypeError) as error:
@@ -79,32 +81,6 @@ def _call_on_numbers(name: str, arguments: list[Any]) -> Any:
     if isinstance(result, int) and abs(result) > _MAX_INTEGER:
         raise PolicyError(f"torch.{name} gives an integer of more than 64 bits")
     return result
-
-
-def _largest_result(name: str, tensors: list[torch.Tensor]) -> int:
-    """Return an upper bound on the elements of a result whose size no number chooses."""
-    if name == "linear":  # its bound is known; the product would count the weights as well
-        return tensors[0].numel() * tensors[1].shape[0]
-    return math.prod(tensor.numel() for tensor in tensors)
-
-
-def _check_result_size(name: str, arguments: list[Any], keywords: dict[str, Any]) -> None:
-    """Compute only the shape of the result, on PyTorch's meta device, which holds no numbers."""
-    if name == "one_hot":  # its shape may depend on the numbers, which the meta device does not have
-        classes = arguments[1] if len(arguments) > 1 and arguments[1] >= 0 else int(arguments[0].max()) + 1
-        elements = arguments[0].numel() * classes
-    else:
-        on_meta = {"device": "meta"} if name in ("zeros", "ones", "full", "arange", "scalar_tensor") else {}
-        shaped = getattr(torch.ops.aten, name)(*map(_to_meta, arguments), **(keywords | on_meta))
-        elements = max(one.numel() for one in _flatten([shaped]))
-    if elements > MAX_ELEMENTS:
-        raise PolicyError(f"torch.{name} would create {elements} elements, expected at most {MAX_ELEMENTS}")
-
-
-def _to_meta(argument: Any) -> Any:
-    if isinstance(argument, list | tuple):
-        return [_to_meta(one) for one in argument]
-    return argument.to("meta") if isinstance(argument, torch.Tensor) else argument
 
 
 def _flatten(arguments: list[Any]) -> list[Any]:

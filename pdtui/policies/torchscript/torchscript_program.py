@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import copy
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,15 +11,16 @@ import torch
 from torch import nn
 
 from pdtui.core.errors import PolicyError
+from pdtui.policies.foreign.pickle_reader import PickledObject
 from pdtui.policies.runtime.fast_mlp import ACTIVATION_TYPES
-from pdtui.policies.torchscript.pickle_reader import PickledObject
+from pdtui.policies.torchscript.forward_pass_budget import ForwardPassBudget
 from pdtui.policies.torchscript.torchscript_operators import apply_torch_operator
 
 _RECURRENT = ("LSTM", "GRU", "RNN", "LSTMCell", "GRUCell", "RNNCell")
 _UNITS = {*_RECURRENT, *(kind.__name__ for kind in ACTIVATION_TYPES)}
 _CASTS: dict[str, Any] = {"int": int, "float": float, "bool": bool}
-_MOST_STATEMENTS = 20_000
-"""Statements per forward pass, which bounds recursion and time."""
+_FAILURES = (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError)
+"""What code may raise that a file brought along."""
 
 
 class TorchScriptProgram:
@@ -28,8 +30,8 @@ class TorchScriptProgram:
         self.functions: dict[str, ast.FunctionDef] = {}
         self.fields: dict[str, dict[str, Any]] = {}
         self.constants = constants
-        self.statements = 0
-        self._depth = 0
+        self.budget = ForwardPassBudget()
+        self.depth = 0
         for module, text in texts.items():
             try:
                 body = ast.parse(text).body
@@ -54,17 +56,22 @@ class TorchScriptProgram:
         function = self.functions.get(name)
         if function is None:
             raise PolicyError(f"its code has no '{name[:100]}'")
-        names = [parameter.arg for parameter in function.args.args]
-        defaults = function.args.defaults
+        names, defaults = [one.arg for one in function.args.args], function.args.defaults
         values = dict(zip(names[len(names) - len(defaults) :], map(ast.literal_eval, defaults), strict=True))
         values |= dict(zip(names, arguments, strict=False)) | (keywords or {})
-        if self._depth == 0:
-            self.statements = 0
-        self._depth += 1
+        if self.depth == 0:
+            self.budget.begin()
+        self.depth += 1
         try:
             return _StackFrame(self, values).run(function.body)
         finally:
-            self._depth -= 1
+            self.depth -= 1
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> TorchScriptProgram:
+        """Return a program that counts its own passes; the code, which never changes, is shared."""
+        other = memo[id(self)] = copy.copy(self)
+        other.budget, other.constants = ForwardPassBudget(), copy.deepcopy(self.constants, memo)
+        return other
 
 
 class InterpretedModule(nn.Module):
@@ -92,7 +99,14 @@ class InterpretedModule(nn.Module):
     def forward(self, *arguments: Any, method: str = "forward") -> Any:
         if f"{self.kind}.{method}" not in self._program.functions:
             raise PolicyError(f"its class '{self.kind}' has no method '{method}'")
-        return self.run(method, list(arguments))
+        try:
+            return self.run(method, list(arguments))
+        except _FAILURES as error:
+            if self._program.depth:
+                raise
+            shapes = ", ".join(str(tuple(one.shape)) for one in arguments if isinstance(one, torch.Tensor))
+            reason = str(error).strip().partition("\n")[0][:200] or type(error).__name__
+            raise PolicyError(f"its code fails when it is given {shapes}: {reason}") from error
 
     def run(self, method: str, arguments: list[Any], keywords: dict[str, Any] | None = None) -> Any:
         """Run a method of the submodule."""
@@ -110,8 +124,7 @@ class _Function(str):
     """The full name of a function that is held in a variable."""
 
 
-class _Return(Exception):  # noqa: N818 - it carries a value
-    pass
+class _Return(Exception): ...  # noqa: N818 - it carries a value
 
 
 class _StackFrame:
@@ -127,9 +140,7 @@ class _StackFrame:
 
     def _run_block(self, body: list[ast.stmt]) -> None:
         for node in body:
-            self._program.statements += 1
-            if self._program.statements > _MOST_STATEMENTS:
-                raise PolicyError(f"its code runs more than {_MOST_STATEMENTS} statements per step")
+            self._program.budget.count_evaluated_expression()
             match node:
                 case ast.Return():
                     raise _Return(None if node.value is None else self._evaluate(node.value))
@@ -157,6 +168,7 @@ class _StackFrame:
             raise PolicyError("its code changes an attribute, which pdtui does not do for a file")
 
     def _evaluate(self, node: ast.expr) -> Any:  # noqa: PLR0912 - one case per kind of expression
+        self._program.budget.count_evaluated_expression()
         match node:
             case ast.Constant():
                 return node.value
@@ -198,12 +210,14 @@ class _StackFrame:
         keywords = {one.arg: self._evaluate(one.value) for one in node.keywords if one.arg is not None}
         if name == "getattr" and isinstance(arguments[0], InterpretedModule):
             return arguments[0].read(str(arguments[1]))
-        if name in _CASTS:
-            return _CASTS[name](*arguments)
+        if name in _CASTS and isinstance(arguments[0], int | float | torch.Tensor):
+            return _CASTS[name](arguments[0])
         if name.startswith("ops.prim."):
             return _call_primitive(name.removeprefix("ops.prim."), arguments)
         if name.startswith("torch."):
-            return apply_torch_operator(name.removeprefix("torch."), arguments, keywords)
+            return apply_torch_operator(
+                name.removeprefix("torch."), arguments, keywords, self._program.budget
+            )
         held = self._values.get(name)
         if name.startswith("__torch__.") or isinstance(held, _Function):
             return self._program.call(held or name, arguments, keywords)
@@ -215,8 +229,7 @@ class _StackFrame:
                 if method.partition("__")[0] == "forward" and not keywords:
                     return owner(*arguments, method=method)
                 return owner.run(method, arguments, keywords)
-        called = (name or ast.unparse(node.func))[:80]
-        raise PolicyError(f"its code calls '{called}', which pdtui does not do")
+        raise PolicyError(f"its code calls '{ast.unparse(node.func)[:80]}', which pdtui does not do")
 
 
 def _call_primitive(name: str, arguments: list[Any]) -> Any:

@@ -15,7 +15,7 @@ POLICY_FOLDERS_VARIABLE = "PDTUI_POLICY_FOLDERS"
 def find_file_beside(name: str, folders: Sequence[Path]) -> Path | None:
     """Return the path of a file in the working directory or one of the folders, None if it is in none."""
     places = (Path(name), *(folder / name for folder in folders))
-    return next((path for path in places if _is_file(path)), None)
+    return next((path for path in places if is_file(path)), None)
 
 
 def find_file_inside_folders(name: str, folders: Sequence[Path], source: str) -> Path | None:
@@ -46,7 +46,7 @@ def find_file_inside_folders(name: str, folders: Sequence[Path], source: str) ->
             continue
         if not any(real.is_relative_to(folder) for folder in inside):
             outside = True
-        elif _is_file(path):
+        elif is_file(path):
             return path
     if outside:
         raise PolicyError(
@@ -57,7 +57,8 @@ def find_file_inside_folders(name: str, folders: Sequence[Path], source: str) ->
     return None
 
 
-def _is_file(path: Path) -> bool:
+def is_file(path: Path) -> bool:
+    """Return whether there is such a file; a name that no file can have is none."""
     try:
         return path.is_file()
     except OSError:  # the name is too long

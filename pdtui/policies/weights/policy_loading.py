@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.core.errors import PolicyError
+from pdtui.policies.foreign.reader_process import ForeignFile, read_foreign_file
 from pdtui.policies.importers import import_network
 from pdtui.policies.runtime.action_decoders import (
     decode_categorical_action,
@@ -18,7 +19,7 @@ from pdtui.policies.runtime.action_decoders import (
     make_action_decoder,
 )
 from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.torchscript import is_torchscript, read_torchscript
+from pdtui.policies.torchscript import ForwardPassLimitError, build_torchscript
 from pdtui.policies.weights.import_options import (
     NO_NORMALISER,
     NO_OPTIONS,
@@ -43,6 +44,7 @@ def load_policy(
     import_options: ImportOptions = NO_OPTIONS,
     spaces: ObservationActionSpaces | None = None,
     folders: Sequence[Path] = (),
+    found: ForeignFile | None = None,
 ) -> Policy:
     """Load a weights file, or a shipped policy by its name.
 
@@ -55,15 +57,17 @@ def load_policy(
         import_options: Answers to what the file leaves open.
         spaces: The world's spaces, with which the policy's shapes are compared.
         folders: Folders to search besides the working directory.
+        found: Content of the file, if `read_policy_of_another_program` has read it.
 
     Raises:
         PolicyError: There is no such file, or it cannot be read, is for another robot, has other shapes than
             the world, or needs an option.
     """
     path = find_weights_file(str(name), folders)
-    if is_torchscript(path):
-        return load_torchscript_policy(path, spaces, import_options)
-    network, digest = load_any_network(path, import_options, spaces, folders)
+    found = found or read_policy_of_another_program(path)
+    if found is not None and found.form == "torchscript":
+        return load_torchscript_policy(path, found, spaces, import_options)
+    network, digest = load_any_network(path, import_options, spaces, folders, found)
     spec = network.spec
     if robot is not None and spec.robot not in ("", robot):
         raise PolicyError(f"{path}: expected a policy for robot '{robot}', found one for '{spec.robot}'")
@@ -75,23 +79,34 @@ def load_policy(
     )
 
 
+def read_policy_of_another_program(path: Path) -> ForeignFile | None:
+    """Return the content of a file that another program wrote, None for one that pdtui wrote.
+
+    A file that cannot be read is a `PolicyError`.
+    """
+    return None if is_own_format(path) else read_foreign_file(path)
+
+
 def load_any_network(
     path: Path,
     import_options: ImportOptions,
     spaces: ObservationActionSpaces | None,
     folders: Sequence[Path] = (),
+    found: ForeignFile | None = None,
 ) -> tuple[PolicyNetwork, str]:
     """Return the network of a file that pdtui or another program wrote, and its hash.
 
     The hash is the file's SHA-256, combined with the import options if any, since they make another policy.
+    The content of another program's file may be given as `found`.
     """
-    digest = hash_file(path)
-    if is_own_format(path):
+    found = found or read_policy_of_another_program(path)
+    if found is None:
         network = load_network(path)
         _check_agreement(path, network.spec, import_options)
-        return network, digest
+        return network, hash_file(path)
+    digest = found.sha256
     statistics = _find_statistics(path, import_options, folders)
-    network = import_network(path, import_options, spaces, normaliser=statistics)
+    network = import_network(found, import_options, spaces, normaliser=statistics)
     if import_options != NO_OPTIONS:
         statistics_digest = hash_file(statistics) if statistics else ""
         parts = (digest, import_options.activation, import_options.squash, statistics_digest)
@@ -142,7 +157,10 @@ def convert_policy(
 
 
 def load_torchscript_policy(
-    path: Path, spaces: ObservationActionSpaces | None, import_options: ImportOptions = NO_OPTIONS
+    path: Path,
+    found: ForeignFile,
+    spaces: ObservationActionSpaces | None,
+    import_options: ImportOptions = NO_OPTIONS,
 ) -> Policy:
     """Load a TorchScript network, whose output is the action or the logits of discrete actions.
 
@@ -159,15 +177,17 @@ def load_torchscript_policy(
         raise PolicyError(f"{path}: TorchScript states its whole computation; expected no import options")
     shape, outputs = spaces.shape or (spaces.observations,), spaces.discrete_actions or spaces.actions
     decode = decode_categorical_action if spaces.discrete_actions else decode_mean_action
-    build = partial(Policy, read_torchscript(path), shape, name=path.stem, sha256=hash_file(path))
+    build = partial(Policy, build_torchscript(found), shape, name=path.stem, sha256=found.sha256)
     problem = ""
     for batched in (False, True):
         try:
-            found = build(batched=batched).act(np.zeros(shape)).action.size
+            given = build(batched=batched).act(np.zeros(shape)).action.size
+        except ForwardPassLimitError:  # a batch axis would change nothing
+            raise
         except PolicyError as error:
             problem = str(error)
             continue
-        if found == outputs:
+        if given == outputs:
             return build(batched=batched, decode=decode)
-        problem = f"{path}: expected {outputs} outputs for '{spaces.owner}', the network gives {found}"
+        problem = f"{path}: expected {outputs} outputs for '{spaces.owner}', the network gives {given}"
     raise PolicyError(problem)

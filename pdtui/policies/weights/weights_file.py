@@ -6,7 +6,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from hashlib import file_digest
-from os import fstat
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +15,14 @@ from safetensors.torch import save
 
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PolicyError
-from pdtui.core.untrusted_file import open_regular_file
-from pdtui.policies.weights.policy_file_lookup import find_file_beside
+from pdtui.core.untrusted_file import WEIGHTS_BUDGET, open_regular_file
+from pdtui.policies.weights.policy_file_lookup import find_file_beside, is_file
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork, check_tensor_shapes
 
 WEIGHTS = Path(__file__).parent / "shipped"
-MAX_BYTES = 1 << 30
-"""Bytes of a weights file."""
 _KEY = "pdtui"
+_MAX_HEADER = 1 << 20
+"""Bytes of a file's header, which is read at once; that of a network of 100 layers has 20,000."""
 
 
 def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
@@ -34,7 +33,7 @@ def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
     own = find_file_beside(name, folders)
     if own is not None:
         return own
-    if (shipped := WEIGHTS / f"{name}.safetensors").is_file():
+    if is_file(shipped := WEIGHTS / f"{name}.safetensors"):
         return shipped
     known = ", ".join(sorted(path.stem for path in WEIGHTS.glob("*.safetensors"))) or "none"
     raise PolicyError(f"no policy '{name}': neither a file nor a shipped policy; shipped policies: {known}")
@@ -43,17 +42,21 @@ def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
 def is_own_format(path: Path) -> bool:
     """Return whether `save_network` wrote the file: safetensors with pdtui's metadata."""
     try:
-        open_regular_file(path).close()  # refuses pipes, on which opening could wait forever
+        # Refuses pipes, on which opening could wait forever.
+        with open_regular_file(path) as file:
+            start = file.read(9)
+        if start[8:] != b"{" or int.from_bytes(start[:8], "little") > _MAX_HEADER:
+            return False
         with safe_open(str(path), framework="pt") as handle:
             return _KEY in (handle.metadata() or {})
-    except (OSError, SafetensorError):
+    except (OSError, SafetensorError, ValueError):
         return False
 
 
 def hash_file(path: Path) -> str:
-    """Return the SHA-256 of a file as hexadecimal digits; `PolicyError` if it cannot be read."""
+    """Return the SHA-256 of a file of weights as hexadecimal digits; `PolicyError` if it cannot be read."""
     try:
-        with open_regular_file(path) as file:
+        with open_regular_file(path, WEIGHTS_BUDGET.bytes) as file:
             return file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise PolicyError(f"{path}: cannot be read: {error.strerror}") from error
@@ -96,13 +99,10 @@ def load_network(path: Path) -> PolicyNetwork:
 
 def _read_safetensors(path: Path) -> tuple[dict[str, str], dict[str, torch.Tensor]]:
     try:
-        with open_regular_file(path) as file:
-            size = fstat(file.fileno()).st_size
-        if size > MAX_BYTES:
-            limit, found = f"{MAX_BYTES >> 20} MiB", f"{size >> 20} MiB"
-            raise PolicyError(f"{path}: expected weights of at most {limit}, found {found}")
+        open_regular_file(path, WEIGHTS_BUDGET.bytes).close()
         with safe_open(str(path), framework="pt") as handle:
             metadata: dict[str, str] = handle.metadata() or {}
             return metadata, {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118
     except (OSError, SafetensorError, RuntimeError, TypeError, ValueError) as error:
-        raise PolicyError(f"{path}: expected a safetensors file: {error}") from error
+        reason = (isinstance(error, OSError) and error.strerror) or error
+        raise PolicyError(f"{path}: expected a safetensors file: {reason}") from error

@@ -140,7 +140,7 @@ def encode_last_message(payload: bytes, begin: int) -> bytes:
     return _HEADER.pack(LAST, len(payload)) + payload + trailer
 
 
-def split_header(data: bytes | bytearray, place: int) -> RrdMessageSpan:
+def read_span_in_buffer(data: bytes | bytearray, place: int) -> RrdMessageSpan:
     """Return the message whose header is at a place in these bytes, which may end within its payload."""
     kind, length = _HEADER.unpack_from(data, place)
     return RrdMessageSpan(kind, place + HEADER_BYTES, length)

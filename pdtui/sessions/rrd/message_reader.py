@@ -118,10 +118,10 @@ class MessageReader:
             return
         seal = read_message_seal(payload)
         if seal is None:
-            raise SessionError(f"byte {span.begin}: the message has lost its checksum")
+            raise SessionError(f"byte {span.begin}: the message has no checksum, though the others have")
         content = payload[:-SEAL_BYTES]
         if compute_message_checksum(span.kind, span.length, content, seal.link) != seal.checksum:
-            raise SessionError(f"byte {span.begin}: the message does not have its checksum")
+            raise SessionError(f"byte {span.begin}: the message does not match its checksum")
 
     def _check_chain(self, span: RrdMessageSpan, payload: memoryview) -> None:
         seal = read_message_seal(payload) if self.sealed else None

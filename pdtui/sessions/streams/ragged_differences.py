@@ -22,10 +22,10 @@ def find_behavior_difference(
 ) -> StreamDifference | None:
     """Return the first difference of the active behaviors and their controllers; None if there is none."""
     row = _first_unequal_row(
-        (here.behavior_counts, here.behavior_rows, here.behavior_names),
-        (recorded.behavior_counts, recorded.behavior_rows, recorded.behavior_names),
+        (here.behavior_counts, here.behavior_row_indices, here.behavior_names),
+        (recorded.behavior_counts, recorded.behavior_row_indices, recorded.behavior_names),
     )
-    count = _elements_before(here.behavior_rows, row)
+    count = _elements_before(here.behavior_row_indices, row)
     exact = np.array([name in _EXACT_FIELDS for name in ACTIVE_FIELDS])
     a, b = here.behavior_states[:count], recorded.behavior_states[:count]
     wrong = differing_values(a, b, tolerance)
@@ -35,11 +35,13 @@ def find_behavior_difference(
         element, field = divmod(int(wrong.argmax()), len(ACTIVE_FIELDS))
         column = f"'{here.behavior_names[element]}' {ACTIVE_FIELDS[field]}"
         values = (_none_for_nan(block[element, field].item()) for block in (a, b))
-        return StreamDifference(int(here.steps[here.behavior_rows[element]]), "behaviors", column, *values)
+        return StreamDifference(
+            int(here.steps[here.behavior_row_indices[element]]), "behaviors", column, *values
+        )
     if row is None:
         return None
     names = (
-        " + ".join(np.array(one.behavior_names, object)[one.behavior_rows == row]) or "none"
+        " + ".join(np.array(one.behavior_names, object)[one.behavior_row_indices == row]) or "none"
         for one in (here, recorded)
     )
     return StreamDifference(int(here.steps[row]), "behaviors", "", *names)
@@ -50,15 +52,15 @@ def find_stimulation_difference(
 ) -> StreamDifference | None:
     """Return the first difference of the stimulated units and their outputs; None if there is none."""
     row = _first_unequal_row(
-        (here.stimulated_counts, here.stimulated_rows, here.stimulated[:, 0]),
-        (recorded.stimulated_counts, recorded.stimulated_rows, recorded.stimulated[:, 0]),
+        (here.stimulated_counts, here.stimulated_row_indices, here.stimulated[:, 0]),
+        (recorded.stimulated_counts, recorded.stimulated_row_indices, recorded.stimulated[:, 0]),
     )
-    count = _elements_before(here.stimulated_rows, row)
+    count = _elements_before(here.stimulated_row_indices, row)
     a, b = here.stimulated[:count], recorded.stimulated[:count]
     wrong = differing_values(a, b, tolerance)
     if wrong.any():
         element, field = divmod(int(wrong.argmax()), 3)
-        step = int(here.steps[here.stimulated_rows[element]])
+        step = int(here.steps[here.stimulated_row_indices[element]])
         values = a[element, field].item(), b[element, field].item()
         return StreamDifference(
             step, ("", "overwritten", "natural")[field], unit(int(a[element, 0])), *values
@@ -66,7 +68,7 @@ def find_stimulation_difference(
     if row is None:
         return None
     units = (
-        " ".join(unit(int(flat)) for flat in one.stimulated[one.stimulated_rows == row, 0]) or "none"
+        " ".join(unit(int(flat)) for flat in one.stimulated[one.stimulated_row_indices == row, 0]) or "none"
         for one in (here, recorded)
     )
     return StreamDifference(int(here.steps[row]), "stimulated units", "", *units)

@@ -84,12 +84,12 @@ class StepBlock:
         return tuple(tuple(values[start:stop]) for start, stop in _spans(self.stimulated_counts))
 
     @cached_property
-    def behavior_rows(self) -> NDArray[np.int64]:
+    def behavior_row_indices(self) -> NDArray[np.int64]:
         """The row of the block to which each active behavior belongs, shape (sum of the counts,)."""
         return np.repeat(np.arange(len(self)), self.behavior_counts)
 
     @cached_property
-    def stimulated_rows(self) -> NDArray[np.int64]:
+    def stimulated_row_indices(self) -> NDArray[np.int64]:
         """The row of the block to which each stimulated unit belongs, shape (sum of the counts,)."""
         return np.repeat(np.arange(len(self)), self.stimulated_counts)
 

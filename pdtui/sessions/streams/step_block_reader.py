@@ -15,10 +15,10 @@ from pdtui.core.errors import SessionError
 from pdtui.sessions.rrd.chunk_stream import ChunkStream
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
-from pdtui.sessions.session_description import count_control_steps
 from pdtui.sessions.session_header import SessionHeader
+from pdtui.sessions.session_header_decoding import count_control_steps
 from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, REWARD_COST_ACTION, ROBOT, STEP
-from pdtui.sessions.streams.pose_queue import PoseQueue
+from pdtui.sessions.streams.recorded_poses import RecordedPoses
 from pdtui.sessions.streams.step_block import StepBlock
 from pdtui.sessions.streams.step_block_decoding import decode_step_block
 from pdtui.sessions.streams.step_numbers import number_steps
@@ -67,7 +67,7 @@ def read_step_blocks(
     Raises:
         SessionError: the file is damaged, or a control step is missing; the message names the file.
     """
-    queue = PoseQueue(header) if poses and header.info.links else None
+    queue = RecordedPoses(header) if poses and header.info.links else None
     taken = 0
     try:
         for batches, at_end in _cut_blocks(header.path, block_steps, queue):
@@ -89,10 +89,10 @@ def read_step_blocks(
         if header.outcome and taken != header.steps - header.missing:
             raise SessionError(f"expected {header.steps - header.missing} control steps, found {taken}")
         if queue is not None:
-            queue.require_empty()
+            queue.require_all_poses_taken()
 
 
-def _cut_blocks(path: Path, block_steps: int, queue: PoseQueue | None) -> Iterator[tuple[_Batches, bool]]:
+def _cut_blocks(path: Path, block_steps: int, queue: RecordedPoses | None) -> Iterator[tuple[_Batches, bool]]:
     """Yield the batches of each block in file order, and whether the end of the file has been read.
 
     The poses on the way are added to the queue.
@@ -149,7 +149,7 @@ def _merge_batches(batches: _Batches, *, activations: bool) -> _Batches:
 
 
 def _decode(
-    table: EntityTable, header: SessionHeader, activations: bool, queue: PoseQueue | None, at_end: bool
+    table: EntityTable, header: SessionHeader, activations: bool, queue: RecordedPoses | None, at_end: bool
 ) -> StepBlock:
     low, high = (int(table.steps[0]), int(table.steps[-1])) if len(table.steps) else (0, -1)
     ended = [step for step in header.endings if low <= step <= high and step in table.steps]
@@ -159,7 +159,7 @@ def _decode(
     return decode_step_block(table, header.info, activations=activations, **others)
 
 
-def _gather_steps(header: SessionHeader, activations: bool, queue: PoseQueue | None) -> StepBlock:
+def _gather_steps(header: SessionHeader, activations: bool, queue: RecordedPoses | None) -> StepBlock:
     with _named_errors(header.path):
         # First without the large columns: usually, a step is missing.
         count_control_steps(RrdContents(header.path, only=(DIGEST_EPISODE,)).table(DRIVE), header.gaps)

@@ -20,4 +20,4 @@ def describe_step_ranges(ranges: Sequence[tuple[int, int]]) -> str:
     """Return half-open ranges in words, such as ``3 steps: 4, 10 to 11``."""
     count = sum(stop - start for start, stop in ranges)
     named = (str(start) if stop == start + 1 else f"{start} to {stop - 1}" for start, stop in ranges)
-    return f"{count} steps: {', '.join(named)}"
+    return f"{count} {'step' if count == 1 else 'steps'}: {', '.join(named)}"

@@ -16,7 +16,7 @@ from pdtui.sessions.streams.value_differences import StreamDifference, differing
 from pdtui.sessions.viewer.link_shape_poses import VECTOR_LENGTHS, box_links, round_links
 
 
-def find_stream_difference(
+def find_first_stream_difference(
     here: StepBlock, recorded: StepBlock, info: DriveInfo, tolerance: float | None = None
 ) -> StreamDifference | None:
     """Return the first difference between the same control steps of two runs; None if there is none.

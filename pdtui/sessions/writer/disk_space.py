@@ -62,7 +62,7 @@ class DiskReserve:
                 f"a recording needs {filesize.decimal(needed)} to begin"
             )
 
-    def is_short(self, folder: Path, size: int, steps: int, chunks: int) -> bool:
+    def lacks_space(self, folder: Path, size: int, steps: int, chunks: int) -> bool:
         """Return whether there is space only for the rows on their way, the heat map, outcome and index.
 
         The size of a step is estimated from the control steps, and that of the index from the chunks so far,

@@ -14,8 +14,8 @@ import numpy as np
 
 from pdtui.sessions.rrd import message_framing as framing
 from pdtui.sessions.rrd.end_index import encode_end_index
+from pdtui.sessions.rrd.footer_positions import shift_footer_positions
 from pdtui.sessions.rrd.message_checksum import SEAL_BYTES, compute_start_checksum, seal_message
-from pdtui.sessions.rrd.rrd_footer import move_chunks
 from pdtui.sessions.writer.session_file import SessionFile
 
 _PIPE_BYTES = 1 << 20
@@ -54,7 +54,7 @@ class MessagePipe:
         self._thread = threading.Thread(target=self._pass_on, name="pdtui recording", daemon=True)
 
     @property
-    def sink(self) -> str:
+    def writing_path(self) -> str:
         """The path that Rerun shall write to."""
         return f"/dev/fd/{self._writing}"
 
@@ -76,10 +76,10 @@ class MessagePipe:
             if not self.file.created:
                 self.file.create()
 
-    def follow_file(self) -> str:
-        """Find out whether the file was deleted or renamed, as `SessionFile.follow` does."""
+    def follow_renamed_file(self) -> str:
+        """Find out whether the file was deleted or renamed, as `SessionFile.follow_renamed_file` does."""
         with self._lock:
-            return self.file.follow()
+            return self.file.follow_renamed_file()
 
     def close(self) -> None:
         """Wait until Rerun has closed its end of the pipe, and close the file; raise why it is not whole."""
@@ -134,7 +134,7 @@ class MessagePipe:
             parts.append(bytes(received[:place]))
             self._checksum = compute_start_checksum(received[:place])
         while len(received) - place >= framing.HEADER_BYTES:
-            span = framing.split_header(received, place)
+            span = framing.read_span_in_buffer(received, place)
             if span.end > len(received):
                 break
             payload = bytes(memoryview(received)[span.start : span.start + span.length])
@@ -153,7 +153,7 @@ class MessagePipe:
 
     def _encode_last(self, payload: bytes, place: int) -> bytes:
         starts = np.frombuffer(self._starts, np.uint64) if self._starts else np.empty(0, np.uint64)
-        footer = move_chunks(memoryview(payload), starts, SEAL_BYTES)
+        footer = shift_footer_positions(memoryview(payload), starts, SEAL_BYTES)
         if self.end_index is not None:
             index = {**self.end_index, "messages": len(self._starts), "checksum": self._checksum}
             footer += encode_end_index(index)

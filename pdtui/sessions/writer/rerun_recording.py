@@ -46,7 +46,9 @@ class RerunRecording:
             raise SessionError(f"{file.path}: cannot be written: {why}")
         with name_file_in_errors(file.path):
             self._pipe, self._closed = MessagePipe(file), False
-            self.stream.set_sinks(rr.FileSink(self._pipe.sink), default_blueprint=session_blueprint(info))
+            self.stream.set_sinks(
+                rr.FileSink(self._pipe.writing_path), default_blueprint=session_blueprint(info)
+            )
             self._pipe.start()
         # A program that ends without closing its recording leaves all that was recorded.
         atexit.register(self.close)
@@ -71,10 +73,10 @@ class RerunRecording:
         with self.errors_named():
             self._pipe.create_file()
 
-    def follow_file(self) -> str:
-        """Find out whether the file was deleted or renamed, as `SessionFile.follow` does."""
+    def follow_renamed_file(self) -> str:
+        """Find out whether the file was deleted or renamed, as `SessionFile.follow_renamed_file` does."""
         with self.errors_named():
-            return self._pipe.follow_file()
+            return self._pipe.follow_renamed_file()
 
     def flush(self, *, wait: bool = True) -> None:
         """Hand everything to the operating system, so that it outlives this process; or only begin to."""

@@ -1,13 +1,13 @@
-"""The file that a session is written into: created exclusively, locked, and never lost from sight."""
+"""The file of a session: created exclusively, locked, and found again if it is renamed or deleted."""
 
 from __future__ import annotations
 
 import fcntl
 import os
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from itertools import count
 from pathlib import Path
-from typing import Literal, get_args
+from typing import BinaryIO, Literal, get_args
 
 from pdtui.core.errors import SessionError
 
@@ -48,7 +48,7 @@ class SessionFile:
 
     def __init__(self, path: Path, existing: ExistingFile = "refuse", sync: SyncMode = "batch") -> None:
         self.path, self._existing, self._sync = path, existing, sync
-        self._replaced: Path | None = None
+        self._replaced: BinaryIO | None = None
         self._descriptor = -1
         self._waiting = bytearray()
         self._unsynchronised = False
@@ -57,16 +57,15 @@ class SessionFile:
         if os.path.lexists(path):
             if existing == "refuse" or not path.is_file():
                 raise SessionError(f"{path}: already exists; a drive is recorded into a new file")
-            if existing == "replace" and is_being_recorded(path):
-                raise SessionError(f"{path}: cannot be replaced: it is being recorded")
+            if existing == "replace":
+                self._replaced = _lock_file_to_replace(path)
 
     def create(self) -> None:
         """Create the file, and write what was kept in memory; an `OSError` says that it cannot be created."""
-        wanted = self.path
-        if self._existing == "replace" and os.path.lexists(wanted):
-            self._replaced = wanted
-            self.path = wanted.with_name(f"{wanted.stem}.new{wanted.suffix}")
-        self._descriptor, self.path = _create(self.path, numbered=self._existing != "refuse")
+        if self._replaced is not None:
+            self.path = self.path.with_name(f"{self.path.stem}.new{self.path.suffix}")
+        numbered = self._existing == "number" or self._replaced is not None
+        self._descriptor, self.path = _create(self.path, numbered=numbered)
         self.created = True
         waiting, self._waiting = bytes(self._waiting), bytearray()
         self.size = 0
@@ -99,7 +98,7 @@ class SessionFile:
             self._unsynchronised = False
             os.fdatasync(self._descriptor)
 
-    def follow(self) -> str:
+    def follow_renamed_file(self) -> str:
         """Find out whether the file is still where it was, and return one line if it is not.
 
         A file that was renamed is followed. One that was deleted is written again, under a new name, from
@@ -122,13 +121,18 @@ class SessionFile:
 
     def finish(self, *, whole: bool) -> None:
         """Close the file; if it is whole, it replaces the file that it was to replace."""
+        replaced, self._replaced = self._replaced, None
+        with replaced or nullcontext():
+            self._finish(None if replaced is None or not whole else Path(replaced.name))
+
+    def _finish(self, replaced: Path | None) -> None:
         if self._descriptor < 0:
             return
         self._unsynchronised = True
         self.synchronise()
-        if whole and self._replaced is not None:
-            self.path.replace(self._replaced)
-            self.path = self._replaced
+        if replaced is not None:
+            self.path.replace(replaced)
+            self.path = replaced
             self._synchronise_folder()
         os.close(self._descriptor)
         self._descriptor = -1
@@ -172,6 +176,25 @@ def is_being_recorded(path: Path) -> bool:
         return False
     finally:
         os.close(descriptor)
+
+
+def _lock_file_to_replace(path: Path) -> BinaryIO:
+    """Open and lock a file so that no other recording can replace it until it is closed."""
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be replaced: {error.strerror}") from error
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        there = path.stat()
+        if (there.st_dev, there.st_ino) == (os.fstat(file.fileno()).st_dev, os.fstat(file.fileno()).st_ino):
+            return file
+    except (BlockingIOError, FileNotFoundError):
+        pass
+    except OSError:  # the file system has no locks
+        return file
+    file.close()
+    raise SessionError(f"{path}: cannot be replaced: it is being recorded")
 
 
 def _create(path: Path, *, numbered: bool) -> tuple[int, Path]:

@@ -16,7 +16,7 @@ from pdtui.core.errors import RecordingEnded, SessionError
 from pdtui.core.step_record import StepRecord
 from pdtui.sessions.drive_info import DriveInfo, encode_drive_info
 from pdtui.sessions.environment_versions import collect_versions
-from pdtui.sessions.session_index import encode_session_index
+from pdtui.sessions.session_header_index import build_session_index
 from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
 from pdtui.sessions.session_summary import SessionSummaryCounter
 from pdtui.sessions.viewer.session_blueprint import session_blueprint
@@ -178,7 +178,7 @@ class SessionRecorder:
         self._outputs.send_properties(VERSIONS, self._versions)
 
     def _end_index(self, outcome: str) -> dict[str, Any]:
-        return encode_session_index(
+        return build_session_index(
             encode_drive_info(self.info, self._created),
             self._versions,
             steps=self._steps,
@@ -189,8 +189,10 @@ class SessionRecorder:
         )
 
     def _require_space(self) -> None:
-        self.notice = self._recording.follow_file() or self.notice  # also if it was deleted with its folder
-        if self._reserve.is_short(self.path.parent, self.bytes, self._steps, self._outputs.chunks):
+        self.notice = (
+            self._recording.follow_renamed_file() or self.notice
+        )  # also if it was deleted with its folder
+        if self._reserve.lacks_space(self.path.parent, self.bytes, self._steps, self._outputs.chunks):
             self.close(f"the disk is full: {self._steps} steps were recorded")
             closed = f"{self.path} was closed in time and is complete"
             raise RecordingEnded(f"the disk is full; {closed}: {self._steps} steps")
@@ -199,8 +201,6 @@ class SessionRecorder:
         records, self._rows = self._rows, []
         if not records:
             return
-        if not self._recording.created:
-            self._recording.create_file()
         self._write_events(records)
         self._count(records)
         steps = [record.step for record in records]
@@ -211,6 +211,9 @@ class SessionRecorder:
             self._viewer_data.write()
         if steps[0] < _DESCRIBED_AGAIN <= steps[-1] + 1:
             self._describe_drive()  # a second copy, in case the first is damaged
+        if not self._recording.created:
+            self._flush_rows()  # so that the first steps are in what the new file is created with
+            self._recording.create_file()
 
     def _count(self, records: Sequence[StepRecord]) -> None:
         self._summary.add(

@@ -255,12 +255,12 @@ FILES: dict[str, tuple[Callable[[], bytes], str]] = {
     "torch with code": (lambda: torch_file({"w": Evil()}), r"objects other than tensors.*print"),
     "whole module": (lambda: torch_file(mlp(2, 2, 2)), r"objects other than tensors.*Sequential"),
     "npz with code": (lambda: npz(w=np.array([Evil()])), r"'w\.npy': holds Python objects"),
-    "bomb": (bomb, r"at most .* 1024 MiB in all; the zip would unpack to 1 entries of 2048 MiB"),
+    "bomb": (bomb, r"at most .* 64 MiB in all; the zip would unpack to 1 entries of 2048 MiB"),
     "lying bomb": (lying_bomb, r"entry 'w\.npy'"),
     "absurd shape": (absurd, r"shape \(1000000, 1000000\) of float32 takes 4000000000000 bytes, found 64"),
     "absurd stride": (
         lambda: torch_file({"0.weight": torch.zeros(1).expand(10**6, 10**6)}),
-        r"tensor '0\.weight': shape \(1000000, 1000000\) claims more numbers than are stored",
+        r"a tensor of shape \(1000000, 1000000\) claims more numbers than are stored",
     ),
     "compressed torch": (
         lambda: zipped(archive__data_dot_pkl=b"\x80\x02}.", archive__version=b"3"),

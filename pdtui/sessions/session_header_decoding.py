@@ -15,8 +15,9 @@ from pdtui.sessions.drive_info import decode_drive_info
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_header import SessionHeader, count_missing
-from pdtui.sessions.session_index import decode_event, decode_gaps
+from pdtui.sessions.session_header_index import decode_event, decode_gaps
 from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, REPAIR, VERSIONS
+from pdtui.sessions.streams.step_numbers import number_steps
 
 
 def scan_session_header(path: Path) -> SessionHeader:
@@ -27,12 +28,12 @@ def scan_session_header(path: Path) -> SessionHeader:
     """
     file = RrdContents(path, entities=(EVENTS, ENDINGS))
     try:
-        return decode_header(file, path, file.skipped_rows[DRIVE])
+        return decode_session_header(file, path, file.skipped_rows[DRIVE])
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error
 
 
-def decode_header(file: RrdContents, path: Path, rows: int) -> SessionHeader:
+def decode_session_header(file: RrdContents, path: Path, rows: int) -> SessionHeader:
     """Return the header of a session of which properties, events and endings were read.
 
     `rows` is the number of control steps that are there.
@@ -41,26 +42,26 @@ def decode_header(file: RrdContents, path: Path, rows: int) -> SessionHeader:
     versions = {name: str(values[0]) for name, values in file.properties(VERSIONS).items() if values}
     gaps = read_gaps(file)
     events = read_events(file.table(EVENTS), complete=not file.properties(REPAIR))
-    endings, outcome = read_endings(file.table(ENDINGS)), read_drive_outcome(file)
+    endings, outcome = read_episode_endings(file.table(ENDINGS)), read_drive_outcome(file)
     steps = rows + count_missing(gaps)
     return SessionHeader(path, info, versions, created, events, steps, endings, outcome, gaps)
 
 
-def find_gaps(steps: NDArray[np.int64]) -> tuple[tuple[int, int], ...]:
-    """Return the ranges of control steps that are missing before and between these, which are in order."""
-    before = np.concatenate([[-1], steps])[: len(steps)]
-    places = np.flatnonzero(steps - before > 1)
-    return tuple((int(before[place]) + 1, int(steps[place])) for place in places)
+def find_gaps(steps: NDArray[np.int64], total: int = 0) -> tuple[tuple[int, int], ...]:
+    """Return the ranges of control steps that are missing before, between and after these.
+
+    The steps are in order; `total` is the number of steps that there were, if it is known.
+    """
+    before, after = np.concatenate([[-1], steps]), np.concatenate([steps, [total]])
+    places = np.flatnonzero(after - before > 1)
+    return tuple((int(before[place]) + 1, int(after[place])) for place in places)
 
 
 def count_control_steps(drive: EntityTable, gaps: Sequence[tuple[int, int]] = ()) -> int:
     """Count the control steps that are there; one that is missing, except in gaps, is a `SessionError`."""
     steps = drive.steps
-    expected = np.arange(len(steps) + count_missing(gaps))
-    for first, end in reversed(gaps):
-        expected = np.delete(expected, slice(first, end))
-    expected = expected[: len(steps)]
-    wrong = np.flatnonzero(steps[: len(expected)] != expected)
+    expected = number_steps(0, len(steps), gaps)
+    wrong = np.flatnonzero(steps != expected)
     if wrong.size:
         raise SessionError(f"expected control step {expected[wrong[0]]}, found step {steps[wrong[0]]}")
     return len(steps)
@@ -94,7 +95,7 @@ def read_events(table: EntityTable, *, complete: bool = True) -> tuple[DriveEven
         raise SessionError(f"an event is damaged: {error}") from error
 
 
-def read_endings(table: EntityTable) -> dict[int, str]:
+def read_episode_endings(table: EntityTable) -> dict[int, str]:
     if not len(table.steps):
         return {}
     return dict(zip(table.steps.tolist(), table.read_texts("TextLog:text"), strict=True))

@@ -30,7 +30,7 @@ _Change = Callable[[memoryview], bytes]
 _OFFSETS, _SIZES = "chunk_byte_offset", "chunk_byte_size"
 
 
-def move_chunks(footer: memoryview, starts: NDArray[np.uint64], longer: int) -> bytes:
+def shift_footer_positions(footer: memoryview, starts: NDArray[np.uint64], longer: int) -> bytes:
     """Return the payload of a footer for a file in which each message is `longer` by so many bytes.
 
     Args:
@@ -71,7 +71,7 @@ def _move_table(table: dict[int, Value], starts: NDArray[np.uint64], longer: int
     def column(name: str) -> NDArray[np.uint64]:
         array = batch.column(name)
         if array.type != pa.uint64() or array.null_count:
-            raise ValueError(f"the file's index has another column '{name}' than expected")
+            raise ValueError(f"the file's index: column '{name}' is not of the expected type")
         data = array.buffers()[1]
         place = data.address - buffer.address + 8 * array.offset
         return np.frombuffer(changed, np.uint64, batch.num_rows, place)
@@ -79,7 +79,7 @@ def _move_table(table: dict[int, Value], starts: NDArray[np.uint64], longer: int
     offsets = column(_OFFSETS)
     numbers = np.searchsorted(starts, offsets)
     if len(offsets) and (numbers.max() >= len(starts) or (starts[numbers] != offsets).any()):
-        raise ValueError("the file's index names places where no message begins")
+        raise ValueError("the file's index points to bytes at which no message begins")
     offsets += np.uint64(longer) * numbers.astype(np.uint64)
     column(_SIZES)[:] += np.uint64(longer)
     packed = pa.compress(buffer, codec=_CODEC, asbytes=True) if compressed else bytes(changed)

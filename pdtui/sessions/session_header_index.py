@@ -15,7 +15,7 @@ from pdtui.sessions.drive_info import decode_drive_info
 _MAX_STEPS = 1 << 40
 
 
-def encode_session_index(
+def build_session_index(
     drive: Mapping[str, Any],
     versions: Mapping[str, str],
     *,

@@ -15,7 +15,7 @@ _KEPT_STEPS = 4096
 
 
 @dataclass(frozen=True)
-class ReplayDeviation:
+class AttributeDeviation:
     """How much an attribute deviates between two runs, in its unit.
 
     Attributes:
@@ -51,7 +51,7 @@ def absolute_attribute_differences(a: Floats, b: Floats, attributes: Sequence[At
     return np.where(np.isnan(change), np.inf, change)
 
 
-class AttributeDeviationCounter:
+class RunDeviationCounter:
     """Counts, block by block, how far the attributes of two runs are apart from the first difference on.
 
     Args:
@@ -110,7 +110,7 @@ class AttributeDeviationCounter:
                 return row
         return self._rows
 
-    def summarise(self) -> tuple[ReplayDeviation, ...]:
+    def summarise(self) -> tuple[AttributeDeviation, ...]:
         """Return the attributes that deviate, ordered from worst to best by spreads in the first step."""
         if not self._rows:
             return ()
@@ -119,5 +119,5 @@ class AttributeDeviationCounter:
         found = []
         for j in order[self._largest[order] > 0]:
             numbers = float(first[j]), float(self._largest[j]), float(mean[j]), int(self._worst[j])
-            found.append(ReplayDeviation(self._attributes[j].name, self._attributes[j].unit, *numbers))
+            found.append(AttributeDeviation(self._attributes[j].name, self._attributes[j].unit, *numbers))
         return tuple(found)

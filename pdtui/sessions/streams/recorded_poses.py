@@ -17,7 +17,7 @@ from pdtui.sessions.viewer.link_shape_poses import VECTOR_LENGTHS, box_links, ro
 Poses = dict[str, NDArray[np.float32]]
 
 
-class PoseQueue:
+class RecordedPoses:
     """Keeps poses that were read until their control steps are taken.
 
     Args:
@@ -25,7 +25,7 @@ class PoseQueue:
     """
 
     def __init__(self, header: SessionHeader) -> None:
-        self._path, links = header.path, header.info.links
+        self._path, self._gaps, links = header.path, header.gaps, header.info.links
         self._shapes = {"Capsules3D": len(round_links(links)), "Boxes3D": len(box_links(links))}
         self._batches: list[pa.RecordBatch] = []
         self._newest = self._taken = -1
@@ -37,7 +37,7 @@ class PoseQueue:
             return
         batch = _select_columns(batch)
         steps = EntityTable(ROBOT, [batch]).steps
-        self._batches.append(batch)
+        self._batches.append(self._drop_gaps(batch))
         self._newest = int(steps[-1])
         if steps[0] <= self._taken:
             raise SessionError(f"the poses of step {steps[0]} come too late in the file")
@@ -49,7 +49,8 @@ class PoseQueue:
             if STEP in chunk.timelines and chunk.entity == ROBOT and chunk.batch.num_rows:
                 batch = _select_columns(chunk.batch)
                 EntityTable(ROBOT, [batch])  # checks the numbers of the steps
-                self._batches.append(batch.filter(pc.greater(batch.column(STEP), self._taken)))
+                later = batch.filter(pc.greater(batch.column(STEP), self._taken))
+                self._batches.append(self._drop_gaps(later))
         self._gathered = True
 
     def take(self, first: int, last: int, *, at_end: bool) -> tuple[NDArray[np.int64], Poses]:
@@ -77,10 +78,18 @@ class PoseQueue:
             if (width := self._shapes[name.partition(":")[0]])
         }
 
-    def require_empty(self) -> None:
+    def require_all_poses_taken(self) -> None:
         """Check that all poses were taken; those of steps beyond the last are a `SessionError`."""
         for batch in self._batches:
-            raise SessionError(f"poses of step {batch.column(STEP)[0]}, which is not recorded")
+            if batch.num_rows:
+                raise SessionError(f"poses of step {batch.column(STEP)[0]}, which is not recorded")
+
+    def _drop_gaps(self, batch: pa.RecordBatch) -> pa.RecordBatch:
+        """Leave out the poses of steps that a repair could not rescue, of which only the poses survive."""
+        for first, end in self._gaps:
+            steps = batch.column(STEP)
+            batch = batch.filter(pc.or_(pc.less(steps, first), pc.greater_equal(steps, end)))
+        return batch
 
 
 def _select_columns(batch: pa.RecordBatch) -> pa.RecordBatch:

@@ -14,7 +14,7 @@ _READ_AT_ONCE = 128
 """Control steps per block. Reading a large block would delay the next control step visibly."""
 
 
-class WatchedSession:
+class StepByStepComparison:
     """Compares control steps one by one, in all streams.
 
     Args:
