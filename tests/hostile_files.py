@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -70,8 +71,9 @@ def run_pdtui(arguments: tuple[str, ...], patience: float = 300.0, prefix: tuple
         begin = time.monotonic()
         command = [*prefix, sys.executable, "-m", "pdtui", *arguments]
         child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors)
-        status = 0
+        status = memory = 0
         while not (ended := os.wait4(child.pid, os.WNOHANG))[0]:
+            memory = max(memory, _peak_memory(child.pid))
             if time.monotonic() - begin > patience:
                 child.kill()
             time.sleep(0.01)
@@ -80,7 +82,21 @@ def run_pdtui(arguments: tuple[str, ...], patience: float = 300.0, prefix: tuple
         seconds = time.monotonic() - begin
         errors.seek(0)
         text = errors.read().decode("utf-8", "replace")
-    return Reading(child.returncode, text, used.ru_maxrss * 1024, seconds, used.ru_utime + used.ru_stime)
+    return Reading(child.returncode, text, memory, seconds, used.ru_utime + used.ru_stime)
+
+
+def _peak_memory(pid: int) -> int:
+    """Return the peak memory of a process and its children, the larger, so far; bytes.
+
+    `getrusage` would count what this process had when it started the other.
+    """
+    peaks = [0]
+    with suppress(OSError):
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        for one in (str(pid), *children):
+            lines = Path(f"/proc/{one}/status").read_text().splitlines()
+            peaks += [int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM")]
+    return max(peaks)
 
 
 SB3_DATA = b'{"policy_class": {"__module__": "stable_baselines3.x"}, "clip_range": 1}'
