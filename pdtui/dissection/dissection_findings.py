@@ -73,7 +73,7 @@ def _not_found(summary: dict[str, Any]) -> list[str]:
                 lines.append(
                     f"{attribute['name']}: {one['unit']} held at {one['value']:g} changes it by "
                     f"{one['effect']:+.2g} at first, but by {one['held']['effect']:+.2g} when it is held for "
-                    "long, which is not confirmed: a passing change."
+                    "long: a passing change."
                 )
     lost = [one["name"] for one in summary["behaviors"] if not one["reached"]]
     if lost:

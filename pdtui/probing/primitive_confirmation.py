@@ -14,6 +14,9 @@ from pdtui.probing.null_distributions import correct_for_comparisons, random_uni
 from pdtui.probing.unit_selection import PrimitiveCandidate
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
+LASTING = 0.5
+"""Share of an effect on a rate that has to be left late in a long roll-out."""
+
 
 @dataclass(frozen=True)
 class EffectVerdict:
@@ -66,9 +69,17 @@ class PrimitiveConfirmation:
     held: EffectVerdict | None = None
 
     @property
+    def lasts(self) -> bool:
+        """Whether the long roll-out still shows `LASTING` of the effect; also if there was none."""
+        if self.held is None:
+            return True
+        left = abs(self.held.measured.effect) >= LASTING * abs(self.verdict.measured.effect)
+        return self.held.confirmed and left
+
+    @property
     def confirmed(self) -> bool:
         """Whether the effect is more than chance, and lasts where that was measured."""
-        return self.verdict.confirmed and (self.held is None or self.held.confirmed)
+        return self.verdict.confirmed and self.lasts
 
 
 def judge_effects(

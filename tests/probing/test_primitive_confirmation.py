@@ -174,6 +174,8 @@ def test_an_effect_that_passes_is_no_primitive() -> None:
     gone: EffectVerdict = replace(first.verdict, corrected_p=0.4)
     assert not replace(first, held=gone).confirmed
     assert replace(first, held=first.verdict).confirmed
+    little = replace(first.verdict, measured=replace(first.verdict.measured, effect=0.8))
+    assert not replace(first, held=little).confirmed
 
 
 def _ceiling(spread: float) -> float:
