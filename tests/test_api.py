@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +95,8 @@ def test_a_recorded_drive_of_a_live_network_replays_bit_for_bit_with_a_rewind(
 def test_a_live_network_is_dissected(world: object) -> None:
     assert callable(world)
     robot, policy, _ = world()
-    found = pdtui.dissect(robot, policy, episodes=2, settings=pdtui.QUICK_DISSECTION)
+    settings = replace(pdtui.QUICK_DISSECTION, controls=8, judge_starts=3, held_steps=60)
+    found = pdtui.dissect(robot, policy, episodes=2, settings=settings)
     assert found.screen.effects.shape[:2] == (policy.units, 2)
     assert np.abs(np.nan_to_num(found.screen.effects)).max() > 0
     assert repr(found).startswith(f"<Dissection of {policy.name} on {robot.name}: {policy.units} units")

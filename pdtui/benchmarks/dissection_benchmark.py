@@ -156,7 +156,7 @@ def bench_dissection(
 def measure_probing_rate(one: RolloutPool, two: RolloutPool, settings: DissectionBenchmarkSettings) -> Floats:
     """Return stimulated control steps per second with one and two workers, in turn, shape (rounds, 2)."""
     rng = np.random.default_rng(0)
-    starts = collect_start_states(one.robot, one.policy, 1100, 2, at=50, survive=settings.probe_steps)
+    starts = collect_start_states(one.robot, one.policy, 1100, 2, at=50)
     jobs: list[RolloutJob] = [
         (Stimulation((int(rng.integers(one.policy.units)),), (float(rng.normal(0, 3)),)), number % 2)
         for number in range(settings.probes)

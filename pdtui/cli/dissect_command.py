@@ -63,6 +63,12 @@ from pdtui.cli.shared_options import (
     help="File of the report for the Rerun viewer; default: the map's name with .rrd.",
 )
 @click.option("--figures", type=FILE_PATH, metavar="FOLDER", help="Also draw figures as PNG files.")
+@click.option(
+    "--null",
+    is_flag=True,
+    help="Test the dissection itself: choose and judge where nothing is to be found, and count what is "
+    "confirmed. Writes no file.",
+)
 @overwrite_option
 @click.option(
     "--start-from",
@@ -80,6 +86,7 @@ def dissect_command(
     quick: bool,
     report: Path | None,
     figures: Path | None,
+    null: bool,
     overwrite: bool,
     budget: float | None,
     as_json: bool,
@@ -89,8 +96,9 @@ def dissect_command(
 
     An interrupted dissection continues where it stopped when the same command is run again.
     """
-    from pdtui.dissection.dissect_into_map import dissect_into_map
+    from pdtui.dissection.dissect_into_map import WrittenDissection, dissect_into_map
     from pdtui.dissection.dissection_config import QUICK_DISSECTION, DissectionConfig, DissectionSettings
+    from pdtui.dissection.null_dissection import NullDissection, dissect_null
     from pdtui.pictures.dissection_report import PictureOutputs
     from pdtui.robots import resolve_robot_name, robot_file_stem, trust_module
 
@@ -101,7 +109,8 @@ def dissect_command(
     resolve_robot_name(name)
     output = output or Path("maps") / f"{robot_file_stem(name)}-dissected.toml"
     outputs = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite)
-    outputs.check()
+    if not null:
+        outputs.check()
     with progress_bar("dissecting", quiet=as_json) as advance:
 
         def show_progress(stage: str, done: int, total: int) -> None:
@@ -116,7 +125,11 @@ def dissect_command(
             progress=show_progress,
             **settings,
         )
-        result = dissect_into_map(config, output, overwrite=overwrite, draw=outputs.draw)
+        result: NullDissection | WrittenDissection
+        if null:
+            result = dissect_null(config)
+        else:
+            result = dissect_into_map(config, output, overwrite=overwrite, draw=outputs.draw)
     print_result(result.as_dict(), as_json, result.table)
-    if not as_json:
+    if isinstance(result, WrittenDissection) and not as_json:
         click.echo(f"wrote {', '.join(map(str, result.pictures))}")

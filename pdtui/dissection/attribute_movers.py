@@ -12,14 +12,18 @@ from pdtui.core.confidence_intervals import bootstrap_interval
 from pdtui.core.units import Stimulation
 from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.dissection_config import DissectionSettings
-from pdtui.probing.effect_probe import EffectProbe, PlanEffects, UnitEffects
-from pdtui.probing.primitive_confirmation import exceeds_random_units
+from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.measured_effects import PlanEffects, UnitEffects
+from pdtui.probing.primitive_confirmation import judge_effects
 from pdtui.probing.start_states import StartState
+from pdtui.probing.unit_selection import exceeds_random_units
 from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
 _KEPT = 0.7
 """Share of the main effect that a second unit has to keep, and share of the side effects that it may keep."""
+_MAX_FALLS = 0.2
+"""Largest share of the judging starts from which the robot may fall."""
 _SAME = 0.99
 """Correlation at which two attributes show the same."""
 
@@ -89,7 +93,8 @@ def find_attribute_movers(
     spread: Floats,
     screen: UnitEffects,
     refined: UnitEffects,
-    starts: Sequence[StartState],
+    choosing: Sequence[StartState],
+    judging: Sequence[StartState],
     settings: DissectionSettings,
     progress: StepProgress | None = None,
 ) -> tuple[AttributeMover, ...]:
@@ -97,14 +102,15 @@ def find_attribute_movers(
 
     Effects are means over the last two thirds of roll-outs that are much longer than those of the sweeps. A
     unit that only shifts the phase of the gait moves an attribute for half a stride, and then not at all.
+    What is returned is confirmed together, by flips of signs at the level of the dissection.
 
     Args:
         columns: Columns of the attributes. Their side effects count, too.
         spread: Standard deviation of every attribute, shape (J,).
-        starts: Starts that neither sweep used. The first half chooses units, the other half measures them.
+        choosing, judging: Starts that neither sweep used: those that choose units, and those that judge them.
     """
-    found = []
-    half, steps = len(starts) // 2, settings.mover_steps
+    found = list[AttributeMover]()
+    samples, steps = list[Floats](), settings.mover_steps
     asked = [(column, sign) for column in columns for sign in (1, -1)]
 
     def probe(plans: Sequence[Stimulation], some: Sequence[StartState]) -> PlanEffects:
@@ -112,19 +118,30 @@ def find_attribute_movers(
 
     for done, (column, sign) in enumerate(asked, start=1):
         singles = _singles(column, sign, screen, refined, settings.mover_singles)
-        lasting = _lasting(probe(singles, starts[:half]), column, sign) if singles else None
+        lasting = _lasting(probe(singles, choosing), column, sign) if singles else None
         if lasting is not None:
             single = singles[lasting]
             pairs = _cancelling(single, column, sign, columns, spread, refined)[: settings.mover_pairs]
             plans = [single, *pairs]
-            best = _choose(probe(plans, starts[:half]), column, sign, columns, spread) if pairs else 0
+            best = _choose(probe(plans, choosing), column, sign, columns, spread) if pairs else 0
             chosen = [single] if best == 0 else [plans[best], single]
-            one = _describe(probe(chosen, starts[half:]), chosen, column, sign, columns, spread)
-            if one is not None:
-                found.append(one)
+            result = probe(chosen, judging)
+            samples.append(result.counted_effects()[0, :, column])
+            found.append(_describe(result, samples[-1], chosen, column, sign, columns, spread))
         if progress is not None:
             progress(done, len(asked))
-    return tuple(found)
+    verdicts = judge_effects(
+        np.array(samples),
+        [one.sign for one in found],
+        None,
+        [max(one.stimulation.values, key=abs) for one in found],
+        [one.measured.falls or 0 for one in found],
+        settings.level,
+        seed=None,
+    )
+    upright = [(one.measured.falls or 0) <= _MAX_FALLS * len(judging) for one in found]
+    kept = zip(found, verdicts, upright, strict=True)
+    return tuple(one for one, verdict, up in kept if verdict.confirmed and up)
 
 
 def _singles(
@@ -201,17 +218,16 @@ def _choose(result: PlanEffects, column: int, sign: int, columns: Sequence[int],
 
 def _describe(
     result: PlanEffects,
+    samples: Floats,
     chosen: Sequence[Stimulation],
     column: int,
     sign: int,
     columns: Sequence[int],
     spread: Floats,
-) -> AttributeMover | None:
-    samples, falls = result.effects[0, :, column], result.falls[0]
+) -> AttributeMover:
+    falls = result.falls[0]
     low, high = bootstrap_interval(samples, 0)
-    if not (sign * low > 0 and sign * high > 0) or falls.mean() > 0.2:
-        return None
     main, side = _parts(result, 0, column, sign, columns, spread)
     alone = None if len(chosen) == 1 else _parts(result, 1, column, sign, columns, spread)[1]
-    measured = MeasuredEffect(float(np.nanmean(samples)), low, high, int(falls.sum()), len(falls))
+    measured = MeasuredEffect(float(samples.mean()), low, high, int(falls.sum()), len(falls))
     return AttributeMover(column, sign, chosen[0], measured, side, main, alone)

@@ -6,29 +6,30 @@ import json
 import time
 from contextlib import ExitStack
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from torch import nn
 
-from pdtui.core.errors import RobotError
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_attribute_columns
-from pdtui.dissection.dissection_config import DissectionConfig, DissectionSettings
+from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.dissection.dissection_result import Dissection, pick_sample_episode
 from pdtui.dissection.dissection_searches import DissectionSearches
+from pdtui.dissection.primitive_judging import judge_primitives, measure_own_range
+from pdtui.dissection.probe_starts import gather_probe_starts
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.effect_probe import EffectProbe
-from pdtui.probing.primitive_confirmation import sample_control_units, select_units_to_refine
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.probing.rollout_pool import RolloutPool
-from pdtui.probing.start_states import StartState, collect_start_states, measure_walk_lengths
+from pdtui.probing.unit_selection import (
+    choose_primitive_candidates,
+    sample_control_units,
+    select_units_to_refine,
+)
 from pdtui.robots import open_robot
-from pdtui.search.behavior_search import SearchStartStates
 from pdtui.search.plan_search import SharedTimeBudget
 from pdtui.sessions.environment_versions import collect_versions
 from pdtui.spectra.episode_monitor import monitor_episodes
@@ -38,28 +39,6 @@ from pdtui.spectra.phase_correlation import correlate_phases
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stimulation_map import StimulationMap
-
-_SHORTEST = 24
-"""Control steps of the longest roll-out, below which dissecting is refused."""
-_MORE = 4
-"""Walks that are tried for each start state that is needed."""
-
-
-class ProbeStarts(NamedTuple):
-    """Start states for each stage of a dissection. No walk serves two stages.
-
-    Attributes:
-        screen, refine: Starts of the sweeps.
-        searches: Starts of everything after them.
-        settings: Those asked for, with roll-outs as short as the walks require.
-        shortened: A sentence on what was shortened; empty if nothing was.
-    """
-
-    screen: tuple[StartState, ...]
-    refine: tuple[StartState, ...]
-    searches: SearchStartStates
-    settings: DissectionSettings
-    shortened: str
 
 
 def dissect(config: DissectionConfig) -> Dissection:
@@ -95,6 +74,7 @@ def dissect(config: DissectionConfig) -> Dissection:
         episodes = monitor_episodes(
             robot, network, range(seed, seed + config.episodes), settings.steps, stage("monitor")
         )
+        columns = range(len(robot.attributes))
         matching = match_units(episodes, robot.attributes, preset)
         phase = correlate_phases(episodes, robot.attributes, preset)
         starts = gather_probe_starts(pool, settings, seed + 100)
@@ -106,19 +86,39 @@ def dissect(config: DissectionConfig) -> Dissection:
             steps=settings.screen_steps,
             progress=stage("screen every unit"),
         )
-        chosen = select_units_to_refine(screen, matching, range(len(robot.attributes)), settings.refine_keep)
-        controls = sample_control_units(screen, settings.controls, seed)
+        chosen = select_units_to_refine(screen, matching, columns, settings.refine_keep)
         refined = prober.measure_units(
-            sorted({*chosen, *controls}),
+            chosen,
             settings.refine_values,
             starts.refine,
             steps=settings.refine_steps,
             progress=stage("refine the best"),
         )
+        judgement = judge_primitives(
+            prober,
+            robot.attributes,
+            choose_primitive_candidates(
+                refined, matching, columns, settings.screen_values, settings.judge_keep
+            ),
+            sample_control_units(screen.units, settings.controls, seed),
+            measure_own_range(episodes),
+            starts.judge,
+            settings,
+            seed,
+            stage("judge"),
+        )
         spread = np.concatenate([episode.attributes for episode in episodes]).std(axis=0)
-        columns = movable_attribute_columns(robot.attributes, episodes)
+        movable = movable_attribute_columns(robot.attributes, episodes)
         movers = find_attribute_movers(
-            prober, columns, spread, screen, refined, starts.searches.held_out, settings, stage("up and down")
+            prober,
+            movable,
+            spread,
+            screen,
+            refined,
+            starts.searches.selection,
+            starts.searches.held_out,
+            settings,
+            stage("up and down"),
         )
         searches = DissectionSearches(
             prober, robot, settings, seed, SharedTimeBudget(config.budget_minutes, began), stage, known
@@ -139,9 +139,9 @@ def dissect(config: DissectionConfig) -> Dissection:
             sample_episode=pick_sample_episode(episodes, robot.attributes, matching, preset),
             screen=screen,
             refined=refined,
-            controls=controls,
+            judgement=judgement,
             spread=spread,
-            movable=tuple(columns),
+            movable=tuple(movable),
             attribute_movers=movers,
             behaviors=behaviors,
             controllers=controllers,
@@ -163,44 +163,3 @@ def _fixed_behaviors(stimulation_map: StimulationMap, policy: Policy) -> tuple[S
     fixed = [one for one in stimulation_map.behaviors.values() if one.pid is None]
     units = [stimulation_map.units_of(one).items() for one in fixed]
     return tuple(Stimulation.of({parse_unit(unit, policy.layers): v for unit, v in one}) for one in units)
-
-
-def gather_probe_starts(pool: RolloutPool, settings: DissectionSettings, first_seed: int) -> ProbeStarts:
-    """Take one start state from each of several walks that last as long as the longest roll-out from there.
-
-    If too few walks do (a hopper may fall after two seconds), starts and roll-outs are shortened: what a unit
-    does within a second is still worth knowing.
-
-    Raises:
-        RobotError: The walks are too short even for that.
-    """
-    counts = (
-        settings.screen_starts,
-        settings.refine_starts,
-        settings.search_starts,
-        settings.selection_starts,
-        settings.held_out_starts,
-    )
-    total, wanted, shortened = sum(counts), settings.walk_steps + settings.longest_rollout, ""
-    seeds = range(first_seed, first_seed + _MORE * total)
-    lengths = measure_walk_lengths(pool.robot, pool.policy, seeds, wanted, enough=total)
-    lasting = sorted(lengths, reverse=True)[total - 1]
-    if lasting < wanted:
-        settings = settings.shortened_to(lasting)
-        if settings.longest_rollout < _SHORTEST:
-            raise RobotError(
-                f"{pool.robot.name}: expected {total} walks of {wanted} steps without a fall, but of "
-                f"{len(seeds)} walks, the best {total} last {lasting} steps; dissection needs a policy that "
-                "stays up longer"
-            )
-        shortened = (
-            f"Of {len(seeds)} walks, {sum(length >= wanted for length in lengths)} lasted the {wanted} steps "
-            f"asked for and {total} lasted {lasting}, so stimulation began at step {settings.walk_steps} and "
-            f"lasted at most {settings.longest_rollout} steps. Effects beyond that were not measured."
-        )
-    everything = collect_start_states(
-        pool.robot, pool.policy, first_seed, total, at=settings.walk_steps, survive=settings.longest_rollout
-    )
-    remaining = iter(everything)
-    parts = [tuple(islice(remaining, count)) for count in counts]
-    return ProbeStarts(parts[0], parts[1], SearchStartStates(*parts[2:]), settings, shortened)

@@ -36,9 +36,13 @@ class DissectionSettings:
         screen_values, screen_starts, screen_steps: Outputs at which every unit is screened, the number of
             starts, and the control steps of each roll-out.
         refine_keep: Units kept after screening, for each attribute and direction.
-        controls: Units drawn at random and refined for comparison.
         refine_values, refine_starts, refine_steps: The same as for screening, for the units kept; their
-            starts are others.
+            starts are others. They choose the units, and their outputs, that are judged.
+        judge_keep: Units judged for each attribute, besides its first match.
+        controls: Units drawn at random and held in the same way as those that are judged.
+        judge_starts, held_steps: Starts that judge, which chose nothing, and control steps of the long
+            roll-outs that tell a lasting change of a rate from a passing one.
+        level: Share of the confirmed pairs of a unit and an attribute that may be false.
         mover_singles, mover_pairs: Units tried alone, and second units tried beside the best of them, for
             each attribute and direction.
         mover_steps: Control steps of those roll-outs.
@@ -54,10 +58,14 @@ class DissectionSettings:
     screen_starts: int = 2
     screen_steps: int = 60
     refine_keep: int = 2
-    controls: int = 48
     refine_values: tuple[float, ...] = (-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0)
     refine_starts: int = 6
     refine_steps: int = 80
+    judge_keep: int = 2
+    controls: int = 199
+    judge_starts: int = 12
+    held_steps: int = 1000
+    level: float = 0.05
     mover_singles: int = 3
     mover_pairs: int = 4
     mover_steps: int = 240
@@ -71,7 +79,7 @@ class DissectionSettings:
 
     @property
     def longest_rollout(self) -> int:
-        """Control steps of the longest roll-out."""
+        """Control steps of the longest roll-out, except the long ones of `held_steps`."""
         behaviors, controllers = self.behavior_search, self.controller_search
         return max(
             *(self.screen_steps, self.refine_steps, self.mover_steps),
@@ -82,7 +90,8 @@ class DissectionSettings:
     def shortened_to(self, steps: int) -> DissectionSettings:
         """Return settings whose walks, start and roll-out together, last at most this many control steps.
 
-        A quarter of them at most is spent on reaching the start.
+        A quarter of them at most is spent on reaching the start. The long roll-outs of `held_steps` stay as
+        they are.
         """
         walk = min(self.walk_steps, steps // 4)
         longest = max(1, steps - walk)
@@ -100,8 +109,9 @@ class DissectionSettings:
 
 
 QUICK_DISSECTION = DissectionSettings(
-    steps=400, screen_values=(-3.0, 3.0), screen_steps=40, refine_keep=1, controls=8,
+    steps=400, screen_values=(-3.0, 3.0), screen_steps=40, refine_keep=1,
     refine_values=(-3.0, 0.0, 3.0), refine_starts=4, refine_steps=60,
+    judge_keep=1, controls=99, judge_starts=8,
     mover_singles=2, mover_pairs=0, mover_steps=160,
     search_starts=3, selection_starts=4, held_out_starts=8, walk_steps=50,
     imprints=ImprintSettings(episodes=4, steps=40, bins=3, units=(8,), factors=(1.0,)),

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
+from pdtui.dissection.primitive_judging import PrimitiveJudgement
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
-from pdtui.probing.effect_probe import UnitEffects
+from pdtui.probing.measured_effects import UnitEffects
 from pdtui.robots.robot_goals import RobotGoals
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
@@ -43,8 +44,8 @@ class Dissection:
         phase: Phase correlations of all units and attributes.
         sample_episode: One monitored episode, with the units that match best, for pictures.
         screen: Effects of every unit at a few outputs.
-        refined: Effects of the best units, the first matches and the controls, from other starts.
-        controls: Units drawn at random.
+        refined: Effects of the best units and the first matches, from other starts.
+        judgement: Which of them are confirmed, from starts that neither saw.
         spread: Standard deviation of every attribute over the monitored steps, shape (J,).
         movable: Columns of the attributes for which up and down were searched.
         attribute_movers: What moves each attribute up and down.
@@ -69,7 +70,7 @@ class Dissection:
     sample_episode: SampleEpisode
     screen: UnitEffects
     refined: UnitEffects
-    controls: tuple[int, ...]
+    judgement: PrimitiveJudgement
     spread: Floats
     movable: tuple[int, ...]
     attribute_movers: tuple[AttributeMover, ...]

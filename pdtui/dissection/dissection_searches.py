@@ -10,7 +10,8 @@ import numpy as np
 from pdtui.core.units import Stimulation
 from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.dissection_config import DissectionSettings
-from pdtui.probing.effect_probe import EffectProbe, UnitEffects
+from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.measured_effects import UnitEffects
 from pdtui.robots.robot import Robot
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.behavior_search import BehaviorSearch, BehaviorSearchResult, SearchStartStates

@@ -8,13 +8,8 @@ from typing import Any
 from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.probing.primitive_confirmation import (
-    TOP_MATCHES,
-    PrimitiveConfirmation,
-    confirm_unit,
-    measure_matching_hits,
-    rank_probed_units,
-)
+from pdtui.probing.matching_hits import TOP_MATCHES, measure_matching_hits
+from pdtui.probing.primitive_confirmation import EffectVerdict, PrimitiveConfirmation
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
 from pdtui.spectra.matching_presets import list_preset_values
@@ -40,6 +35,7 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
         "attributes": [
             _attribute(dissection, column, matches) for column in range(len(dissection.attributes))
         ],
+        "judged": _judgement(dissection),
         "shortened": dissection.shortened,
         "movable": [dissection.attributes[column].name for column in dissection.movable],
         "steered": [_mover(dissection, one) for one in dissection.attribute_movers],
@@ -56,10 +52,11 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
     attribute = dissection.attributes[column]
     matching, phase, layers = dissection.matching, dissection.phase, dissection.layers
     ranked = matching.ranked_units(column)
-    rate = measure_matching_hits(column, dissection.screen, matching, dissection.refined, dissection.controls)
-    first = None
-    if ranked.size:
-        first = confirm_unit(int(ranked[0]), column, dissection.screen, dissection.refined, dissection.seed)
+    judgement = dissection.judgement
+    rate = measure_matching_hits(
+        column, dissection.screen, matching, judgement.control_effects, judgement.controls
+    )
+    first = judgement.of_pair(int(ranked[0]), column) if ranked.size else None
     return {
         "name": attribute.name,
         "unit": attribute.unit,
@@ -82,32 +79,73 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
             for unit in ranked[:matches]
         ],
         "first_match": None if first is None else _confirmation(dissection, column, first),
-        "probed": [
-            _confirmation(dissection, column, one)
-            for one in rank_probed_units(column, dissection.screen, dissection.refined, dissection.seed)
-        ],
+        "probed": [_confirmation(dissection, column, one) for one in judgement.of_attribute(column)],
         "hits": {
             "first": rate.first,
             **{f"best_{count}": _number(share) for count, share in zip(TOP_MATCHES, rate.best, strict=True)},
             "random": _number(rate.random),
             "rank_correlation": _number(rate.correlation),
-            **_numbers(rate, "held_out_matching", "held_out_probing"),
+            **_numbers(rate, "held_out_matching", "held_out_probing", "ceiling", "disattenuated_matching"),
         },
     }
 
 
 def _confirmation(dissection: Dissection, column: int, one: PrimitiveConfirmation) -> dict[str, Any]:
-    rho = float(dissection.phase.rho(dissection.preset)[column, one.unit])
+    rho, measured = float(dissection.phase.rho(dissection.preset)[column, one.unit]), one.verdict.measured
+    low, high = dissection.judgement.own_range[one.unit]
     return {
         "unit": format_unit(one.unit, dissection.layers),
-        "value": one.value,
-        **_numbers(one.measured, "effect", "low", "high"),
+        **_verdict(one.verdict),
         "confirmed": one.confirmed,
+        "own_range": [float(low), float(high)],
+        "in_range": one.in_range,
+        "at_end_of_range": _verdict(one.own_range),
+        "held": None if one.held is None else _verdict(one.held),
         "both_ways": one.both_ways,
-        "survived": one.safe_magnitude,
+        "survived": dissection.refined.safe_magnitude(one.unit),
         "rho": _number(rho),
         # ρ > 0 means that a higher output goes with a higher attribute.
-        "sign_agrees": bool(rho * one.value * one.measured.effect > 0),
+        "sign_agrees": bool(rho * one.verdict.value * measured.effect > 0),
+    }
+
+
+def _verdict(one: EffectVerdict) -> dict[str, Any]:
+    return {
+        "value": one.value,
+        **_numbers(one.measured, "effect", "low", "high"),
+        "falls": one.measured.falls,
+        "of": one.measured.of,
+        **_numbers(one, "flip_p", "corrected_p"),
+        "random_p": one.random_p,
+        "passes": one.confirmed,
+    }
+
+
+def _judgement(dissection: Dissection) -> dict[str, Any]:
+    judgement = dissection.judgement
+    pairs = judgement.confirmations
+    ranges = {
+        name: {
+            "judged": len(some),
+            "confirmed": sum(one.verdict.confirmed for one in some),
+            "at_end_of_range": sum(one.own_range.confirmed for one in some),
+        }
+        for name, some in (
+            ("in_range", [one for one in pairs if one.in_range]),
+            ("out_of_range", [one for one in pairs if not one.in_range]),
+        )
+    }
+    return {
+        "level": judgement.level,
+        "starts": judgement.starts,
+        "controls": len(judgement.controls),
+        "smallest_p": judgement.smallest_p,
+        "fewest_confirmed": judgement.fewest_confirmed,
+        "pairs": len(pairs),
+        "passed": sum(one.verdict.confirmed for one in pairs),
+        "passing_by": sum(one.verdict.confirmed and not one.confirmed for one in pairs),
+        "confirmed": sum(one.confirmed for one in pairs),
+        "ranges": ranges,
     }
 
 
@@ -132,7 +170,7 @@ def _side_effects(dissection: Dissection) -> dict[str, Any]:
     }
     return {
         "units": [format_unit(unit, dissection.layers) for unit in dissection.refined.units],
-        "controls": [format_unit(unit, dissection.layers) for unit in dissection.controls],
+        "controls": [format_unit(unit, dissection.layers) for unit in dissection.judgement.controls],
         "attributes": [attribute.name for attribute in dissection.attributes],
         "by_value": matrices,
     }

@@ -11,22 +11,33 @@ from rich.text import Text
 
 from pdtui.core.text_tables import new_table
 from pdtui.core.units import MAX_LISTED, describe_units
+from pdtui.dissection.dissection_findings import describe_findings
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.probing.primitive_confirmation import TOP_MATCHES
+from pdtui.probing.matching_hits import TOP_MATCHES
 
 _MATCHES = 3
 
 
 def render_dissection(dissection: Dissection) -> RenderableType:
-    """Return what `pdtui dissect` prints: the tables, then the remarks."""
+    """Return what `pdtui dissect` prints: the tables, the remarks, and the findings in plain words."""
     summary = summarise_dissection(dissection)
-    return Group(*dissection_tables(summary), *(Text(line) for line in dissection_remarks(summary)))
+    parts: list[RenderableType] = [*dissection_tables(summary)]
+    parts += [Text(line) for line in dissection_remarks(summary)]
+    for heading, lines in describe_findings(summary).items():
+        parts += [Text(f"\n{heading}", style="bold"), *(Text(f"- {line}") for line in lines)]
+    return Group(*parts)
 
 
 def dissection_tables(summary: dict[str, Any]) -> list[Table]:
     """Return the tables of a summary. Every cell is text."""
-    tables = [_matching_table(summary), _probing_table(summary), _mover_table(summary)]
+    tables = [
+        _matching_table(summary),
+        _probing_table(summary),
+        _range_table(summary),
+        _agreement_table(summary),
+        _mover_table(summary),
+    ]
     if summary["behaviors"]:
         tables.append(_behavior_table(summary))
     if summary["holds"]:
@@ -57,17 +68,44 @@ def _matching_table(summary: dict[str, Any]) -> Table:
 
 
 def _probing_table(summary: dict[str, Any]) -> Table:
+    judged = summary["judged"]
+    return _table(
+        f"Probing: effects of units, {judged['starts']} starts, beside {judged['controls']} random units",
+        [(attribute, one) for attribute in summary["attributes"] for one in attribute["probed"] or [None]],
+        {
+            "attribute": lambda pair: f"{pair[0]['name']} ({pair[0]['unit']})",
+            "unit": lambda pair: _probed_unit(pair[1]),
+            "effect [95 %]": lambda pair: _effect(pair[1]),
+            "p: flips / random units": lambda pair: _p_values(pair[1]),
+            "corrected": lambda pair: "" if pair[1] is None else _show(pair[1]["corrected_p"], ".2g"),
+            "held long": lambda pair: "" if pair[1] is None else _effect(pair[1]["held"]),
+            "both ways": lambda pair: "" if pair[1] is None else _yes(pair[1]["both_ways"]),
+        },
+    )
+
+
+def _range_table(summary: dict[str, Any]) -> Table:
+    names = {"in_range": "in its own range", "out_of_range": "outside it"}
+    return _table(
+        "Pairs by whether the unit puts out such values by itself",
+        [(names[key], counts) for key, counts in summary["judged"]["ranges"].items()],
+        {
+            "output": lambda row: row[0],
+            "judged": lambda row: str(row[1]["judged"]),
+            "more than chance": lambda row: str(row[1]["confirmed"]),
+            "at the end of its own range": lambda row: str(row[1]["at_end_of_range"]),
+        },
+    )
+
+
+def _agreement_table(summary: dict[str, Any]) -> Table:
     hits = "hits: first / " + " / ".join(f"best {count}" for count in TOP_MATCHES) + " / random"
     return _table(
-        "Probing: measured effects of units",
+        "Matching against probing",
         summary["attributes"],
         {
-            "attribute": lambda one: f"{one['name']} ({one['unit']})",
-            "best unit": lambda one: _probed_unit(_best(one)),
-            "effect [95 %]": lambda one: _effect(_best(one)),
-            "both ways": lambda one: "" if _best(one) is None else _yes(_best(one)["both_ways"]),
+            "attribute": lambda one: one["name"],
             "first match": lambda one: _probed_unit(one["first_match"]),
-            "its effect [95 %]": lambda one: _effect(one["first_match"]),
             hits: lambda one: " / ".join(
                 [
                     _yes(one["hits"]["first"]),
@@ -75,9 +113,12 @@ def _probing_table(summary: dict[str, Any]) -> Table:
                     _show(one["hits"]["random"], ".0%"),
                 ]
             ),
-            "held-out rank correlation: matching / probing": lambda one: " / ".join(
-                _show(one["hits"][f"held_out_{what}"], "+.2f") for what in ("matching", "probing")
+            "held-out rank correlation: matching": lambda one: _show(
+                one["hits"]["held_out_matching"], "+.2f"
             ),
+            "without noise": lambda one: _show(one["hits"]["disattenuated_matching"], "+.2f"),
+            "screening": lambda one: _show(one["hits"]["held_out_probing"], "+.2f"),
+            "noise ceiling": lambda one: _show(one["hits"]["ceiling"], ".2f"),
         },
     )
 
@@ -137,7 +178,7 @@ def _controller_table(summary: dict[str, Any]) -> Table:
     )
 
 
-def _table(title: str, rows: Sequence[dict[str, Any]], cells: Mapping[str, Callable[[Any], str]]) -> Table:
+def _table(title: str, rows: Sequence[Any], cells: Mapping[str, Callable[[Any], str]]) -> Table:
     """Return a table with a column for each heading in `cells`, whose function makes a row's cell."""
     table = new_table(title, *cells)
     for row in rows:
@@ -166,6 +207,8 @@ def dissection_remarks(summary: dict[str, Any]) -> list[str]:
     for flaw, units in by_flaw.items():
         more = ", …" if len(units) > MAX_LISTED else ""
         lines.append(f"† {len(units)} of the units: {flaw} ({', '.join(units[:MAX_LISTED])}{more}).")
+    if summary["judged"]["ranges"]["out_of_range"]["judged"]:
+        lines.append("‡ The unit never puts out such a value by itself.")
     if any(match["rho_disagree"] for one in attributes for match in one["matches"][:_MATCHES]):
         lines.append("! The plain and the circular mean of the phase disagree. Trust the circular one.")
     for seed, steps in summary["too_short"]:
@@ -173,14 +216,15 @@ def dissection_remarks(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _best(attribute: dict[str, Any]) -> Any:
-    return next(iter(attribute["probed"]), None)
-
-
 def _probed_unit(one: dict[str, Any] | None) -> str:
     if one is None:
         return "none"
-    return f"{one['unit']} = {one['value']:g}" + ("" if one["confirmed"] else " (not confirmed)")
+    outside = "" if one["in_range"] else " ‡"
+    return f"{one['unit']} = {one['value']:g}{outside}" + ("" if one["confirmed"] else " (not confirmed)")
+
+
+def _p_values(one: dict[str, Any] | None) -> str:
+    return "" if one is None else f"{_show(one['flip_p'], '.2g')} / {_show(one['random_p'], '.2g')}"
 
 
 def _yes(value: bool) -> str:

@@ -11,7 +11,6 @@ from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.core.units import Stimulation, describe_units, format_unit
 from pdtui.dissection.dissection_config import SEEDS_PER_DISSECTION
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.probing.primitive_confirmation import rank_probed_units
 from pdtui.robots.robot_goals import HoldBehaviorGoal
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
@@ -81,7 +80,7 @@ def _draft_primitives(dissection: Dissection) -> list[MotorPrimitive]:
     primitives = []
     for attribute, name in _primitive_names(dissection).items():
         column = dissection.column(attribute)
-        best_units = rank_probed_units(column, dissection.screen, dissection.refined, dissection.seed)
+        best_units = dissection.judgement.of_attribute(column)
         # Without a phase there is no ρ, and without ρ no magnitude c: such a unit is no primitive.
         rho = dissection.phase.rho(dissection.preset)[column]
         best = next((one for one in best_units if one.confirmed and np.isfinite(rho[one.unit])), None)
@@ -94,8 +93,8 @@ def _draft_primitives(dissection: Dissection) -> list[MotorPrimitive]:
                     format_unit(best.unit, dissection.layers),
                     round(float(rho[best.unit]), 4),
                     float(f"{discrepancy:.4g}") if np.isfinite(discrepancy) else None,
-                    best.value,
-                    best.measured,
+                    best.verdict.value,
+                    best.verdict.measured,
                 )
             )
     return primitives

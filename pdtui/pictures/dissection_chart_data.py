@@ -11,7 +11,6 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.confidence_intervals import bootstrap_interval
 from pdtui.core.units import format_unit
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.probing.primitive_confirmation import rank_probed_units
 from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.spectrogram import short_time_transform
 
@@ -147,7 +146,7 @@ def rank_nearest_units(dissection: Dissection, column: int) -> tuple[list[str], 
 
 def compute_effect_curves(dissection: Dissection, column: int) -> list[EffectCurve]:
     """Return the effect curves of the unit that moves an attribute most and of its first match."""
-    probed = rank_probed_units(column, dissection.screen, dissection.refined, dissection.seed)[:1]
+    probed = dissection.judgement.of_attribute(column)[:1]
     ranked = dissection.matching.ranked_units(column)
     roles: dict[int, list[str]] = {}
     for one in probed:
@@ -182,20 +181,13 @@ def _curve(dissection: Dissection, column: int, unit: int, role: str) -> EffectC
 
 
 def side_effect_matrix(dissection: Dissection) -> SideEffectMatrix:
-    """Return the side effects of the refined units, without those of the random control group alone."""
-    refined = dissection.refined
-    chosen = set(refined.units) - set(dissection.controls)
-    for column in range(len(dissection.attributes)):
-        chosen.update(dissection.matching.ranked_units(column)[:1].tolist())
-        best = rank_probed_units(column, dissection.screen, refined, dissection.seed)[:1]
-        chosen.update(one.unit for one in best)
-    rows = [row for row, unit in enumerate(refined.units) if unit in chosen]
-    by_value = {value: matrix[rows] for value, matrix in dissection.side_effects().items()}
-    nothing = np.zeros((len(rows), len(dissection.attributes)))
+    """Return the side effects of the refined units."""
+    units, by_value = dissection.refined.units, dissection.side_effects()
+    nothing = np.zeros((len(units), len(dissection.attributes)))
     sizes = np.max([nothing, *(np.abs(np.nan_to_num(matrix)) for matrix in by_value.values())], axis=0)
     order = np.lexsort((-sizes.max(axis=1), sizes.argmax(axis=1)))
     return SideEffectMatrix(
-        tuple(format_unit(refined.units[rows[row]], dissection.layers) for row in order),
+        tuple(format_unit(units[row], dissection.layers) for row in order),
         tuple(attribute.name for attribute in dissection.attributes),
         {value: matrix[order] for value, matrix in by_value.items()},
     )

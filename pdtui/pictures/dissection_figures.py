@@ -22,7 +22,7 @@ from pdtui.pictures.dissection_attribute_plots import (
 from pdtui.pictures.dissection_chart_data import side_effect_matrix
 from pdtui.pictures.matplotlib_page import format_policy_title, open_figure_page
 from pdtui.pictures.plot_colors import GREEN, GREY, VERMILLION, color_to_hex, diverging_colors
-from pdtui.probing.primitive_confirmation import TOP_MATCHES
+from pdtui.probing.matching_hits import TOP_MATCHES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -152,9 +152,12 @@ def draw_matching_hits(target: Path | BytesIO, dissection: Dissection) -> None:
             ("held_out_probing", "ranked by probing", _PROBED, "s"),
         ):
             right.plot(column(key), places, marker, color=color, markersize=4, label=label)
+        right.plot(
+            column("ceiling"), places, "|", color="black", markersize=9, label="noise ceiling of probing"
+        )
         right.axvline(0, color=_FAINT, linewidth=0.6)
         right.set(xlabel="rank correlation with the effect on other starts", xlim=(-1.05, 1.05))
-        right.set_title(f"Held out: {len(dissection.controls)} units drawn at random")
+        right.set_title(f"Held out: {len(dissection.judgement.controls)} units drawn at random")
         for panel in (left, right):
             panel.grid(axis="y", linewidth=0.3, alpha=0.5)
             panel.set_axisbelow(True)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.atomic_file import check_writable
 from pdtui.core.errors import PictureError
+from pdtui.dissection.dissection_findings import describe_findings
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.dissection.dissection_tables import dissection_remarks, dissection_tables
@@ -155,9 +156,12 @@ def _log_overviews(log: Log, dissection: Dissection) -> None:
 
 
 def dissection_markdown(dissection: Dissection) -> str:
-    """Return everything that the terminal prints about a dissection, and its origin, as Markdown."""
+    """Return what was found in plain words, and everything else that the terminal prints, as Markdown."""
     summary = summarise_dissection(dissection)
-    parts = [f"# Dissection of {summary['policy']} on {summary['robot']}", _origin(dissection, summary)]
+    parts = [f"# Dissection of {summary['policy']} on {summary['robot']}"]
+    for heading, lines in describe_findings(summary).items():
+        parts += [f"## {heading}", "\n".join(f"- {line}" for line in lines)]
+    parts += ["## Where it comes from", _origin(dissection, summary)]
     parts += [table_to_markdown(table) for table in dissection_tables(summary)]
     parts += ["## Remarks", "\n".join(f"- {line}" for line in dissection_remarks(summary))]
     return "\n\n".join(parts) + "\n"

@@ -3,89 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.core.worker_pool import StepProgress
+from pdtui.probing.measured_effects import PlanEffects, SingleUnitEffects, UnitEffects
 from pdtui.probing.rollout_journal import RolloutJournal, fingerprint_start_state
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, RolloutPlan
-
-
-@dataclass(frozen=True)
-class PlanEffects:
-    """Effects of S plans from each of K starts on J attributes.
-
-    Attributes:
-        effects: change of each attribute against the unperturbed roll-out from the same start, in its unit,
-            shape (S, K, J): a difference of means over the measured steps; for an angle, of its mean change
-            since the start. NaN where the robot fell before the measured steps.
-        means: the means with stimulation, shape (S, K, J).
-        unperturbed: the means without stimulation, shape (K, J).
-        falls: whether the robot fell, shape (S, K).
-        errors: mean distance from the target for plans with a controller, else NaN, shape (S, K).
-    """
-
-    effects: Floats
-    means: Floats
-    unperturbed: Floats
-    falls: NDArray[np.bool_]
-    errors: Floats
-
-
-@dataclass(frozen=True)
-class UnitEffects:
-    """Effects of N units, overwritten with D values from K starts, on J attributes.
-
-    Attributes:
-        units: flat indices of the units.
-        values: the values v with which each unit is overwritten.
-        effects: change of each attribute against the unperturbed roll-out, shape (N, D, K, J), as in
-            `PlanEffects`.
-        falls: whether the robot fell, shape (N, D, K).
-        unperturbed: means of the attributes without stimulation, shape (K, J).
-    """
-
-    units: tuple[int, ...]
-    values: tuple[float, ...]
-    effects: Floats
-    falls: NDArray[np.bool_]
-    unperturbed: Floats
-
-    def robust_effects(self, column: int, sign: float) -> Floats:
-        """Return the weakest effect over all starts in the direction of `sign`, shape (N, D).
-
-        It is negative where the effect from a start has the other sign, and at most 0 where the robot fell.
-        """
-        weakest = np.min(sign * np.nan_to_num(self.effects[..., column]), axis=-1)
-        return np.asarray(np.where(self.falls.any(axis=-1), np.minimum(weakest, 0.0), weakest))
-
-    def robust_strengths(self, column: int) -> Floats:
-        """Return the largest robust effect of each unit over its values and both directions, shape (N,)."""
-        both = np.maximum(self.robust_effects(column, 1.0), self.robust_effects(column, -1.0))
-        return np.asarray(np.maximum(both.max(axis=1), 0.0))
-
-    def mean_strengths(self, column: int, values: Sequence[float]) -> Floats:
-        """Return the largest mean effect of each unit over the starts, in size, at some values, shape (N,).
-
-        Unlike `robust_strengths` it does not require one sign from every start, so it ranks weak units too.
-        A fall counts as no effect.
-        """
-        doses = [self.values.index(value) for value in values]
-        effects = np.where(self.falls, 0.0, np.nan_to_num(self.effects[..., column]))[:, doses]
-        return np.asarray(np.abs(effects.mean(axis=-1)).max(axis=1))
-
-    def safe_magnitude(self, unit: int) -> float:
-        """Return the largest |v| of a unit up to which the robot never fell; 0 if there is none."""
-        row = self.units.index(unit)
-        falls = zip(self.values, self.falls[row].any(axis=-1), strict=True)
-        lowest_fall = min((abs(value) for value, fell in falls if fell), default=np.inf)
-        return max((abs(value) for value in self.values if abs(value) < lowest_fall), default=0.0)
 
 
 class EffectProbe:
@@ -133,6 +60,7 @@ class EffectProbe:
             unperturbed=unperturbed,
             falls=np.array([outcome.fell for outcome in probed], np.bool_).reshape(shape),
             errors=np.array([outcome.error for outcome in probed], np.float64).reshape(shape),
+            unperturbed_falls=np.array([self._unperturbed[key].fell for key in keys], np.bool_),
         )
 
     def measure_units(
@@ -154,7 +82,23 @@ class EffectProbe:
             effects=result.effects.reshape(*shape, -1),
             falls=result.falls.reshape(shape),
             unperturbed=result.unperturbed,
+            unperturbed_falls=result.unperturbed_falls,
         )
+
+    def measure_outputs(
+        self,
+        outputs: Sequence[tuple[int, float]],
+        starts: Sequence[StartState],
+        *,
+        steps: int,
+        measure_from: int | None = None,
+        progress: StepProgress | None = None,
+    ) -> SingleUnitEffects:
+        """Hold single units at outputs of their own, and measure them as `measure_plans` does."""
+        rows = {output: row for row, output in enumerate(dict.fromkeys(outputs))}
+        plans = [Stimulation((unit,), (value,)) for unit, value in rows]
+        result = self.measure_plans(plans, starts, steps=steps, measure_from=measure_from, progress=progress)
+        return SingleUnitEffects(rows, result)
 
     def _run(
         self,

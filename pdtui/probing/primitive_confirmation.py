@@ -1,23 +1,48 @@
-"""Decide from probed effects which units are motor primitives, and how well matching alone finds them."""
+"""Decide from starts that chose nothing which units are motor primitives."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import stats
 
+from pdtui.core.attributes import Floats
 from pdtui.core.confidence_intervals import bootstrap_interval
-from pdtui.probing.effect_probe import UnitEffects
-from pdtui.spectra.matching import UnitDiscrepancies
+from pdtui.probing.measured_effects import SingleUnitEffects
+from pdtui.probing.null_distributions import correct_for_comparisons, random_unit_p_value, sign_flip_p_values
+from pdtui.probing.unit_selection import PrimitiveCandidate
 from pdtui.stimulation.stimulation_map import MeasuredEffect
 
-RANDOM_QUANTILE = 0.9
-"""A unit exceeds random units if it moves the attribute more than this share of all units does."""
-TOP_MATCHES = (5, 10)
-"""Numbers of first matches whose share of hits is reported."""
+LASTING = 0.5
+"""Share of an effect on a rate that has to be left late in a long roll-out."""
+
+
+@dataclass(frozen=True)
+class EffectVerdict:
+    """Whether the effect of one output of a unit on one attribute is more than chance.
+
+    Attributes:
+        value: output v at which the unit was held.
+        measured: mean effect with its 95 % interval over the starts, and the falls, which count as no effect.
+        flip_p: p-value against flips of the signs of the paired differences, see `sign_flip_p_values`.
+        random_p: p-value against units drawn at random and held in the same way; None if there were none.
+        corrected_p: the larger of the two, corrected for all comparisons; 1 where the effect has another sign
+            than on the starts that chose the unit.
+        level: share of false discoveries that is accepted.
+    """
+
+    value: float
+    measured: MeasuredEffect
+    flip_p: float
+    random_p: float | None
+    corrected_p: float
+    level: float
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the corrected p-value is at most the level."""
+        return self.corrected_p <= self.level
 
 
 @dataclass(frozen=True)
@@ -26,165 +51,151 @@ class PrimitiveConfirmation:
 
     Attributes:
         unit: flat index.
-        value: output v with the strongest effect, among the values at which all units were screened.
-        measured: effect at that value with its 95 % interval over the starts.
-        one_sign: whether the effect had the same sign from every start, without a fall.
-        exceeds_random: whether it exceeds the effect of `RANDOM_QUANTILE` of all units at the same |v|.
-        both_ways: whether +v and −v move the attribute in opposite directions, each from every start.
-        safe_magnitude: largest |v| up to which the robot never fell.
+        column: column of the attribute.
+        verdict: the effect of the output that was chosen for the unit.
+        in_range: whether the unit puts out such values by itself.
+        own_range: the effect of that end of the unit's own range that is nearest to the output; equal to
+            `verdict` if the output is in range.
+        both_ways: whether v and −v move the attribute opposite ways (by sign flips, not corrected).
+        held: the effect late in a roll-out that is much longer; None where it was not measured.
     """
 
     unit: int
-    value: float
-    measured: MeasuredEffect
-    one_sign: bool
-    exceeds_random: bool
+    column: int
+    verdict: EffectVerdict
+    in_range: bool
+    own_range: EffectVerdict
     both_ways: bool
-    safe_magnitude: float
+    held: EffectVerdict | None = None
+
+    @property
+    def lasts(self) -> bool:
+        """Whether the long roll-out still shows `LASTING` of the effect; also if there was none."""
+        if self.held is None:
+            return True
+        left = abs(self.held.measured.effect) >= LASTING * abs(self.verdict.measured.effect)
+        return self.held.confirmed and left
 
     @property
     def confirmed(self) -> bool:
-        """Whether the effect has one sign, exceeds random units and has an interval without zero."""
-        return self.one_sign and self.exceeds_random and self.measured.low * self.measured.high > 0
+        """Whether the effect is more than chance, and lasts where that was measured."""
+        return self.verdict.confirmed and self.lasts
 
 
-@dataclass(frozen=True)
-class MatchingHitRate:
-    """How well matching alone finds the units that move an attribute.
+def judge_effects(
+    differences: Floats,
+    signs: Sequence[float],
+    controls: Sequence[Floats] | None,
+    values: Sequence[float],
+    falls: Sequence[int],
+    level: float,
+    seed: int | None = 0,
+) -> list[EffectVerdict]:
+    """Judge the effects of P pairs of a unit and an attribute together.
 
-    A hit is a unit whose screened strength is in the highest tenth and not zero. Correlations are NaN where
-    either side does not vary.
-
-    Attributes:
-        first: whether the first match is a hit.
-        best: share of hits among the first 5 and the first 10 matches (`TOP_MATCHES`).
-        random: share of hits among all units.
-        correlation: rank correlation of small discrepancy with strength over all units.
-        held_out_matching: the same over the control units, with their strength from starts that screening did
-            not see.
-        held_out_probing: rank correlation of the screened strength of the control units with that strength.
+    Args:
+        differences: effects from K starts, shape (P, K).
+        signs: the sign of each effect on the starts that chose it.
+        controls: for each pair, the effects of C units drawn at random on the same attribute, held in the
+            same way from the same starts, shape (C, K); None for no such comparison.
+        values: the outputs v.
+        falls: the number of starts from which the robot fell.
+        level: share of false discoveries that is accepted.
+        seed: seed of the intervals; None for no intervals, which take most of the time.
     """
-
-    first: bool
-    best: tuple[float, ...]
-    random: float
-    correlation: float
-    held_out_matching: float
-    held_out_probing: float
-
-
-def select_units_to_refine(
-    screen: UnitEffects, matching: UnitDiscrepancies, columns: Sequence[int], keep: int
-) -> tuple[int, ...]:
-    """Choose the first match of each attribute, and the `keep` strongest probed units in each direction."""
-    chosen: set[int] = set()
-    for column in columns:
-        chosen.update(matching.ranked_units(column)[:1].tolist())
-        for sign in (1.0, -1.0):
-            strengths = screen.robust_effects(column, sign).max(axis=1)
-            order = np.argsort(-strengths, kind="stable")[:keep]
-            chosen.update(screen.units[row] for row in order if strengths[row] > 0)
-    return tuple(sorted(chosen))
-
-
-def sample_control_units(screen: UnitEffects, count: int, seed: int) -> tuple[int, ...]:
-    """Draw units at random, whatever they do: a ranking has to beat them."""
-    rng = np.random.default_rng(seed)
-    chosen = rng.choice(screen.units, size=min(count, len(screen.units)), replace=False)
-    return tuple(sorted(chosen.tolist()))
-
-
-def confirm_unit(
-    unit: int, column: int, screen: UnitEffects, refined: UnitEffects, seed: int
-) -> PrimitiveConfirmation:
-    """Judge one unit by its refined effects.
-
-    It is judged at the values at which all units were screened, by its effects from other starts.
-    """
-    row = refined.units.index(unit)
-    shared = [dose for dose, value in enumerate(refined.values) if value in screen.values]
-    up, down = (refined.robust_effects(column, sign)[row] for sign in (1.0, -1.0))
-    robust = np.maximum(up, down)
-    dose = shared[int(np.argmax(robust[shared]))]
-    samples = refined.effects[row, dose, :, column]
-    known = samples[np.isfinite(samples)]
-    effect = float(known.mean()) if known.size else float("nan")
-    value = refined.values[dose]
-    low, high = bootstrap_interval(samples, seed)
-    return PrimitiveConfirmation(
-        unit=unit,
-        value=value,
-        measured=MeasuredEffect(effect, low, high),
-        one_sign=bool(robust[dose] > 0),
-        exceeds_random=exceeds_random_units(effect, value, column, screen),
-        both_ways=_moves_both_ways(refined.values, up > 0, down > 0),
-        safe_magnitude=refined.safe_magnitude(unit),
-    )
+    if not len(differences):
+        return []
+    means = differences.mean(axis=-1)
+    flips = sign_flip_p_values(differences)
+    randoms: list[float | None] = [None] * len(differences)
+    if controls is not None:
+        pairs = zip(means, controls, strict=True)
+        randoms = [random_unit_p_value(abs(mean), np.abs(some.mean(axis=-1))) for mean, some in pairs]
+    larger = [
+        max(flip, random or 0.0) if sign * mean > 0 else 1.0
+        for flip, random, sign, mean in zip(flips.tolist(), randoms, signs, means, strict=True)
+    ]
+    corrected, nothing = correct_for_comparisons(larger), (float("nan"), float("nan"))
+    return [
+        EffectVerdict(
+            values[row],
+            MeasuredEffect(
+                float(means[row]),
+                *(nothing if seed is None else bootstrap_interval(differences[row], seed)),
+                falls[row],
+                differences.shape[-1],
+            ),
+            float(flips[row]),
+            randoms[row],
+            float(corrected[row]),
+            level,
+        )
+        for row in range(len(differences))
+    ]
 
 
-def rank_probed_units(
-    column: int, screen: UnitEffects, refined: UnitEffects, seed: int, count: int = 3
-) -> list[PrimitiveConfirmation]:
-    """Return the `count` best of the refined units that move an attribute most, confirmed ones first."""
-    order = np.argsort(-refined.robust_strengths(column), kind="stable")[: 4 * count]
-    judged = [confirm_unit(refined.units[row], column, screen, refined, seed) for row in order]
-    return sorted(judged, key=lambda one: not one.confirmed)[:count]
-
-
-def measure_matching_hits(
-    column: int,
-    screen: UnitEffects,
-    matching: UnitDiscrepancies,
-    refined: UnitEffects,
+def judge_candidates(
+    candidates: Sequence[PrimitiveCandidate],
+    probed: SingleUnitEffects,
+    own_range: Floats,
     controls: Sequence[int],
-) -> MatchingHitRate:
-    """Compare the ranking by discrepancy with the effects that probing measured.
+    level: float,
+    seed: int | None = 0,
+) -> tuple[PrimitiveConfirmation, ...]:
+    """Judge candidates together: at their outputs, and at the ends of their own ranges.
 
-    The refined effects are from other starts; the controls are those of the refined units drawn at random.
+    Each is compared with the controls at the same output, or at the same end of their own ranges.
+
+    Args:
+        candidates: pairs of a unit and an attribute.
+        probed: effects of their units and of the controls, from starts that chose neither: at the outputs of
+            the candidates, at the opposite ones, and at the ends of the own ranges.
+        own_range: lowest and highest output of every unit by itself, shape (U, 2).
+        controls: units drawn at random. A candidate is not compared with itself.
+        level: share of false discoveries that is accepted, separately for both.
+        seed: seed of the intervals; None for no intervals, which take most of the time.
     """
-    strengths = screen.robust_strengths(column)
-    hits = (strengths > 0) & (strengths > np.quantile(strengths, RANDOM_QUANTILE))
-    values = [value for value in screen.values if value in refined.values]
-    units = np.array(screen.units)
-    screened = screen.mean_strengths(column, values)[np.searchsorted(units, np.array(controls, np.intp))]
-    rows = [refined.units.index(unit) for unit in controls]
-    held_out = refined.mean_strengths(column, values)[rows]
-    probing = rank_correlation(screened, held_out)
-    ranked = matching.ranked_units(column)
-    if not ranked.size:
-        none = float("nan")
-        return MatchingHitRate(False, (none,) * len(TOP_MATCHES), float(hits.mean()), none, none, probing)
-    order = np.searchsorted(units, ranked)
-    return MatchingHitRate(
-        first=bool(hits[order[0]]),
-        best=tuple(float(hits[order[:count]].mean()) for count in TOP_MATCHES),
-        random=float(hits.mean()),
-        correlation=rank_correlation(-matching.discrepancy[column, ranked], strengths[order]),
-        held_out_matching=rank_correlation(-matching.discrepancy[column, list(controls)], held_out),
-        held_out_probing=probing,
+    in_range = [bool(own_range[one.unit, 0] <= one.value <= own_range[one.unit, 1]) for one in candidates]
+
+    def at_the_end(one: PrimitiveCandidate, unit: int) -> float:
+        low, high = own_range[one.unit]
+        return one.value if low <= one.value <= high else float(own_range[unit, int(one.value > high)])
+
+    outputs = (lambda one, _: one.value), at_the_end
+    chosen, ends = (_judge(candidates, output, probed, controls, level, seed) for output in outputs)
+    return tuple(
+        PrimitiveConfirmation(
+            one.unit, one.column, verdict, inside, end, _opposite(one, verdict, probed, level)
+        )
+        for one, verdict, inside, end in zip(candidates, chosen, in_range, ends, strict=True)
     )
 
 
-def rank_correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Return Spearman's rank correlation, with ties at their mean rank; NaN if a side does not vary."""
-    if len(a) < 2 or np.ptp(a) == 0 or np.ptp(b) == 0:
-        return float("nan")
-    return float(stats.spearmanr(a, b).statistic)
+def _judge(
+    candidates: Sequence[PrimitiveCandidate],
+    output: Callable[[PrimitiveCandidate, int], float],
+    probed: SingleUnitEffects,
+    controls: Sequence[int],
+    level: float,
+    seed: int | None,
+) -> list[EffectVerdict]:
+    """Judge candidates where `output` says at which output a unit is held for a candidate."""
+    differences, others, values, falls = [], [], [], []
+    for one in candidates:
+        values.append(output(one, one.unit))
+        differences.append(probed.effects_of(one.unit, values[-1])[:, one.column])
+        drawn = [unit for unit in controls if unit != one.unit]
+        effects = [probed.effects_of(unit, output(one, unit))[:, one.column] for unit in drawn]
+        others.append(np.array(effects).reshape(len(drawn), -1))
+        falls.append(probed.falls_of(one.unit, values[-1]))
+    signs = [one.sign for one in candidates]
+    return judge_effects(np.array(differences), signs, others, values, falls, level, seed)
 
 
-def exceeds_random_units(effect: float, value: float, column: int, screen: UnitEffects) -> bool:
-    """Return whether an effect exceeds that of `RANDOM_QUANTILE` of all units at the nearest screened |v|."""
-    magnitude = min((abs(v) for v in screen.values), key=lambda size: abs(size - abs(value)))
-    doses = [dose for dose, v in enumerate(screen.values) if abs(v) == magnitude]
-    # A fall before the measured steps leaves NaN, which counts as no effect.
-    sizes = np.abs(np.nan_to_num(screen.effects[:, doses, :, column]).mean(axis=-1))
-    return bool(abs(effect) > np.quantile(sizes, RANDOM_QUANTILE))
-
-
-def _moves_both_ways(values: Sequence[float], up: NDArray[np.bool_], down: NDArray[np.bool_]) -> bool:
-    for dose, value in enumerate(values):
-        if value > 0 and -value in values:
-            mirror = values.index(-value)
-            if (up[dose] and down[mirror]) or (down[dose] and up[mirror]):
-                return True
-    return False
+def _opposite(
+    one: PrimitiveCandidate, verdict: EffectVerdict, probed: SingleUnitEffects, level: float
+) -> bool:
+    """Return whether the opposite output moves the attribute the other way."""
+    opposite = probed.effects_of(one.unit, -one.value)[:, one.column]
+    other_way = float(opposite.mean()) * verdict.measured.effect < 0
+    return bool(other_way and sign_flip_p_values(opposite) <= level and verdict.flip_p <= level)

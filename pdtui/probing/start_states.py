@@ -29,47 +29,38 @@ class StartState:
 
 
 def collect_start_states(
-    robot: Robot, policy: Policy, first_seed: int, count: int, *, at: int = 100, survive: int = 0
+    robot: Robot, policy: Policy, first_seed: int, count: int, *, at: int = 100
 ) -> list[StartState]:
     """Take one state from each of several unstimulated walks, which differ in heading and phase of the gait.
 
-    Seeds whose walk falls before step ``at + survive`` are skipped, so that a fall within `survive` steps of
-    a stimulated roll-out is due to the stimulation.
-
-    The state is taken `at` control steps after the reset, and the walk goes on for `survive` steps.
+    The state is taken `at` control steps after the reset. Seeds whose walk does not get that far are skipped,
+    but not those whose walk would fall later: to leave these out would flatter every stimulation.
 
     Raises:
         RobotError: too few of ``4 * count`` walks last that long.
     """
     starts: list[StartState] = []
     for seed in range(first_seed, first_seed + 4 * count):
-        start = None
-        for step in _walk(robot, policy, seed, at + survive):
+        for step in _walk(robot, policy, seed, at):
             if step == at:
-                start = StartState(seed, at, robot.snapshot(), policy.snapshot())
-        if start is not None and step == at + survive:
-            starts.append(start)
+                starts.append(StartState(seed, at, robot.snapshot(), policy.snapshot()))
         if len(starts) == count:
             return starts
     raise RobotError(
-        f"{robot.name}: expected {count} walks of {at + survive} steps without a fall among {4 * count} "
-        f"seeds, found {len(starts)}; dissection needs a policy that mostly stays up"
+        f"{robot.name}: expected {count} walks of {at} steps without a fall among {4 * count} seeds, found "
+        f"{len(starts)}; dissection needs a policy that mostly stays up"
     )
 
 
-def measure_walk_lengths(
-    robot: Robot, policy: Policy, seeds: Sequence[int], most: int, *, enough: int = 0
-) -> list[int]:
+def measure_walk_lengths(robot: Robot, policy: Policy, seeds: Sequence[int], most: int) -> list[int]:
     """Return for how many control steps unstimulated walks last, in the order of their seeds.
 
-    Walks are broken off after `most` steps. After `enough` walks of that length no more follow; 0 is never.
+    Walks are broken off after `most` steps.
     """
     lengths: list[int] = []
     for seed in seeds:
         *_, length = _walk(robot, policy, seed, most)
         lengths.append(length)
-        if enough and sum(length >= most for length in lengths) >= enough:
-            break
     return lengths
 
 

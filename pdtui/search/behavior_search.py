@@ -13,7 +13,8 @@ from pdtui.core.attributes import Floats
 from pdtui.core.confidence_intervals import bootstrap_interval
 from pdtui.core.units import Stimulation
 from pdtui.core.worker_pool import StepProgress
-from pdtui.probing.effect_probe import EffectProbe, PlanEffects, UnitEffects
+from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.measured_effects import PlanEffects, UnitEffects
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.goal_scores import measure_goal_gains, score_plans_by_goal

@@ -10,7 +10,8 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
-from pdtui.probing.effect_probe import EffectProbe, UnitEffects
+from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.measured_effects import UnitEffects
 from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import PidStimulationPlan
 from pdtui.search.plan_search import Deadline, PlanScoringStage, select_plans

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pdtui.core.attributes import Floats
-from pdtui.probing.effect_probe import PlanEffects
+from pdtui.probing.measured_effects import PlanEffects
 from pdtui.robots.robot import Robot
 from pdtui.robots.robot_goals import BehaviorGoal
 

@@ -11,9 +11,9 @@ from pdtui.dissection.attribute_movers import find_attribute_movers, movable_att
 from pdtui.dissection.dissection_config import QUICK_DISSECTION
 from pdtui.dissection.draft_map import KeyAllocator
 from pdtui.probing.effect_probe import EffectProbe
-from pdtui.probing.primitive_confirmation import select_units_to_refine
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
+from pdtui.probing.unit_selection import select_units_to_refine
 from pdtui.spectra.episode_monitor import MonitoredEpisode, monitor_episodes
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_matching_preset
@@ -25,7 +25,7 @@ def test_the_unit_that_is_wired_to_a_motor_moves_the_body_both_ways(wired_file: 
         prober = EffectProbe(crew)
         episodes = monitor_episodes(crew.robot, crew.policy, range(1000, 1002), 80)
         spread = np.concatenate([episode.attributes for episode in episodes]).std(axis=0)
-        starts = collect_start_states(crew.robot, crew.policy, 1100, 8, at=10, survive=20)
+        starts = collect_start_states(crew.robot, crew.policy, 1100, 14, at=10)
         screen = prober.measure_units(range(crew.policy.units), (-4.0, 4.0), starts[:2], steps=16)
         everything = range(len(crew.robot.attributes))
         chosen = select_units_to_refine(
@@ -34,7 +34,7 @@ def test_the_unit_that_is_wired_to_a_motor_moves_the_body_both_ways(wired_file: 
         refined = prober.measure_units(chosen, (-4.0, 0.0, 4.0), starts[2:4], steps=16)
         plan = replace(QUICK_DISSECTION, mover_steps=18, mover_singles=3, mover_pairs=3)
         columns = movable_attribute_columns(crew.robot.attributes, episodes)
-        found = find_attribute_movers(prober, columns, spread, screen, refined, starts[4:], plan)
+        found = find_attribute_movers(prober, columns, spread, screen, refined, starts[4:6], starts[6:], plan)
         assert found
         assert WIRED_MOTOR >= 0
         for one in found:

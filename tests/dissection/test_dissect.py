@@ -20,8 +20,9 @@ from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.dissection.dissection_tables import render_dissection
 from pdtui.dissection.draft_map import draft_map
 from pdtui.policies.weights.weights_file import hash_file
-from pdtui.probing.effect_probe import EffectProbe, PlanEffects
-from pdtui.probing.primitive_confirmation import rank_correlation
+from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.matching_hits import rank_correlation
+from pdtui.probing.measured_effects import PlanEffects
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
 from pdtui.robots.robot_goals import WALKING_GOALS
@@ -165,7 +166,12 @@ def test_a_budget_that_is_over_still_screens(policy_file: Path) -> None:
 def effects(means: list[list[float]], falls: list[list[bool]], unperturbed: list[float]) -> PlanEffects:
     stimulated, without = np.array(means)[..., None], np.array(unperturbed)[:, None]
     return PlanEffects(
-        stimulated - without, stimulated, without, np.array(falls), np.full(stimulated.shape, np.nan)
+        stimulated - without,
+        stimulated,
+        without,
+        np.array(falls),
+        np.full(stimulated.shape, np.nan),
+        np.zeros(stimulated.shape[1], np.bool_),
     )
 
 
@@ -214,7 +220,7 @@ magnitudes = {{ "0:3" = 9.5, "1:7" = -9.5 }}
         ),
     )
     with RolloutPool("ant", policy_file, 1) as crew:
-        starts = collect_start_states(crew.robot, crew.policy, 1200, 1, at=5, survive=20)
+        starts = collect_start_states(crew.robot, crew.policy, 1200, 1, at=5)
         searches = DissectionSearches(
             EffectProbe(crew), crew.robot, effort, 1000, SharedTimeBudget(None), lambda _: None, (known,)
         )

@@ -39,7 +39,7 @@ def test_a_roll_out_from_a_start_goes_on_as_the_walk_did(
     world: Callable[[], Robot], network: Callable[[], Policy]
 ) -> None:
     robot, policy = world(), network()
-    starts = collect_start_states(robot, policy, 5, 2, at=30, survive=20)
+    starts = collect_start_states(robot, policy, 5, 2, at=30)
     robot.reset(seed=5)
     policy.reset()
     values = []
@@ -53,7 +53,7 @@ def test_a_roll_out_from_a_start_goes_on_as_the_walk_did(
 
 def test_without_its_memory_the_start_is_another() -> None:
     robot, policy = Pole(), pole_policy()
-    (start,) = collect_start_states(robot, policy, 5, 1, at=4, survive=20)
+    (start,) = collect_start_states(robot, policy, 5, 1, at=4)
     forgotten = StartState(
         start.seed, start.step, start.snapshot, tuple(0 * array for array in start.policy_state)
     )
@@ -67,7 +67,7 @@ def test_a_unit_that_favours_a_move_makes_it() -> None:
     left_minus_right = weight[1] - np.delete(weight, 1, axis=0).max(axis=0)
     unit = int(np.argmax(left_minus_right))
     assert left_minus_right[unit] > 0
-    (start,) = collect_start_states(robot, policy, 0, 1, at=10, survive=0)
+    (start,) = collect_start_states(robot, policy, 0, 1, at=10)
     flat = parse_unit(f"fc:{unit}", policy.layers)
     pushed = run_rollout(robot, policy, start, Stimulation((flat,), (60.0,)), 20, 10)
     assert pushed.means[0] == 0.0

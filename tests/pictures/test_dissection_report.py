@@ -151,9 +151,19 @@ def test_text_and_properties_say_what_it_was_made_from(dissection: Dissection, e
     (text,) = entities["/summary"]["TextDocument:text"]
     first = summarise_dissection(dissection)["attributes"][0]
     row = f"| vx | {first['frequency']:.2f} | {first['matches'][0]['unit']} |"
-    heading = "## Probing: measured effects of units"
+    heading = "## Probing: effects of units, 3 starts, beside 6 random units"
     for fact in (dissection.policy_hash, f"| seed | {dissection.seed};", heading, row):
         assert fact in text
+    headings = [
+        "# Dissection",
+        "## What was found",
+        "## What was not found",
+        "## What these figures cannot tell",
+    ]
+    places = [text.index(one) for one in [*headings, "## Where it comes from", heading]]
+    assert places == sorted(places)
+    # Three starts allow no p-value below 2 ** -2.
+    assert "Nothing could be confirmed: with 3 starts and 6 random units no p-value is below 0.25" in text
     stored = json.loads(entities["/__properties/dissection"]["summary"][0])
     assert stored == summarise_dissection(dissection)
 

@@ -20,7 +20,7 @@ FIRST_TORQUE = 8
 @pytest.fixture(scope="module")
 def starts(policy_file: Path) -> list[StartState]:
     with RolloutPool("ant", policy_file, 1) as pool:
-        return collect_start_states(pool.robot, pool.policy, 1000, 3, at=20, survive=30)
+        return collect_start_states(pool.robot, pool.policy, 1000, 3, at=20)
 
 
 def test_nothing_stimulated_changes_nothing(policy_file: Path, starts: list[StartState]) -> None:
@@ -65,7 +65,7 @@ def test_the_number_of_workers_does_not_matter(policy_file: Path, starts: list[S
 
 def test_a_wired_unit_is_found_with_its_sign(wired_file: Path) -> None:
     with RolloutPool("ant", wired_file, 1) as pool:
-        starts = collect_start_states(pool.robot, pool.policy, 1000, 2, at=5, survive=20)
+        starts = collect_start_states(pool.robot, pool.policy, 1000, 2, at=5)
         sweep = EffectProbe(pool).measure_units(range(pool.policy.units), (-3.0, 3.0), starts, steps=20)
         unit = pool.policy.layers[0] + WIRED_UNIT
         column = FIRST_TORQUE + WIRED_MOTOR
@@ -106,7 +106,7 @@ def test_a_fall_before_the_measured_steps_leaves_no_number(
 
 def test_a_controller_brings_a_torque_to_its_target(wired_file: Path) -> None:
     with RolloutPool("ant", wired_file, 1) as pool:
-        starts = collect_start_states(pool.robot, pool.policy, 1000, 2, at=5, survive=40)
+        starts = collect_start_states(pool.robot, pool.policy, 1000, 2, at=5)
         name = pool.robot.attributes[FIRST_TORQUE + WIRED_MOTOR].name
         pid = PidGains(name, kp=0.002, ki=0.2, kd=0.0, limit=5.0, step=1.0)
         wired = Stimulation((pool.policy.layers[0] + WIRED_UNIT,), (1.0,))

@@ -43,7 +43,7 @@ def test_an_interrupted_dissection_goes_on_without_loss(policy_file: Path, tmp_p
 
 def test_what_is_known_is_not_run_again_and_anything_else_is(policy_file: Path, tmp_path: Path) -> None:
     with RolloutPool("ant", policy_file, 1) as pool, RolloutJournal(tmp_path / "rollouts", "one") as journal:
-        starts = collect_start_states(pool.robot, pool.policy, 1000, 2, at=5, survive=20)
+        starts = collect_start_states(pool.robot, pool.policy, 1000, 2, at=5)
         plan, other = Stimulation((3,), (2.0,)), Stimulation((3,), (2.5,))
         first = EffectProbe(pool, journal).measure_plans([plan], starts, steps=10)
         known = len(journal)
@@ -58,7 +58,7 @@ def test_what_is_known_is_not_run_again_and_anything_else_is(policy_file: Path, 
 
 def test_starts_that_differ_only_in_their_random_generator_are_two(policy_file: Path, tmp_path: Path) -> None:
     with RolloutPool("ant", policy_file, 1) as pool, RolloutJournal(tmp_path / "rollouts", "one") as journal:
-        (start,) = collect_start_states(pool.robot, pool.policy, 1000, 1, at=5, survive=20)
+        (start,) = collect_start_states(pool.robot, pool.policy, 1000, 1, at=5)
         rng = np.random.default_rng(1).bit_generator.state
         other = replace(start, snapshot=replace(start.snapshot, rng=rng))
         EffectProbe(pool, journal).measure_plans([Stimulation((3,), (2.0,))], [start, other], steps=10)

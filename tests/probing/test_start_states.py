@@ -12,7 +12,7 @@ from pdtui.robots import make_robot
 
 def test_starts_are_where_the_walk_was(policy_file: Path) -> None:
     robot, policy = make_robot("ant"), load_policy(policy_file)
-    starts = collect_start_states(robot, policy, 2000, 2, at=15, survive=10)
+    starts = collect_start_states(robot, policy, 2000, 2, at=15)
     assert [(start.seed, start.step) for start in starts] == [(2000, 15), (2001, 15)]
     observation, _ = robot.reset(seed=2001)
     for _ in range(15):
@@ -25,5 +25,5 @@ def test_starts_are_where_the_walk_was(policy_file: Path) -> None:
 def test_a_policy_that_always_falls_is_refused(policy_file: Path) -> None:
     robot, policy = make_robot("ant"), load_policy(policy_file)
     robot._healthy_z_range = (0.9, 1.0)  # type: ignore[attr-defined]
-    with pytest.raises(RobotError, match=r"ant: expected 2 walks of 25 steps without a fall .*found 0"):
-        collect_start_states(robot, policy, 2000, 2, at=15, survive=10)
+    with pytest.raises(RobotError, match=r"ant: expected 2 walks of 15 steps without a fall .*found 0"):
+        collect_start_states(robot, policy, 2000, 2, at=15)

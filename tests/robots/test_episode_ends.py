@@ -97,9 +97,9 @@ def test_monitoring_and_walks_end_with_the_episode(robot: Sprinter) -> None:
     (episode,) = monitor_episodes(robot, _policy(), [0], 50)
     assert (episode.steps, episode.ended) == (LAST, robot.end)
     assert measure_walk_lengths(robot, _policy(), [0, 1], 50) == [LAST - 1] * 2
-    assert len(collect_start_states(robot, _policy(), 0, 2, at=5, survive=10)) == 2
-    with pytest.raises(Exception, match="expected 1 walks of 30 steps"):
-        collect_start_states(robot, _policy(), 0, 1, at=5, survive=25)
+    assert len(collect_start_states(robot, _policy(), 0, 2, at=5)) == 2
+    with pytest.raises(Exception, match="expected 1 walks of 25 steps"):
+        collect_start_states(robot, _policy(), 0, 1, at=25)
 
 
 def test_a_roll_out_ends_with_the_episode(robot: Sprinter) -> None:

@@ -161,7 +161,7 @@ def test_probing_sees_the_authors_brake_and_how_common_brakes_are(reference: Ref
     units = sorted({156, *others})
     with RolloutPool(_PaddedAnt(), policy, 1) as pool:
         speed = pool.robot.attribute_index("speed")
-        starts = collect_start_states(pool.robot, policy, 1102, 4, at=100, survive=100)
+        starts = collect_start_states(pool.robot, policy, 1102, 4, at=100)
         sweep = EffectProbe(pool).measure_units(units, (-20.0, -8.0), starts, steps=80)
     change = np.nan_to_num(sweep.effects[..., speed])
     row = units.index(156)

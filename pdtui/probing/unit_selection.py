@@ -1,0 +1,90 @@
+"""Choose the units that are probed further, from effects on starts that will not judge them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.probing.measured_effects import UnitEffects
+from pdtui.spectra.matching import UnitDiscrepancies
+
+RANDOM_QUANTILE = 0.9
+"""A unit exceeds random units if it moves the attribute more than this share of all units does."""
+
+
+@dataclass(frozen=True)
+class PrimitiveCandidate:
+    """A unit that may move an attribute, chosen before it is judged.
+
+    Attributes:
+        unit: flat index.
+        column: column of the attribute.
+        value: output v that moved the attribute most, among those that are judged.
+        sign: 1 if the attribute rose, −1 if it fell.
+    """
+
+    unit: int
+    column: int
+    value: float
+    sign: float
+
+
+def select_units_to_refine(
+    screen: UnitEffects, matching: UnitDiscrepancies, columns: Sequence[int], keep: int
+) -> tuple[int, ...]:
+    """Choose the first match of each attribute, and the `keep` strongest probed units in each direction."""
+    chosen: set[int] = set()
+    for column in columns:
+        chosen.update(matching.ranked_units(column)[:1].tolist())
+        for sign in (1.0, -1.0):
+            strengths = screen.robust_effects(column, sign).max(axis=1)
+            order = np.argsort(-strengths, kind="stable")[:keep]
+            chosen.update(screen.units[row] for row in order if strengths[row] > 0)
+    return tuple(sorted(chosen))
+
+
+def sample_control_units(units: Sequence[int], count: int, seed: int) -> tuple[int, ...]:
+    """Draw units at random, whatever they do: a ranking has to beat them."""
+    rng = np.random.default_rng(seed)
+    chosen = rng.choice(np.array(units), size=min(count, len(units)), replace=False)
+    return tuple(sorted(chosen.tolist()))
+
+
+def choose_primitive_candidates(
+    refined: UnitEffects,
+    matching: UnitDiscrepancies,
+    columns: Sequence[int],
+    values: Sequence[float],
+    keep: int,
+) -> tuple[PrimitiveCandidate, ...]:
+    """Choose for each attribute its first match and the `keep` units that move it most reliably.
+
+    Each comes with its best output among those of `values` at which units were refined.
+    """
+    doses = [dose for dose, value in enumerate(refined.values) if value in values]
+    candidates = []
+    for column in columns:
+        robust = np.maximum(refined.robust_effects(column, 1.0), refined.robust_effects(column, -1.0))
+        strengths = robust[:, doses].max(axis=1)
+        order = np.argsort(-strengths, kind="stable")[:keep]
+        rows = [int(row) for row in order if strengths[row] > 0]
+        first = [refined.units.index(int(unit)) for unit in matching.ranked_units(column)[:1]]
+        means = refined.counted_effects()[..., column].mean(axis=-1)
+        for row in dict.fromkeys([*first, *rows]):
+            # A unit without a reliable effect is judged where its mean effect is largest.
+            scores = robust[row] if strengths[row] > 0 else np.abs(means[row])
+            dose = doses[int(np.argmax(scores[doses]))]
+            sign = 1.0 if means[row, dose] >= 0 else -1.0
+            candidates.append(PrimitiveCandidate(refined.units[row], column, refined.values[dose], sign))
+    return tuple(candidates)
+
+
+def exceeds_random_units(effect: float, value: float, column: int, screen: UnitEffects) -> bool:
+    """Return whether an effect exceeds that of `RANDOM_QUANTILE` of all units at the nearest screened |v|."""
+    magnitude = min((abs(v) for v in screen.values), key=lambda size: abs(size - abs(value)))
+    doses = [dose for dose, v in enumerate(screen.values) if abs(v) == magnitude]
+    # A fall before the measured steps leaves NaN, which counts as no effect.
+    sizes = np.abs(np.nan_to_num(screen.effects[:, doses, :, column]).mean(axis=-1))
+    return bool(abs(effect) > np.quantile(sizes, RANDOM_QUANTILE))
