@@ -43,7 +43,7 @@ def test_masses_are_scaled_with_everything_that_follows_from_them() -> None:
     own = robot.model.body_subtreemass[0]  # type: ignore[attr-defined]
     with scaled_physics(robot, 1.0, 1.2):
         assert robot.model.body_subtreemass[0] == pytest.approx(1.2 * own)  # type: ignore[attr-defined]
-        assert robot.model.body_subtreemass[0] == own  # type: ignore[attr-defined]
+    assert robot.model.body_subtreemass[0] == own  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("name", ["ant", "anymal", "walker", "HalfCheetah-v5"])
