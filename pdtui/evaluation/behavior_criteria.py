@@ -74,10 +74,14 @@ class BehaviorCriterion:
 
     Attributes:
         words: The criterion, for tables.
+        quantity: What is measured, with its unit.
+        measure: Measures it in a run; NaN where the run has ended.
         judge: Tells whether a run without a fall meets it.
     """
 
     words: str
+    quantity: str
+    measure: Callable[[JudgedRun], float]
     judge: Callable[[JudgedRun], bool]
 
     def is_met(self, run: JudgedRun) -> bool:
@@ -103,7 +107,7 @@ def choose_criterion(name: str, aim: BehaviorAim, attributes: Sequence[Attribute
         return _spin(aim) if "spin" in words else _turn(aim)
     if directed and aim.attribute in ("vx", "vy") and {"vx", "vy"} <= known.keys() and "drift" not in words:
         return _course(aim)
-    return _beyond_default(aim) if not directed else _beyond_zero(aim)
+    return _beyond_zero(aim, unit) if directed else _beyond_default(aim, unit)
 
 
 def _side(aim: BehaviorAim) -> str:
@@ -111,61 +115,75 @@ def _side(aim: BehaviorAim) -> str:
 
 
 def _spin(aim: BehaviorAim) -> BehaviorCriterion:
-    def judge(run: JudgedRun) -> bool:
-        return float(np.nanmax(aim.sign * run.turned(aim.attribute))) >= 2.0 * np.pi * TURNS
+    def count_turns(run: JudgedRun) -> float:
+        turned = aim.sign * run.turned(aim.attribute)
+        return float(turned[np.isfinite(turned)].max(initial=0.0)) / (2.0 * np.pi)
 
-    return BehaviorCriterion(f"two full turns to the {_side(aim)}", judge)
+    words = f"two full turns to the {_side(aim)}"
+    return BehaviorCriterion(words, "turns", count_turns, lambda run: count_turns(run) >= TURNS)
 
 
 def _turn(aim: BehaviorAim) -> BehaviorCriterion:
-    def judge(run: JudgedRun) -> bool:
+    def rate(run: JudgedRun) -> float:
         turned = run.turned(aim.attribute)[run.times.last_bins]
-        seconds = (len(turned) - 1) * run.times.bin_seconds
-        return float(aim.sign * (turned[-1] - turned[0])) / seconds >= TURN_RATE
+        return float(turned[-1] - turned[0]) / ((len(turned) - 1) * run.times.bin_seconds)
 
-    return BehaviorCriterion(f"still turns {_side(aim)} by {TURN_RATE} rad/s in the last 5 s", judge)
+    words = f"still turns {_side(aim)} by {TURN_RATE} rad/s in the last 5 s"
+    return BehaviorCriterion(words, "rad/s", rate, lambda run: aim.sign * rate(run) >= TURN_RATE)
 
 
 def _stand(attribute: str, unit: str) -> BehaviorCriterion:
-    def judge(run: JudgedRun) -> bool:
-        left = abs(run.last(attribute))
-        if unit == "m/s":
-            return left < STAND_SPEED and not run.drift() > STAND_DRIFT  # NaN without poses
-        return left < STAND_SHARE * abs(run.last(attribute, default=True))
+    def left(run: JudgedRun) -> float:
+        return abs(run.last(attribute))
 
-    if unit == "m/s":
-        return BehaviorCriterion(
-            f"stands in the last 5 s: under {STAND_SPEED} m/s, within {STAND_DRIFT} m", judge
-        )
-    return BehaviorCriterion(f"under {STAND_SHARE:.0%} of the default in the last 5 s", judge)
+    def judge_stand(run: JudgedRun) -> bool:
+        return left(run) < STAND_SPEED and not run.drift() > STAND_DRIFT  # NaN without poses
+
+    def judge_share(run: JudgedRun) -> bool:
+        return left(run) < STAND_SHARE * abs(run.last(attribute, default=True))
+
+    if unit != "m/s":
+        words = f"under {STAND_SHARE:.0%} of the default in the last 5 s"
+        return BehaviorCriterion(words, unit, left, judge_share)
+    words = f"stands in the last 5 s: under {STAND_SPEED} m/s, within {STAND_DRIFT} m"
+    return BehaviorCriterion(words, unit, left, judge_stand)
 
 
 def _course(aim: BehaviorAim) -> BehaviorCriterion:
-    axis = "vxvy".index(aim.attribute) // 2
+    axis = ("vx", "vy").index(aim.attribute)
+
+    def velocity(run: JudgedRun) -> Floats:
+        return np.array([run.last("vx"), run.last("vy")])
+
+    def off(run: JudgedRun) -> float:
+        along, across = aim.sign * velocity(run)[axis], velocity(run)[1 - axis]
+        return float(np.degrees(np.arctan2(abs(across), along)))
 
     def judge(run: JudgedRun) -> bool:
-        velocity = np.array([run.last("vx"), run.last("vy")])
-        along = aim.sign * float(velocity[axis])
-        return along > STAND_SPEED and along >= np.cos(np.radians(COURSE)) * float(np.hypot(*velocity))
+        return bool(np.hypot(*velocity(run)) > STAND_SPEED) and off(run) <= COURSE
 
     sign = "+" if aim.sign > 0 else "−"
+    words = f"course within {COURSE:.0f}° of {sign}{aim.attribute[1]} in the last 5 s"
+    return BehaviorCriterion(words, "° off", off, judge)
+
+
+def _beyond_zero(aim: BehaviorAim, unit: str) -> BehaviorCriterion:
+    sign = ">" if aim.sign > 0 else "<"
     return BehaviorCriterion(
-        f"course within {COURSE:.0f}° of {sign}{aim.attribute[1]} in the last 5 s", judge
+        f"{aim.attribute} {sign} 0 and {sign} the default's in the last 5 s",
+        unit,
+        lambda run: run.last(aim.attribute),
+        lambda run: aim.sign * run.last(aim.attribute) > 0.0 and _beats_default(run, aim),
     )
 
 
-def _beyond_zero(aim: BehaviorAim) -> BehaviorCriterion:
-    def judge(run: JudgedRun) -> bool:
-        return aim.sign * run.last(aim.attribute) > 0.0 and _beats_default(run, aim)
-
-    sign = ">" if aim.sign > 0 else "<"
-    return BehaviorCriterion(f"{aim.attribute} {sign} 0 and {sign} the default's in the last 5 s", judge)
-
-
-def _beyond_default(aim: BehaviorAim) -> BehaviorCriterion:
+def _beyond_default(aim: BehaviorAim, unit: str) -> BehaviorCriterion:
     sign = ">" if aim.sign > 0 else "<"
     return BehaviorCriterion(
-        f"{aim.attribute} {sign} the default's in the last 5 s", partial(_beats_default, aim=aim)
+        f"{aim.attribute} {sign} the default's in the last 5 s",
+        unit,
+        lambda run: run.last(aim.attribute),
+        partial(_beats_default, aim=aim),
     )
 
 

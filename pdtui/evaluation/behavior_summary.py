@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pdtui.core.attributes import Attribute
-from pdtui.evaluation.behavior_criteria import JudgedRun, choose_criterion
+from pdtui.evaluation.behavior_criteria import BehaviorCriterion, JudgedRun, choose_criterion
 from pdtui.evaluation.effect_figures import (
     SideEffects,
     WindowEffect,
@@ -68,6 +68,7 @@ class BehaviorEvaluation:
         attribute, unit: The attribute of its aim, and the unit of that.
         wanted: Sign of the wanted effect; that of ``stop`` is towards 0.
         criterion: What a person would call by its name, in words.
+        seen, quantity: Median of what the criterion measures, and its name or unit.
         runs: Number of seeds.
         held: Time for which it is held, s.
         first, last: The effect in the first and the last window of the hold.
@@ -95,6 +96,8 @@ class BehaviorEvaluation:
     unit: str
     wanted: float
     criterion: str
+    seen: float
+    quantity: str
     runs: int
     held: float
     first: WindowEffect
@@ -139,14 +142,25 @@ class BehaviorRuns:
         assert self.behavior.aim is not None
         return wanted_sign(self.behavior.aim, self.defaults, self.column)
 
+    @property
+    def criterion(self) -> BehaviorCriterion:
+        """What a person would call by the behavior's name."""
+        assert self.behavior.aim is not None
+        return choose_criterion(self.behavior.name, self.behavior.aim, self.attributes)
+
+    def judged_runs(self, traces: Sequence[HeldRunTrace]) -> list[JudgedRun]:
+        """Return runs on the first seeds with what a criterion needs to judge them."""
+        rows = zip(traces, self.defaults, self.times, strict=False)
+        return [JudgedRun(trace, default, times, self.attributes) for trace, default, times in rows]
+
     def judge(self, traces: Sequence[HeldRunTrace]) -> list[bool]:
         """Return which runs meet the behavior's criterion."""
-        assert self.behavior.aim is not None
-        criterion = choose_criterion(self.behavior.name, self.behavior.aim, self.attributes)
-        return [
-            criterion.is_met(JudgedRun(trace, default, times, self.attributes))
-            for trace, default, times in zip(traces, self.defaults, self.times, strict=False)
-        ]
+        return [self.criterion.is_met(run) for run in self.judged_runs(traces)]
+
+    def measure(self) -> float:
+        """Return the median of what the criterion measures; NaN if every run ended before."""
+        seen = np.array([self.criterion.measure(run) for run in self.judged_runs(self.traces)])
+        return float(np.nanmedian(seen)) if np.isfinite(seen).any() else float("nan")
 
     def wanted_effects(self, traces: Sequence[HeldRunTrace]) -> tuple[float, float]:
         """Return the mean effects in the first and the last window in the wanted direction."""
@@ -173,7 +187,9 @@ def summarise_behavior(runs: BehaviorRuns) -> BehaviorEvaluation:
         attribute=behavior.aim.attribute,
         unit=runs.attributes[column].unit,
         wanted=runs.sign,
-        criterion=choose_criterion(behavior.name, behavior.aim, runs.attributes).words,
+        criterion=runs.criterion.words,
+        seen=runs.measure(),
+        quantity=runs.criterion.quantity,
         runs=len(runs.traces),
         held=held,
         first=window_effect(*both, column, times.first_bins),

@@ -31,12 +31,13 @@ def _criteria_table(result: MapEvaluation) -> Table:
     rows = result.undisturbed()
     title = f"{_title(result)}, held for {rows[0].held:.0f} s"
     left = ["behavior", "is called so if it"]
-    columns = ("met [95 %]", "by itself", "falls", "falls by itself", "back after release")
+    columns = ("median", "met [95 %]", "by itself", "falls", "falls by itself", "back after release")
     table = new_table(title, *left, *columns, left=left)
     for row in rows:
         table.add_row(
             row.behavior,
             row.criterion,
+            f"{row.seen:.2f} {row.quantity}",
             f"{row.judged}/{row.runs} [{row.judged_low:.0%}, {row.judged_high:.0%}]",
             *(
                 f"{count}/{row.runs}"

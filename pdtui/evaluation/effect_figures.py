@@ -12,8 +12,8 @@ from pdtui.evaluation.held_run import HeldRunTrace
 from pdtui.evaluation.paired_statistics import sign_flip_p_value, studentised_interval
 from pdtui.evaluation.protocol_settings import RunTimes
 
-ONSET_SECONDS, END_SECONDS = 0.5, 1.0
-"""Effects are averaged over these times before their onset and end are read, because strides swing them."""
+ONSET_SECONDS = 0.5
+"""Effects are averaged over this time before their onset is read, because strides swing them."""
 GAIT_ATTRIBUTES = ("speed", "height", "yaw rate", "pitch")
 """Attributes by which the usual gait is recognised, whatever the course."""
 _GAIT_SPREADS, _GAIT_SHARE = 3.0, 0.1
@@ -102,7 +102,9 @@ def onset_and_end(effect: Floats, times: RunTimes, sign: float) -> tuple[float, 
     if half <= 0.0:
         return float("nan"), 0.0
     held, seconds = sign * effect[: times.held_bins], times.bin_seconds
-    rises, falls = (_running_mean(held, length, seconds) for length in (ONSET_SECONDS, END_SECONDS))
+    rises = _running_mean(held, max(1, round(ONSET_SECONDS / seconds)))
+    # The end compares like with like: means as long as the first window, which noise does not lift to half.
+    falls = _running_mean(held, times.first_bins.stop)
     there, left = np.flatnonzero(rises >= half), np.flatnonzero(falls >= half)
     onset = _middle(int(there[0]), held, rises) * seconds if len(there) else float("nan")
     if not len(left):
@@ -111,8 +113,8 @@ def onset_and_end(effect: Floats, times: RunTimes, sign: float) -> tuple[float, 
     return onset, (len(held) if whole else _middle(int(left[-1]), held, falls)) * seconds
 
 
-def _running_mean(values: Floats, length: float, seconds: float) -> Floats:
-    width = min(max(1, round(length / seconds)), len(values))
+def _running_mean(values: Floats, width: int) -> Floats:
+    width = min(width, len(values))
     return np.convolve(values, np.full(width, 1.0 / width), "valid")
 
 
