@@ -70,14 +70,22 @@ def test_a_replay_names_the_first_step_that_differs(map_path: Path, tmp_path: Pa
 
 
 def test_evaluate_prints_the_agreed_json(map_path: Path) -> None:
-    result = run("evaluate", "ant", "--map", map_path, "--seeds", "100-101", "--json")
+    few = ("--seeds", "100", "--quick", "--hold", 100)
+    result = run("evaluate", "ant", "--map", map_path, *few, "--json")
     assert result.exit_code == 0, result.output
     data = json.loads(result.output)
-    assert (data["robot"], data["policy"], data["seeds"]) == ("ant", "small", [100, 101])
-    (push,) = data["behaviors"]
-    assert push["behavior"] == "push"
-    assert {"measure", "effect", "low", "high", "default", "right_sign", "falls"} <= push.keys()
-    assert push["low"] <= push["effect"] <= push["high"]
+    assert (data["robot"], data["policy"], data["seeds"]) == ("ant", "small", [100])
+    assert {row["behavior"] for row in data["behaviors"]} == {"push"}
+    push = data["behaviors"][0]
+    assert {"condition", "criterion", "onset", "lasts", "judged", "back", "falls", "holds"} <= push.keys()
+    assert {"effect", "low", "high", "p_value", "corrected", "default"} <= push["last"].keys()
+    assert [one["kind"] for one in push["substitutes"]] == ["random units", "random directions", "actions"]
+
+
+def test_evaluate_refuses_a_quick_look_at_anything_but_behaviors(map_path: Path) -> None:
+    refused = run("evaluate", "ant", "--map", map_path, "--policy-only", "--quick")
+    assert refused.exit_code == 2
+    assert "--policy-only and --quick are mutually exclusive" in refused.output
 
 
 def test_evaluate_measures_a_target_and_the_policy_alone(map_path: Path) -> None:

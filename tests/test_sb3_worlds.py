@@ -11,7 +11,11 @@ import pytest
 from click.testing import CliRunner
 
 from pdtui.cli import main
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.evaluation.behavior_evaluation import evaluate_behaviors, plan_evaluation
+from pdtui.evaluation.protocol_settings import ProtocolSettings
 from pdtui.sessions.session_reader import read_session
+from pdtui.stimulation.map_policy_lookup import resolve_map_policy
 from pdtui.stimulation.map_reader import load_map
 
 FIXTURES = Path(__file__).parent / "fixtures"
@@ -47,12 +51,15 @@ def test_a_policy_is_dissected_measured_driven_and_replayed(env: str, tmp_path: 
     behaviors = list(stimulation_map.behaviors.values())
     assert stimulation_map.primitives or behaviors
 
-    measured = strict(run("evaluate", path, "--seeds", "100-104", "--workers", 2, "--json"))["behaviors"]
+    config = DriveConfig(env, resolve_map_policy(stimulation_map), 0)
+    few = ProtocolSettings(hold_steps=200, hold_seconds=0.0, window_seconds=1.0, draws=0, condition_seeds=0)
+    plan = plan_evaluation(config, range(100, 105), few)
+    measured = evaluate_behaviors(config, plan, workers=2).behaviors
     aimed = {one.name: one.aim for one in behaviors if one.aim is not None}
-    assert [one["behavior"] for one in measured] == list(aimed)
+    assert [one.behavior for one in measured] == list(aimed)
     if env == "Hopper-v5":
         assert measured, "a hopper's leg is easily moved"
-    signs = [np.sign(one["effect"]) == aimed[one["behavior"]].sign for one in measured]
+    signs = [np.sign(one.first.effect) == aimed[one.behavior].sign for one in measured]
     assert sum(signs) >= 0.5 * len(signs), measured
 
     pressed = [one.key for one in behaviors][:3]

@@ -15,6 +15,7 @@ from pdtui.cli.shared_options import (
     build_drive_config,
     force_option,
     import_option_flags,
+    integer_option,
     json_option,
     map_option,
     map_policy_option,
@@ -31,6 +32,7 @@ from pdtui.stimulation.seed_ranges import require_unused_seeds
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
+    from pdtui.evaluation.protocol_settings import ProtocolSettings
     from pdtui.paper.experiment import Experiment
 
 
@@ -74,9 +76,15 @@ def experiment_options(command: click.Command) -> click.Command:
 @click.option("--policy-only", is_flag=True, help="Measure the policy alone, one episode per seed.")
 @start_option
 @click.option(
-    "--update",
-    is_flag=True,
-    help="Write the measured effects of the behaviors into the map; its comments are kept.",
+    "--update", is_flag=True, help="Write the effects of the behaviors into the map; its comments are kept."
+)
+@click.option("--quick", is_flag=True, help="Take a quick look: fewer seeds and random draws.")
+@integer_option("--hold", help="Control steps for which a behavior is held, at least 10 s; default: 1000.")
+@click.option(
+    "--strip",
+    type=FILE_PATH,
+    metavar="FILE.png",
+    help="Draw frames of the best, the median and the worst seed of each behavior.",
 )
 @click.option(
     "--experiment",
@@ -107,6 +115,9 @@ def evaluate_command(
     policy_only: bool,
     start: str,
     update: bool,
+    quick: bool,
+    hold: int | None,
+    strip: Path | None,
     experiment: str | None,
     pictures: tuple[Path, ...],
     overwrite: bool,
@@ -119,10 +130,12 @@ def evaluate_command(
     ROBOT is a robot's name or a map file.
     """
     own_options = {name: value for name, value in own_options.items() if value not in (None, ())}
+    _check_modes(
+        {"--policy-only": policy_only, "--target": target, "--experiment": experiment},
+        {"--update": update, "--quick": quick, "--hold": hold, "--strip": strip},
+    )
     if experiment is None and (others or pictures):
         raise click.UsageError(f"{'more than one map' if others else '-o'} needs --experiment")
-    if sum([policy_only, target is not None, update, experiment is not None]) > 1:
-        raise click.UsageError("--target, --policy-only, --update and --experiment are mutually exclusive")
     if start and not policy_only:
         raise click.UsageError("--start needs --policy-only; tasks and experiments have their own starts")
     if update and force:
@@ -163,7 +176,11 @@ def evaluate_command(
             alone = evaluate_policy(config, seeds, progress=advance)
         print_result(asdict(alone), as_json, lambda: policy_evaluation_table(alone))
     else:
-        _evaluate_behaviors(config, seeds, workers, update, as_json)
+        from pdtui.evaluation.protocol_settings import QUICK_SEEDS, choose_protocol
+
+        sizes = seeds[:QUICK_SEEDS] if quick else seeds, choose_protocol(quick=quick, hold=hold)
+        drawn = None if strip is None else (strip, overwrite)
+        _evaluate_behaviors(config, *sizes, workers, drawn, update=update, as_json=as_json)
 
 
 def _require_unused_seeds(config: DriveConfig, seeds: range) -> None:
@@ -173,17 +190,42 @@ def _require_unused_seeds(config: DriveConfig, seeds: range) -> None:
         click.echo(make_printable(warning), err=True)
 
 
-def _evaluate_behaviors(config: DriveConfig, seeds: range, workers: int, update: bool, as_json: bool) -> None:
-    from pdtui.evaluation.behavior_evaluation import evaluate_behaviors
-    from pdtui.evaluation.evaluation_tables import behavior_tables
+def _evaluate_behaviors(
+    config: DriveConfig,
+    seeds: range,
+    settings: ProtocolSettings,
+    workers: int,
+    drawn: tuple[Path, bool] | None,
+    *,
+    update: bool,
+    as_json: bool,
+) -> None:
+    from pdtui.evaluation import behavior_evaluation as evaluation
+    from pdtui.evaluation.behavior_tables import behavior_tables
+    from pdtui.pictures.behavior_strips import draw_strips, film_strips
+    from pdtui.pictures.matplotlib_page import check_figure_path
     from pdtui.stimulation.map_writer import replace_effects, rewrite_map
 
+    if drawn is not None:
+        check_figure_path(*drawn)
+    plan = evaluation.plan_evaluation(config, seeds, settings)
+    if not as_json:
+        click.echo(f"{evaluation.count_control_steps(plan):,} control steps, {workers} processes", err=True)
     with progress_bar("evaluating", quiet=as_json) as advance:
-        result = evaluate_behaviors(config, seeds, workers=workers, progress=advance)
+        result = evaluation.evaluate_behaviors(config, plan, workers=workers, progress=advance)
     if update:
         path = Path(config.stimulation_map.source)
         rewrite_map(path, lambda text: replace_effects(text, result.measured_effects(), str(path)))
     print_result(asdict(result), as_json, lambda: behavior_tables(result))
+    if drawn is not None:
+        with progress_bar("filming", quiet=as_json) as advance:
+            draw_strips(drawn[0], plan, result, film_strips(plan, result, advance))
+
+
+def _check_modes(modes: Mapping[str, Any], behaviors_only: Mapping[str, Any]) -> None:
+    chosen, given = ([flag for flag, on in flags.items() if on] for flags in (modes, behaviors_only))
+    if len(chosen) > 1 or (chosen and given):
+        raise click.UsageError(f"{' and '.join((chosen + given)[:2])} are mutually exclusive")
 
 
 def _check_experiment(

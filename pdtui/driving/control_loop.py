@@ -5,19 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import KeystrokeError, MapError, SimulationDiverged
 from pdtui.core.step_record import StepRecord
+from pdtui.core.units import Stimulation
 from pdtui.driving.rewind_history import STEPS_PER_KEPT_STATE, DriveState, RewindHistory
-from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.runtime.policy import Policy, PolicyStep
 from pdtui.robots.robot import Robot, is_fall
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.stimulation.behavior_latch import BehaviorLatch
 from pdtui.stimulation.stimulation_map import StimulationMap
+
+PolicyAct = Callable[[NDArray[Any], Stimulation, np.random.Generator | None], PolicyStep]
+"""Acts as `Policy.act` does."""
 
 
 class ControlLoop:
@@ -51,6 +57,8 @@ class ControlLoop:
         self.step = 0
         self.episode = 0
         self.latch = BehaviorLatch(stimulation_map, policy.layers, robot.attributes, robot.control_dt)
+        self.act: PolicyAct = policy.act
+        """What acts in each control step; an evaluation may put a disturbed policy in its place."""
         self._noise = np.random.default_rng(seed) if stochastic else None
         self._ended = False
         self.history = RewindHistory()
@@ -99,7 +107,7 @@ class ControlLoop:
         if self.robot.set_commands({**self.robot.commands, **self.latch.commands}):
             self._observation = self.robot.observe()
         behaviors = self.latch.active
-        acted = self.policy.act(self._observation, stimulation, self._noise)
+        acted = self.act(self._observation, stimulation, self._noise)
         ended, reward, cost, diverged, fell, finished = "", 0.0, 0.0, False, False, False
         try:
             self._observation, gained, terminated, truncated, details = self.robot.step(acted.action)

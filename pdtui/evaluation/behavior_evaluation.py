@@ -1,183 +1,197 @@
-"""`pdtui evaluate`: what each behavior of a map does, on seeds that no search used.
+"""`pdtui evaluate`: what each behavior of a map does when it is held, beside what would do as well.
 
-Each seed is driven twice from the same reset: with the policy alone, and with the behavior latched from step
-`STIMULATED_FROM` on. Attributes are averaged over the last `WINDOW` control steps; an effect is the
-difference between both drives of a seed.
+Each seed is driven with the policy alone and with each behavior, pressed at a step that the seed draws and
+held; see `ProtocolSettings`. The same is done in disturbed worlds, and with substitutes for the behavior's
+units.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-from pdtui.core.attributes import Floats
-from pdtui.core.confidence_intervals import confidence_interval
-from pdtui.core.drive_events import DriveEvent
 from pdtui.core.worker_pool import StepProgress, WorkerPool
-from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.headless_drive import run_episode
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.evaluation.task_evaluation import TaskEvaluation, TaskRunResult, run_task_episode, summarise_task
+from pdtui.evaluation.behavior_summary import (
+    BehaviorEvaluation,
+    BehaviorRuns,
+    SubstituteFigures,
+    correct_over_table,
+    summarise_behavior,
+    summarise_substitute,
+)
+from pdtui.evaluation.effect_figures import relative_spread
+from pdtui.evaluation.evaluation_plan import EvaluationPlan, RunKey
+from pdtui.evaluation.held_run import (
+    HeldRunPlan,
+    HeldRunTrace,
+    PushMeasurement,
+    measure_push,
+    run_held_behavior,
+)
+from pdtui.evaluation.protocol_settings import ProtocolSettings
+from pdtui.evaluation.run_conditions import UNDISTURBED
+from pdtui.evaluation.task_evaluation import (
+    TaskEvaluation,
+    count_task_steps,
+    list_task_runs,
+    run_task_episode,
+    summarise_tasks,
+)
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
 
-STEPS = 400
-"""Control steps per episode."""
-STIMULATED_FROM = 100
-"""Control step before which the behavior is latched: the robot walks steadily by then."""
-WINDOW = 200
-"""Control steps at the end of an episode over which attributes are averaged."""
-
-
-@dataclass(frozen=True)
-class BehaviorEvaluation:
-    """The effect of one behavior over all seeds.
-
-    Attributes:
-        measure: attribute, its unit and what the behavior aims at.
-        effect: mean over seeds of the difference to the policy alone, in the attribute's unit.
-        low, high: 95 % interval of `effect` (Student's t over seeds).
-        value: mean of the attribute with the behavior.
-        default: mean of the attribute with the policy alone.
-        right_sign: number of seeds on which the robot stayed up and the behavior reached its aim: the
-            difference has the right sign and, unless the aim is ``raise`` or ``lower``, so has the attribute
-            itself; for ``stop``, the attribute is less than a fifth of the default.
-        falls: number of seeds on which the robot fell with the behavior.
-        default_falls: number of seeds on which it fell with the policy alone.
-    """
-
-    behavior: str
-    measure: str
-    effect: float
-    low: float
-    high: float
-    value: float
-    default: float
-    right_sign: int
-    falls: int
-    default_falls: int
+FEWEST_DIFFERENT = 0.02
+"""Spread of the starts, as a share of the mean, below which seeds are nearly one start."""
 
 
 @dataclass(frozen=True)
 class MapEvaluation:
-    """The effects of all behaviors of a map, and the success of those with a task."""
+    """What all behaviors of a map do.
+
+    Attributes:
+        robot, policy: Their names.
+        seeds: The seeds.
+        settings: The sizes of the evaluation.
+        control_steps: Control steps that were planned; falls make them fewer.
+        start_spread: Standard deviation over seeds of the mean speed (of the first attribute, where there is
+            no speed) in the first window without a press, as a share of its mean; NaN for one seed.
+        nearly_one_start: Whether that is less than 2 %, so that many seeds tell hardly more than one.
+        not_offered: Conditions that the robot cannot be put in.
+        behaviors: Every behavior with an aim, in each condition.
+        tasks: Every behavior with a task.
+    """
 
     robot: str
     policy: str
     seeds: tuple[int, ...]
+    settings: ProtocolSettings
+    control_steps: int
+    start_spread: float
+    nearly_one_start: bool
+    not_offered: tuple[str, ...]
     behaviors: tuple[BehaviorEvaluation, ...]
     tasks: tuple[TaskEvaluation, ...] = ()
 
+    def undisturbed(self) -> list[BehaviorEvaluation]:
+        """Return the rows of the robot's own world."""
+        return [row for row in self.behaviors if row.condition == UNDISTURBED.name]
+
     def measured_effects(self) -> dict[str, MeasuredEffect]:
-        """Return the effects by behavior, as maps hold them."""
+        """Return the undisturbed effects at the end of the hold by behavior, as maps hold them."""
         return {
-            one.behavior: MeasuredEffect(one.effect, one.low, one.high, one.falls, len(self.seeds))
-            for one in self.behaviors
+            row.behavior: MeasuredEffect(row.last.effect, row.last.low, row.last.high, row.falls, row.runs)
+            for row in self.undisturbed()
         }
 
 
-@dataclass(frozen=True)
-class BehaviorRunMeans:
-    """Means of attributes over the measured steps of one episode, shape (J,), and whether the robot fell."""
+def plan_evaluation(
+    config: DriveConfig, seeds: Sequence[int], settings: ProtocolSettings | None = None
+) -> EvaluationPlan:
+    """Return the runs of an evaluation; the seed of `config` is not used.
 
-    mean: Floats
-    fell: bool
+    Raises:
+        PdtuiError: The robot, policy or map cannot be loaded.
+    """
+    return EvaluationPlan(build_control_loop(config), tuple(seeds), settings or ProtocolSettings())
+
+
+def count_control_steps(plan: EvaluationPlan) -> int:
+    """Return how many control steps an evaluation runs; falls make it fewer."""
+    held = sum(plan.times(key.behavior, key.seed).steps for key in plan.held_runs())
+    times = [plan.times(key.behavior, key.seed) for key in plan.measuring_runs()]
+    first = sum(one.press + one.window for one in times)
+    return held + first + sum(count_task_steps(plan, run) for run in list_task_runs(plan))
 
 
 def evaluate_behaviors(
-    config: DriveConfig, seeds: Sequence[int], *, workers: int = 2, progress: StepProgress | None = None
+    config: DriveConfig, plan: EvaluationPlan, *, workers: int = 1, progress: StepProgress | None = None
 ) -> MapEvaluation:
-    """Measure every behavior of the map that has an aim or a task.
+    """Run an evaluation; `progress` is called with the number of runs done and the total.
 
-    The seed of `config` is not used; `progress` is called with the number of runs done and the total.
-
-    Raises:
-        PdtuiError: the robot, policy or map cannot be loaded.
+    Args:
+        config: What the plan was made for; worker processes build it again.
+        plan: The runs.
+        workers: Number of worker processes.
+        progress: Called with the number of runs done and of all runs.
     """
-    known = config.stimulation_map.behaviors.values()
-    tasked = [b for b in known if b.task]
-    behaviors = [b for b in known if b.aim is not None and b.pid is None]
-    loop = build_control_loop(config)
-    names = ["", *(b.name for b in behaviors)] if behaviors else []
-    jobs: list[_Job] = [(name, seed, "aim") for name in names for seed in seeds]
-    jobs += [(b.name, seed, kind) for b in tasked for kind in ("task", "untouched") for seed in seeds]
-    with WorkerPool(f"evaluation of {config.robot}", workers, loop, build_control_loop, config) as pool:
-        runs: dict[_Job, Any] = dict(zip(jobs, pool.map(_run_job, jobs, progress), strict=True))
-    return MapEvaluation(
-        config.robot,
-        loop.policy.name,
-        tuple(seeds),
-        tuple(_summarise(loop, behavior, runs, seeds) for behavior in behaviors),
-        tuple(
-            summarise_task(
-                behavior,
-                loop.robot.find_task(behavior.task),
-                [runs[behavior.name, seed, "task"] for seed in seeds],
-                [runs[behavior.name, seed, "untouched"] for seed in seeds],
-            )
-            for behavior in tasked
-        ),
-    )
+    measuring, held, tasks = plan.measuring_runs(), plan.held_runs(), list_task_runs(plan)
+    total, done = len(measuring) + len(held) + len(tasks), 0
 
+    def advance(finished: int, _jobs: int) -> None:
+        if progress is not None:
+            progress(done + finished, total)
 
-_Job = tuple[str, int, str]
-"""A behavior's name, a seed, and what to run: ``aim``, ``task``, or ``untouched`` for a task without it."""
-
-
-def _run_job(loop: ControlLoop, job: _Job) -> BehaviorRunMeans | TaskRunResult:
-    name, seed, kind = job
-    if kind == "aim":
-        return run_behavior_episode(loop, name, seed)
-    return run_task_episode(loop, loop.map.behaviors[name], seed, untouched=kind == "untouched")
-
-
-def run_behavior_episode(built: ControlLoop, name: str, seed: int) -> BehaviorRunMeans:
-    """Run one episode with a behavior, or with the policy alone where the name is empty.
-
-    If the episode ends early, the mean is over the steps from `STIMULATED_FROM` to its end.
-    """
-    loop = ControlLoop(built.robot, built.policy, built.map, seed)
-
-    def press(step: int) -> list[DriveEvent]:
-        return [DriveEvent(step, "behavior", name)] if name and step == STIMULATED_FROM else []
-
-    records = list(run_episode(loop, STEPS, press))
-    rows = [record.attributes for record in records]
-    ended = bool(records[-1].ended)
-    window = rows[min(STIMULATED_FROM, len(rows) - 1) :] if ended else rows[-WINDOW:]
-    return BehaviorRunMeans(np.mean(window, axis=0), records[-1].fell)
+    with WorkerPool(f"evaluation of {config.robot}", workers, plan.loop, build_control_loop, config) as pool:
+        measured: dict[str, list[PushMeasurement]] = {}
+        trials = [
+            HeldRunPlan(key.behavior, key.seed, plan.times(key.behavior, key.seed)) for key in measuring
+        ]
+        for key, found in zip(measuring, pool.map(measure_push, trials, advance), strict=True):
+            measured.setdefault(key.behavior, []).append(found)
+        done += len(measuring)
+        runs = {key: run for key in held if (run := plan.held_plan(key, measured)) is not None}
+        traces = dict(zip(runs, pool.map(run_held_behavior, list(runs.values()), advance), strict=True))
+        done += len(held)
+        verdicts = dict(zip(tasks, pool.map(run_task_episode, tasks, advance), strict=True))
+    return _summarise(plan, traces, summarise_tasks(plan, verdicts))
 
 
 def _summarise(
-    loop: ControlLoop, behavior: Behavior, runs: dict[_Job, Any], seeds: Sequence[int]
-) -> BehaviorEvaluation:
-    assert behavior.aim is not None
-    column = loop.robot.attribute_index(behavior.aim.attribute)
-    with_it = np.array([runs[behavior.name, seed, "aim"].mean[column] for seed in seeds])
-    default = np.array([runs["", seed, "aim"].mean[column] for seed in seeds])
-    fell = np.array([runs[behavior.name, seed, "aim"].fell for seed in seeds])
-    effect = with_it - default
-    sign = behavior.aim.sign
-    if behavior.aim.direction == "stop":
-        right = np.abs(with_it) < 0.2 * np.abs(default)
-        wanted = "near 0"
-    elif behavior.aim.direction in ("raise", "lower"):
-        right = effect * sign > 0
-        wanted = "more" if sign > 0 else "less"
-    else:
-        right = (with_it * sign > 0) & (effect * sign > 0)
-        wanted = "> 0" if sign > 0 else "< 0"
-    return BehaviorEvaluation(
-        behavior.name,
-        f"{behavior.aim.attribute} ({loop.robot.attributes[column].unit}), wanted {wanted}",
-        float(effect.mean()),
-        *confidence_interval(effect),
-        float(with_it.mean()),
-        float(default.mean()),
-        int((right & ~fell).sum()),
-        int(fell.sum()),
-        int(sum(runs["", seed, "aim"].fell for seed in seeds)),
+    plan: EvaluationPlan, traces: Mapping[RunKey, HeldRunTrace], tasks: tuple[TaskEvaluation, ...]
+) -> MapEvaluation:
+    robot = plan.loop.robot
+    rows: list[BehaviorEvaluation] = []
+    tables = [UNDISTURBED.name], [name for name in plan.conditions if name != UNDISTURBED.name]
+    for table in tables:
+        own = [_runs_of(plan, traces, behavior, name) for name in table for behavior in plan.behaviors]
+        summaries = [
+            replace(summarise_behavior(runs), substitutes=_summarise_substitutes(plan, traces, runs))
+            for runs in own
+        ]
+        rows += correct_over_table(summaries, plan.settings.level)
+    names = [attribute.name for attribute in robot.attributes]
+    defaults = [traces[RunKey("", seed)] for seed in plan.seeds] if plan.behaviors else []
+    times, column = plan.times("", plan.seeds[0]), names.index("speed") if "speed" in names else 0
+    spread = relative_spread(defaults, column, times)
+    return MapEvaluation(
+        robot.name,
+        plan.loop.policy.name,
+        tuple(plan.seeds),
+        plan.settings,
+        count_control_steps(plan),
+        spread,
+        spread < FEWEST_DIFFERENT,
+        plan.not_offered,
+        tuple(rows),
+        tasks,
     )
+
+
+def _runs_of(
+    plan: EvaluationPlan, traces: Mapping[RunKey, HeldRunTrace], behavior: Behavior, condition: str
+) -> BehaviorRuns:
+    seeds = plan.seeds_of(condition)
+    return BehaviorRuns(
+        behavior,
+        condition,
+        plan.loop.robot.attributes,
+        [plan.times(behavior.name, seed) for seed in seeds],
+        [traces[RunKey(behavior.name, seed, condition)] for seed in seeds],
+        [traces[RunKey("", seed, condition)] for seed in seeds],
+    )
+
+
+def _summarise_substitutes(
+    plan: EvaluationPlan, traces: Mapping[RunKey, HeldRunTrace], own: BehaviorRuns
+) -> tuple[SubstituteFigures, ...]:
+    if own.condition != UNDISTURBED.name:
+        return ()
+    seeds, name = plan.seeds[: plan.settings.draw_seeds], own.behavior.name
+    figures = []
+    for kind, draws in plan.substitutes_of(own.behavior):
+        keys = [[RunKey(name, seed, UNDISTURBED.name, kind, draw) for seed in seeds] for draw in range(draws)]
+        if keys[0][0] in traces:
+            drawn = [[traces[key] for key in row] for row in keys]
+            figures.append(summarise_substitute(kind, own, drawn))
+    return tuple(figures)

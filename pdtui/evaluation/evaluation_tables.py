@@ -1,4 +1,4 @@
-"""The tables of `pdtui evaluate` and `pdtui tune`."""
+"""The tables of targets, of a policy alone and of `pdtui tune`."""
 
 from __future__ import annotations
 
@@ -8,58 +8,10 @@ from rich.console import Group
 from rich.table import Table
 
 from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
-from pdtui.evaluation.behavior_evaluation import MapEvaluation
 from pdtui.evaluation.policy_evaluation import PolicyEvaluation
 from pdtui.search.gain_tuning import TunedGains
 from pdtui.search.step_response import StepResponseSummary
 from pdtui.search.tracking_summary import TrackingSummary
-
-
-def behavior_tables(result: MapEvaluation) -> Group:
-    """Return a table of the behaviors that move an attribute, and one of those with a task."""
-    tables = [_aim_table(result)] if result.behaviors else []
-    return Group(*tables, *([_task_table(result)] if result.tasks else []))
-
-
-def _task_table(result: MapEvaluation) -> Table:
-    table = new_table(
-        f"{result.robot}, policy {result.policy}, {format_seed_range(result.seeds)}",
-        *("behavior", "success means", "success", "without it", "falls", "measured (without it)"),
-    )
-    count = len(result.seeds)
-    for row in result.tasks:
-        measured = ", ".join(
-            f"{name} {value:.2f} ({row.figures_by_itself.get(name, float('nan')):.2f})"
-            for name, value in row.figures.items()
-        )
-        table.add_row(
-            row.behavior,
-            row.wanted,
-            f"{row.done}/{count}",
-            f"{row.by_itself}/{count}",
-            f"{row.falls}/{count}",
-            measured,
-        )
-    return table
-
-
-def _aim_table(result: MapEvaluation) -> Table:
-    table = new_table(
-        f"{result.robot}, policy {result.policy}, {format_seed_range(result.seeds)}",
-        *("behavior", "attribute", "with it", "default", "effect [95 %]", "aim reached", "falls"),
-    )
-    count = len(result.seeds)
-    for row in result.behaviors:
-        table.add_row(
-            row.behavior,
-            row.measure,
-            f"{row.value:.2f}",
-            f"{row.default:.2f}",
-            format_mean_with_interval(row.effect, row.low, row.high, "+.2f"),
-            f"{row.right_sign}/{count}",
-            f"{row.falls}/{count}",
-        )
-    return table
 
 
 def policy_evaluation_table(result: PolicyEvaluation) -> Table:

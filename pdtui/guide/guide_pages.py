@@ -16,6 +16,7 @@ TOPICS = (
     "sessions",
     "maps",
     "dissecting",
+    "evaluating",
     "your-policy",
     "your-world",
     "results",

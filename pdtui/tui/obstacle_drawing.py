@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.pictures.perspective_camera import PerspectiveCamera
 from pdtui.tui.braille_canvas import BrailleCanvas
-from pdtui.tui.perspective_camera import PerspectiveCamera
 
 _ON_GROUND = np.array([1.0, 1.0, 0.0])
 """Makes the place on the ground of x, y and radius."""

@@ -3,30 +3,31 @@
 from __future__ import annotations
 
 import multiprocessing
-from typing import Any
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from rich.console import Console
 from scipy import stats
 
-from pdtui.core.attributes import Floats
 from pdtui.core.confidence_intervals import confidence_interval
 from pdtui.core.errors import MapError, WorkerError
+from pdtui.core.printable_text import to_json
 from pdtui.core.text_tables import format_mean_with_interval
 from pdtui.core.units import Stimulation
-from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.evaluation.behavior_evaluation import STEPS, evaluate_behaviors, run_behavior_episode
+from pdtui.evaluation.behavior_evaluation import MapEvaluation, evaluate_behaviors, plan_evaluation
+from pdtui.evaluation.behavior_tables import behavior_tables
 from pdtui.evaluation.evaluation_tables import tracking_table
+from pdtui.evaluation.paired_statistics import holm_correction
 from pdtui.evaluation.policy_evaluation import evaluate_policy
+from pdtui.evaluation.protocol_settings import ProtocolSettings
+from pdtui.evaluation.run_conditions import CONDITIONS
 from pdtui.evaluation.target_tracking import evaluate_target_tracking, find_pid_behaviors
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
-from pdtui.stimulation.stimulation_map import StimulationMap
+from pdtui.stimulation.stimulation_map import MeasuredEffect, StimulationMap
 from tests.deadline import deadline
-from tests.turning_robot import Vehicle, turning_loop
 
 
 @pytest.fixture(scope="module")
@@ -34,45 +35,102 @@ def config(small_map: StimulationMap) -> DriveConfig:
     return DriveConfig("ant", small_map, 0)
 
 
-def _mean_vy(policy: Policy, seed: int, pushed: bool) -> float:
-    """A plain loop: 400 steps, stimulated from step 100 on, the last 200 count."""
+SMALL = ProtocolSettings(
+    first_press=20,
+    presses=10,
+    hold_steps=40,
+    hold_seconds=0.0,
+    window_seconds=1.0,
+    draws=2,
+    draw_seeds=1,
+    condition_seeds=2,
+)
+
+
+def _mean_vy(policy: Policy, seed: int, pushed: bool) -> tuple[float, float]:
+    """A plain loop; the first and the last second of the hold."""
     robot = make_robot("ant")
     observation, _ = robot.reset(seed=seed)
+    press = 20 + int(np.random.default_rng((1, seed)).integers(10))
     vy = []
-    for step in range(400):
-        stimulation = Stimulation((3, 16 + 7), (-2.0, 2.0)) if pushed and step >= 100 else Stimulation()
+    for step in range(press + 60):
+        held = pushed and press <= step < press + 40
+        stimulation = Stimulation((3, 16 + 7), (-2.0, 2.0)) if held else Stimulation()
         observation, _, terminated, _, _ = robot.step(policy.act(observation, stimulation).action)
         assert not terminated
         vy.append(robot.read_attributes()[robot.attribute_index("vy")])
-    return float(np.mean(vy[-200:]))
+    return float(np.mean(vy[press : press + 20])), float(np.mean(vy[press + 20 : press + 40]))
 
 
-def test_effects_are_paired_differences_over_the_last_200_steps(config: DriveConfig, policy: Policy) -> None:
-    seeds = [100, 101, 102]
-    result = evaluate_behaviors(config, seeds).behaviors[0]
-    if result.falls or result.default_falls:
-        pytest.fail("the untrained policy was chosen to stay up on these seeds")
-    pushed = np.array([_mean_vy(policy, seed, True) for seed in seeds])
-    default = np.array([_mean_vy(policy, seed, False) for seed in seeds])
-    assert result.effect == pytest.approx((pushed - default).mean())
-    assert result.value == pytest.approx(pushed.mean())
-    assert result.default == pytest.approx(default.mean())
-    assert result.right_sign == int(((pushed > 0) & (pushed > default)).sum())
-    assert result.measure == "vy (m/s), wanted > 0"
+@pytest.fixture(scope="module")
+def result(config: DriveConfig) -> MapEvaluation:
+    return evaluate_behaviors(config, plan_evaluation(config, [100, 101, 102], SMALL), workers=2)
 
 
-def test_the_number_of_workers_changes_nothing(config: DriveConfig) -> None:
-    assert evaluate_behaviors(config, [100, 101], workers=1) == evaluate_behaviors(
-        config, [100, 101], workers=2
+def test_effects_are_paired_differences_while_the_behavior_is_held(
+    result: MapEvaluation, policy: Policy
+) -> None:
+    row = result.behaviors[0]
+    pushed, default = (
+        np.array([_mean_vy(policy, seed, on) for seed in result.seeds]) for on in (True, False)
     )
+    for window, part in ((row.first, 0), (row.last, 1)):
+        assert window.effect == pytest.approx((pushed - default)[:, part].mean())
+        assert window.value == pytest.approx(pushed[:, part].mean())
+        assert window.default == pytest.approx(default[:, part].mean())
+        assert window.low <= window.effect <= window.high
+        assert window.p_value >= 2 / 2**3
+    assert not row.holds  # three seeds cannot tell
+    assert (row.attribute, row.unit, row.condition) == ("vy", "m/s", "undisturbed")
+    assert result.measured_effects()["push"] == MeasuredEffect(
+        row.last.effect, row.last.low, row.last.high, row.falls, 3
+    )
+
+
+def test_every_condition_and_every_substitute_has_its_figures(result: MapEvaluation) -> None:
+    assert [row.condition for row in result.behaviors] == [one.name for one in CONDITIONS]
+    assert [row.runs for row in result.behaviors] == [3, *[2] * 8]
+    first, *others = result.behaviors
+    assert not any(row.substitutes for row in others)
+    kinds = [(one.kind, one.draws, one.seeds) for one in first.substitutes]
+    assert kinds == [("random units", 2, 1), ("random directions", 2, 1), ("actions", 1, 1)]
+    assert result.not_offered == ()
+    disturbed = [row.last.p_value for row in others]
+    assert [row.last.corrected for row in others] == pytest.approx(holm_correction(disturbed))
+
+
+def test_the_steps_that_are_announced_are_run(config: DriveConfig, result: MapEvaluation) -> None:
+    # 6 measuring runs, 6 undisturbed, 2 × 2 × 8 disturbed and 5 substitutes.
+    plan = plan_evaluation(config, [100, 101, 102], SMALL)
+    assert [len(plan.measuring_runs()), len(plan.held_runs())] == [6, 6 + 32 + 5]
+    press = [20 + int(np.random.default_rng((1, seed)).integers(10)) for seed in (100, 101, 102)]
+    runs = [2 + 2 * 8 + 5, 2 + 2 * 8, 2]
+    held = sum(count * (start + 60) for count, start in zip(runs, press, strict=True))
+    assert result.control_steps == held + 2 * sum(start + 20 for start in press)
+
+
+def test_the_tables_show_the_criterion_and_what_is_not_offered(result: MapEvaluation) -> None:
+    console = Console(width=200)
+    with console.capture() as shown:
+        console.print(behavior_tables(replace(result, not_offered=("pushed",), nearly_one_start=True)))
+    text = shown.get()
+    assert "course within 45° of +y in the last 5 s" in text
+    assert "Not offered by ant: pushed." in text
+    assert "These 3 seeds are nearly one start" in text
+
+
+def test_the_number_of_workers_changes_nothing(config: DriveConfig, result: MapEvaluation) -> None:
+    alone = evaluate_behaviors(config, plan_evaluation(config, [100, 101, 102], SMALL), workers=1)
+    assert to_json(asdict(alone)) == to_json(asdict(result))
 
 
 def test_a_killed_worker_ends_an_evaluation(config: DriveConfig) -> None:
     def kill_one(_done: int, _total: int) -> None:
         multiprocessing.active_children()[0].kill()
 
+    plan = plan_evaluation(config, range(100, 110), SMALL)
     with deadline(60), pytest.raises(WorkerError, match="evaluation of ant: .*killed by SIGKILL"):
-        evaluate_behaviors(config, range(100, 110), workers=2, progress=kill_one)
+        evaluate_behaviors(config, plan, workers=2, progress=kill_one)
 
 
 def test_the_interval_is_students() -> None:
@@ -80,31 +138,6 @@ def test_the_interval_is_students() -> None:
     expected = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
     assert confidence_interval(values) == pytest.approx((expected.low, expected.high))
     assert confidence_interval(values[:1]) == (float("-inf"), float("inf"))
-
-
-class _Tipping(Vehicle):
-    """Tips over in a given control step of each episode."""
-
-    def __init__(self, step: int) -> None:
-        super().__init__()
-        self.tips_in, self.steps = step, 0
-
-    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Floats, dict[str, Any]]:
-        self.steps = 0
-        return super().reset(seed=seed, options=options)
-
-    def step(self, action: NDArray[np.float32]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
-        self.steps += 1
-        observation, reward, _, truncated, info = super().step(action)
-        return observation, reward, self.steps == self.tips_in, truncated, info
-
-
-@pytest.mark.parametrize(("step", "fell"), [(STEPS - 1, True), (STEPS, True), (STEPS + 1, False)])
-def test_a_fall_counts_up_to_the_last_step(step: int, fell: bool) -> None:
-    standing = turning_loop()
-    loop = ControlLoop(_Tipping(step), standing.policy, standing.map, 0)
-    assert run_behavior_episode(loop, "turn", 1).fell == fell
-    assert run_behavior_episode(loop, "", 1).fell == fell
 
 
 def test_one_seed_gives_a_mean_without_an_interval(config: DriveConfig) -> None:

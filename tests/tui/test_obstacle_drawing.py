@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.pictures.perspective_camera import PerspectiveCamera
 from pdtui.sessions.episode_statistics import EpisodeStatistics
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.obstacle_drawing import draw_obstacles_from_above, draw_obstacles_from_side
-from pdtui.tui.perspective_camera import PerspectiveCamera
 from pdtui.tui.theme import STYLES
 from pdtui.tui.widgets.robot_view import RobotView
 from tests.tui.conftest import MakeApp

@@ -8,8 +8,8 @@ from rich import filesize
 
 from pdtui.core.printable_text import make_printable
 from pdtui.core.step_record import ActiveBehavior
+from pdtui.pictures.perspective_camera import PerspectiveCamera, round_length_down
 from pdtui.tui.cell_text import fit_cells, format_number, format_signed
-from pdtui.tui.perspective_camera import PerspectiveCamera, round_length_down
 from pdtui.tui.widgets.activation_heatmap import UnitGrid, allocate_layer_rows
 from pdtui.tui.widgets.attribute_table import AttributeHistory, draw_sparklines
 from pdtui.tui.widgets.path_view import MOST_POINTS, PathTrail

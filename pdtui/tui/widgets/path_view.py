@@ -10,10 +10,10 @@ from textual.strip import Strip
 
 from pdtui.core.attributes import Floats
 from pdtui.driving.drive_snapshot import DriveSnapshot
+from pdtui.pictures.perspective_camera import round_length_down
 from pdtui.robots.geometry import root_body_row, rotate_vectors
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import format_number
-from pdtui.tui.perspective_camera import round_length_down
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 

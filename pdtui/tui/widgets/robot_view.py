@@ -11,11 +11,11 @@ from textual.strip import Strip
 from pdtui.core.attributes import Floats
 from pdtui.core.robot_links_and_state import NO_OBSTACLES
 from pdtui.driving.drive_snapshot import DriveSnapshot
+from pdtui.pictures.perspective_camera import PerspectiveCamera, round_length_down
 from pdtui.robots.geometry import capsule_ends, compute_link_poses, root_body_row, rotate_vectors
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.obstacle_drawing import draw_obstacles_from_above, draw_obstacles_from_side
-from pdtui.tui.perspective_camera import PerspectiveCamera, round_length_down
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 

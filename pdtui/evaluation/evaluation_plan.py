@@ -1,0 +1,169 @@
+"""Which runs an evaluation consists of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from pdtui.core.units import Stimulation, parse_unit
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.evaluation.held_run import HeldRunPlan, PushMeasurement
+from pdtui.evaluation.protocol_settings import ProtocolSettings, RunTimes, plan_run_times
+from pdtui.evaluation.run_conditions import CONDITIONS, UNDISTURBED, find_condition
+from pdtui.evaluation.substitute_pushes import (
+    ActionPush,
+    SubstitutePush,
+    draw_random_direction,
+    draw_random_units,
+    mean_push_size,
+)
+from pdtui.stimulation.stimulation_map import Behavior
+
+SubstituteKind = Literal["units", "random units", "random directions", "actions"]
+"""What is pushed; ``units`` are the behavior's own."""
+MEASURED_SEEDS = 3
+"""Seeds on which it is measured how far a behavior moves units and actions."""
+
+
+class RunKey(NamedTuple):
+    """One run of an evaluation.
+
+    Attributes:
+        behavior: The behavior that is pressed; empty for the policy alone.
+        seed: Seed of the run.
+        condition: Name of the condition.
+        kind: What is pushed.
+        draw: Number of the draw of a random kind.
+    """
+
+    behavior: str
+    seed: int
+    condition: str = UNDISTURBED.name
+    kind: SubstituteKind = "units"
+    draw: int = 0
+
+
+@dataclass(frozen=True)
+class EvaluationPlan:
+    """The runs of an evaluation.
+
+    Attributes:
+        loop: Robot, policy and map.
+        seeds: The seeds.
+        settings: The sizes of the evaluation.
+    """
+
+    loop: ControlLoop
+    seeds: Sequence[int]
+    settings: ProtocolSettings
+
+    @cached_property
+    def behaviors(self) -> list[Behavior]:
+        """The behaviors with an aim; those of mode ``pid`` have targets instead."""
+        return [b for b in self.loop.map.behaviors.values() if b.aim is not None and b.pid is None]
+
+    @cached_property
+    def tasked(self) -> list[Behavior]:
+        """The behaviors with a task."""
+        return [b for b in self.loop.map.behaviors.values() if b.task]
+
+    @cached_property
+    def conditions(self) -> list[str]:
+        """Names of the conditions that the robot is put in."""
+        disturbed = self.settings.condition_seeds > 0
+        wanted = [one for one in CONDITIONS if disturbed or one is UNDISTURBED]
+        return [one.name for one in wanted if one.is_offered(self.loop.robot)]
+
+    @cached_property
+    def not_offered(self) -> tuple[str, ...]:
+        """Names of the conditions that the robot cannot be put in."""
+        return tuple(one.name for one in CONDITIONS if not one.is_offered(self.loop.robot))
+
+    def outputs(self, behavior: Behavior) -> Stimulation:
+        """Return the units that a behavior overwrites."""
+        units = self.loop.map.units_of(behavior)
+        return Stimulation.of({parse_unit(unit, self.loop.policy.layers): v for unit, v in units.items()})
+
+    def seeds_of(self, condition: str) -> Sequence[int]:
+        """Return the seeds that are run in a condition."""
+        return self.seeds if condition == UNDISTURBED.name else self.seeds[: self.settings.condition_seeds]
+
+    def substitutes_of(self, behavior: Behavior) -> list[tuple[SubstituteKind, int]]:
+        """Return the kinds of substitutes of a behavior, and the number of draws of each."""
+        if not self.outputs(behavior).units:
+            return []
+        draws = self.settings.draws
+        return [("random units", draws), ("random directions", draws), ("actions", 1)] if draws else []
+
+    def held_runs(self) -> list[RunKey]:
+        """Return the runs in which a behavior with an aim is held, and those without a press."""
+        names = ["", *(b.name for b in self.behaviors)] if self.behaviors else []
+        keys = [
+            RunKey(name, seed, condition)
+            for condition in self.conditions
+            for name in names
+            for seed in self.seeds_of(condition)
+        ]
+        keys += [
+            RunKey(behavior.name, seed, UNDISTURBED.name, kind, draw)
+            for behavior in self.behaviors
+            for kind, draws in self.substitutes_of(behavior)
+            for draw in range(draws)
+            for seed in self.seeds[: self.settings.draw_seeds]
+        ]
+        return keys
+
+    def measuring_runs(self) -> list[RunKey]:
+        """Return the runs that measure how far behaviors move units and actions, and observations spread."""
+        named = [b.name for b in self.behaviors if self.outputs(b).units]
+        names = ["", *named] if self.behaviors else []
+        return [RunKey(name, seed) for name in names for seed in self.seeds[:MEASURED_SEEDS]]
+
+    def times(self, name: str, seed: int) -> RunTimes:
+        """Return the times of a run; one without a press lasts as long as the longest with one."""
+        dt, known = self.loop.robot.control_dt, self.loop.map.behaviors
+        if name:
+            return plan_run_times(self.settings, seed, dt, known[name].period)
+        whole = plan_run_times(self.settings, seed, dt)
+        longest = max((self.times(b.name, seed).steps for b in self.behaviors), default=0)
+        return replace(whole, after=max(whole.after, longest - whole.press - whole.held))
+
+    def held_plan(self, key: RunKey, measured: Mapping[str, Sequence[PushMeasurement]]) -> HeldRunPlan | None:
+        """Return what to run for a key.
+
+        Args:
+            key: The run.
+            measured: What the measuring runs found, by behavior.
+
+        Returns:
+            The run; None for a substitute whose size was not measured, because the robot fell before.
+        """
+        spread = np.mean([one.observation_spread for one in measured[""]], axis=0)
+        plan = HeldRunPlan(
+            key.behavior,
+            key.seed,
+            self.times(key.behavior, key.seed),
+            find_condition(key.condition),
+            observation_spread=spread,
+        )
+        if key.kind == "units":
+            return plan
+        substitute = self._draw(key, measured[key.behavior])
+        return None if substitute is None else replace(plan, substitute=substitute)
+
+    def _draw(self, key: RunKey, measured: Sequence[PushMeasurement]) -> SubstitutePush | None:
+        layers = self.loop.policy.layers
+        if key.kind == "random units":
+            outputs = self.outputs(self.loop.map.behaviors[key.behavior])
+            return draw_random_units(outputs, layers, key.behavior, key.draw)
+        sizes = [one.size for one in measured if one.size is not None]
+        if not sizes:
+            return None
+        size = mean_push_size(sizes)
+        if key.kind == "actions":
+            return ActionPush(size.action)
+        return draw_random_direction(size, layers, key.behavior, key.draw)

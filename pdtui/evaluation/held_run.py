@@ -1,0 +1,162 @@
+"""One run of an evaluation: walk, press, hold, release, and go on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pdtui.core.attributes import Floats, unwrap_angles
+from pdtui.core.drive_events import DriveEvent
+from pdtui.core.step_record import StepRecord
+from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.headless_drive import run_episode
+from pdtui.evaluation.protocol_settings import RunTimes
+from pdtui.evaluation.run_conditions import (
+    UNDISTURBED,
+    EvaluationCondition,
+    disturb_policy,
+    disturbed_world,
+    plan_pushes,
+    push_robot,
+)
+from pdtui.evaluation.substitute_pushes import PushSize, PushSizeMeter, SubstitutePush, act_in_place
+from pdtui.robots.geometry import root_body_row
+
+
+@dataclass(frozen=True)
+class HeldRunPlan:
+    """One run.
+
+    Attributes:
+        behavior: The behavior that is pressed; empty for the policy alone.
+        seed: Seed of the run.
+        times: When it is pressed and released.
+        condition: How the run is disturbed.
+        substitute: What acts in the place of the behavior's units; None for the units.
+        observation_spread: Standard deviation of every observation in an undisturbed walk, for noise.
+    """
+
+    behavior: str
+    seed: int
+    times: RunTimes
+    condition: EvaluationCondition = UNDISTURBED
+    substitute: SubstitutePush | None = None
+    observation_spread: Floats = field(default_factory=lambda: np.zeros(()))
+
+
+@dataclass(frozen=True)
+class HeldRunTrace:
+    """What is kept of a run: means over bins from the press on, NaN after a fall.
+
+    Attributes:
+        values: Attributes, shape (bins, J), angles unwrapped.
+        places: Where the first body is at the end of each bin, x and y in m, shape (bins, 2); NaN for a robot
+            without poses.
+        fell_at: Control steps from the press to a fall; negative for a fall before it, None for none.
+    """
+
+    values: Floats
+    places: Floats
+    fell_at: int | None
+
+    @property
+    def fell(self) -> bool:
+        """Whether the robot fell."""
+        return self.fell_at is not None
+
+
+def drive_held_run(built: ControlLoop, plan: HeldRunPlan) -> Iterator[StepRecord]:
+    """Drive one run and yield its records, up to the end of the episode."""
+    robot, times = built.robot, plan.times
+    pushes = plan_pushes(plan.condition, plan.seed, times.dt, times.steps)
+
+    def before_step(step: int) -> Sequence[DriveEvent]:
+        push_robot(robot, pushes, step)
+        if plan.behavior and step == times.press:
+            return [DriveEvent(step, "behavior", plan.behavior)]
+        return [DriveEvent(step, "default")] if step == times.press + times.held else []
+
+    with disturbed_world(robot, plan.condition):
+        loop = ControlLoop(robot, built.policy, built.map, plan.seed)
+        act = act_in_place(loop.act, built.policy, robot, plan.substitute)
+        loop.act = disturb_policy(act, robot, plan.condition, plan.seed, plan.observation_spread)
+        yield from run_episode(loop, times.steps, before_step)
+
+
+def run_held_behavior(built: ControlLoop, plan: HeldRunPlan) -> HeldRunTrace:
+    """Run once and keep what figures and judges need."""
+    times, attributes = plan.times, built.robot.attributes
+    rows, places, fell_at = [], [], None
+    for record in drive_held_run(built, plan):
+        rows.append(record.attributes)
+        places.append(record.poses[0, :2] if len(record.poses) else np.full(2, np.nan))
+        if record.fell:
+            fell_at = record.step - times.press
+    smooth = unwrap_angles(np.array(rows), attributes)[times.press :]
+    values = np.full((times.bins, len(attributes)), np.nan)
+    ends = np.full((times.bins, 2), np.nan)
+    for number in range(min(times.bins, len(smooth) // times.bin)):
+        part = slice(number * times.bin, (number + 1) * times.bin)
+        values[number] = smooth[part].mean(axis=0)
+        ends[number] = places[times.press + part.stop - 1]
+    return HeldRunTrace(values, ends, fell_at)
+
+
+@dataclass(frozen=True)
+class PushMeasurement:
+    """What one measuring run found: the size of the push, if any, and the spread of each observation."""
+
+    size: PushSize | None
+    observation_spread: Floats
+
+
+def measure_push(built: ControlLoop, plan: HeldRunPlan) -> PushMeasurement:
+    """Run up to the end of the first window and measure how far the behavior moves units and actions."""
+    loop = ControlLoop(built.robot, built.policy, built.map, plan.seed)
+    meter = PushSizeMeter(built.policy)
+    loop.act = meter.act
+
+    def press(step: int) -> Sequence[DriveEvent]:
+        pressed = plan.behavior and step == plan.times.press
+        return [DriveEvent(step, "behavior", plan.behavior)] if pressed else []
+
+    for _ in run_episode(loop, plan.times.press + plan.times.window, press):
+        pass
+    return PushMeasurement(meter.size(), np.array(meter.observations).std(axis=0))
+
+
+@dataclass(frozen=True)
+class HeldRunFilm:
+    """Poses of a run at some times, and its whole way.
+
+    Attributes:
+        seconds: Time of each frame from the press on, s; frames after a fall are missing.
+        poses: Poses of all bodies in each frame, shape (frames, B, 7).
+        way: Where the robot is at each control step from the press on, x and y in m, shape (steps, 2).
+        held: Control steps from the press to the release.
+        fell: Whether it fell.
+    """
+
+    seconds: tuple[float, ...]
+    poses: Floats
+    way: Floats
+    held: int
+    fell: bool
+
+
+def film_held_run(built: ControlLoop, plan: HeldRunPlan, seconds: Sequence[float]) -> HeldRunFilm:
+    """Run once more and keep the poses at some times from the press on, s."""
+    times, root = plan.times, root_body_row(built.robot.links)
+    wanted = {times.press + round(one / times.dt): one for one in seconds}
+    taken, poses, way, fell = [], [], [], False
+    for record in drive_held_run(built, plan):
+        if record.step in wanted:
+            taken.append(wanted[record.step])
+            poses.append(record.poses)
+        if record.step >= times.press:
+            way.append(record.poses[root, :2])
+        fell = fell or record.fell
+    bodies = np.array(poses).reshape(len(poses), -1, 7)
+    return HeldRunFilm(tuple(taken), bodies, np.array(way).reshape(-1, 2), times.held, fell)

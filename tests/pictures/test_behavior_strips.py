@@ -1,0 +1,62 @@
+"""Strips of frames of the best, the median and the worst seed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from pdtui.core.errors import PictureError
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.evaluation.behavior_evaluation import MapEvaluation, evaluate_behaviors, plan_evaluation
+from pdtui.evaluation.evaluation_plan import EvaluationPlan
+from pdtui.evaluation.held_run import HeldRunPlan, drive_held_run
+from pdtui.evaluation.protocol_settings import ProtocolSettings
+from pdtui.pictures.behavior_strips import draw_strips, film_strips, frame_seconds, rank_seeds
+from pdtui.stimulation.stimulation_map import StimulationMap
+
+FEW = ProtocolSettings(
+    first_press=10, presses=5, hold_steps=40, hold_seconds=0.0, window_seconds=1.0, draws=0, condition_seeds=0
+)
+
+
+@pytest.fixture(scope="module")
+def plan(small_map: StimulationMap) -> EvaluationPlan:
+    return plan_evaluation(DriveConfig("ant", small_map, 0), [100, 101, 102], FEW)
+
+
+@pytest.fixture(scope="module")
+def result(plan: EvaluationPlan, small_map: StimulationMap) -> MapEvaluation:
+    return evaluate_behaviors(DriveConfig("ant", small_map, 0), plan)
+
+
+def test_seeds_that_meet_the_criterion_come_first(result: MapEvaluation) -> None:
+    row = replace(result.behaviors[0], runs=4, wanted=-1.0)
+    row = replace(row, seed_met=(False, True, True, False), seed_effects=(-9.0, -1.0, -2.0, -8.0))
+    assert rank_seeds(row) == [2, 1, 0, 3]
+
+
+def test_a_strip_shows_the_runs_that_were_judged(
+    plan: EvaluationPlan, result: MapEvaluation, tmp_path: Path
+) -> None:
+    strips = film_strips(plan, result)
+    assert [strip.rank for strip in strips] == ["best", "median", "worst"]
+    assert sorted(strip.seed for strip in strips) == [100, 101, 102]
+    best, times = strips[0], plan.times("push", strips[0].seed)
+    records = list(drive_held_run(plan.loop, HeldRunPlan("push", best.seed, times)))
+    assert list(best.film.seconds) == frame_seconds(times)
+    for seconds, poses in zip(best.film.seconds, best.film.poses, strict=True):
+        assert np.array_equal(poses, records[times.press + round(seconds / times.dt)].poses)
+    assert len(best.film.way) == times.held + times.after
+    draw_strips(tmp_path / "strip.png", plan, result, strips)
+    picture = imread(tmp_path / "strip.png")[..., :3]
+    cells = np.array_split(picture[120:], len(strips[0].film.seconds) + 1, axis=1)
+    assert all((cell.min(axis=2) < 0.9).sum() > 100 for cell in cells)  # each column shows something
+
+
+def test_a_robot_without_shapes_has_no_strip(plan: EvaluationPlan, result: MapEvaluation) -> None:
+    with pytest.raises(PictureError, match="ant: no behavior with an aim"):
+        film_strips(plan, replace(result, behaviors=()))
