@@ -13,6 +13,7 @@ from pdtui.cli.shared_options import (
     FILE_PATH,
     SeedList,
     build_drive_config,
+    check_judging_seeds,
     force_option,
     import_option_flags,
     integer_option,
@@ -26,9 +27,7 @@ from pdtui.cli.shared_options import (
     workers_option,
 )
 from pdtui.core.errors import MapError
-from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
-from pdtui.stimulation.seed_ranges import require_unused_seeds
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
@@ -148,7 +147,7 @@ def evaluate_command(
         _check_experiment(EXPERIMENTS.get(experiment), others, pictures, own_options)
     config = build_drive_config(robot, map_name, policy, import_options, force=force, start=start)
     if not policy_only:
-        _require_unused_seeds(config, seeds)
+        check_judging_seeds(config, seeds)
     if experiment is not None:
         rest = [build_drive_config(other, None, "", import_options, force=force) for other in others]
         _run_experiment(
@@ -181,13 +180,6 @@ def evaluate_command(
         sizes = seeds[:QUICK_SEEDS] if quick else seeds, choose_protocol(quick=quick, hold=hold)
         drawn = None if strip is None else (strip, overwrite)
         _evaluate_behaviors(config, *sizes, workers, drawn, update=update, as_json=as_json)
-
-
-def _require_unused_seeds(config: DriveConfig, seeds: range) -> None:
-    the_map = config.stimulation_map
-    warning = require_unused_seeds(seeds, the_map.seeds, the_map.source)
-    if warning:
-        click.echo(make_printable(warning), err=True)
 
 
 def _evaluate_behaviors(
@@ -246,8 +238,7 @@ def _check_experiment(
 def _flag(options: Mapping[str, Any]) -> str:
     """The first of these options as it is typed."""
     name = next(iter(options))
-    flags = (one.opts[0] for e in EXPERIMENTS.values() for one in e.options if one.name == name)
-    return next(flags)
+    return next(one.opts[0] for e in EXPERIMENTS.values() for one in e.options if one.name == name)
 
 
 def _run_experiment(name: str, as_json: bool, **request: Any) -> None:

@@ -15,7 +15,7 @@ from pdtui.core.errors import MapError, SeedError
 from pdtui.core.printable_text import make_printable, to_json
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, NO_OPTIONS, SQUASH_NAMES, ImportOptions
 from pdtui.sessions.session_schema import ACTIVATIONS_KEPT
-from pdtui.stimulation.seed_ranges import FIRST_SEARCH_SEED, parse_seed_range
+from pdtui.stimulation.seed_ranges import FIRST_SEARCH_SEED, parse_seed_range, require_unused_seeds
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
@@ -190,6 +190,14 @@ def build_drive_config(
             stimulation_map = load_map(path)
     stimulation_map = resolve_map_policy(stimulation_map, policy, import_options)
     return DriveConfig(robot, stimulation_map, seed, **options)
+
+
+def check_judging_seeds(config: DriveConfig, seeds: range) -> None:
+    """Refuse to judge a map on seeds on which something in it was chosen; warn if it does not say enough."""
+    judged = config.stimulation_map
+    warning = require_unused_seeds(seeds, judged.seeds, judged.source)
+    if warning:
+        click.echo(make_printable(warning), err=True)
 
 
 def print_result(

@@ -97,23 +97,19 @@ def tune_gains(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> list[TunedGains]:
-    """Choose gains and limits of behaviors, one after the other.
-
-    Without a time limit the result depends only on the arguments.
+    """Choose gains and limits, one behavior after the other; without a time limit, in a repeatable way.
 
     Args:
         config: robot, map and policy, or a loop of them.
         names: names of behaviors of mode ``pid``; empty for all of the map.
-        seeds: at least 2, none of them for judging; one half for the search, the other to compare its result
-            with the map's gains.
+        seeds: at least 2, none for judging; half for the search, half to compare its result with the map's.
         settings: how much to do.
         workers: number of processes.
         progress: called with controllers tried, controllers in all, and a note.
 
     Raises:
         MapError: the map has no such behavior, or it is of another mode; fewer than 2 seeds.
-        SeedError: a seed is reserved for judging.
-        PdtuiError: the robot or the policy cannot be loaded.
+        PdtuiError: a seed is reserved for judging; the robot or the policy cannot be loaded.
     """
     if len(seeds) < 2:
         raise MapError(f"expected at least 2 seeds, half of them to choose by, found {len(seeds)}")
