@@ -40,9 +40,9 @@ def find_experiments() -> dict[str, Experiment]:
     try:
         from pdtui.paper.experiment import list_experiments
     except ModuleNotFoundError as error:
-        if error.name != "pdtui.paper":
-            raise
-        return {}
+        if error.name == "pdtui.paper":
+            return {}
+        raise
     return list_experiments()
 
 
@@ -124,10 +124,7 @@ def evaluate_command(
     as_json: bool,
     **own_options: Any,
 ) -> None:
-    """Measure what each behavior of ROBOT's map does, compared with the policy alone.
-
-    ROBOT is a robot's name or a map file.
-    """
+    """Measure what each behavior of ROBOT, a robot's name or a map file, does beside the policy alone."""
     own_options = {name: value for name, value in own_options.items() if value not in (None, ())}
     _check_modes(
         {"--policy-only": policy_only, "--target": target, "--experiment": experiment},
@@ -177,9 +174,9 @@ def evaluate_command(
     else:
         from pdtui.evaluation.protocol_settings import QUICK_SEEDS, choose_protocol
 
-        sizes = seeds[:QUICK_SEEDS] if quick else seeds, choose_protocol(quick=quick, hold=hold)
-        drawn = None if strip is None else (strip, overwrite)
-        _evaluate_behaviors(config, *sizes, workers, drawn, update=update, as_json=as_json)
+        settings, drawn = choose_protocol(quick=quick, hold=hold), strip and (strip, overwrite)
+        seeds = seeds[:QUICK_SEEDS] if quick else seeds
+        _evaluate_behaviors(config, seeds, settings, workers, drawn, update=update, as_json=as_json)
 
 
 def _evaluate_behaviors(
@@ -226,7 +223,7 @@ def _check_experiment(
     """Refuse what the experiment would otherwise silently ignore."""
     if experiment is None:
         return  # `pdtui.paper` is not installed, which running it will say
-    name, own = experiment.name, {option.name for option in experiment.options}
+    name, own = experiment.name, [option.name for option in experiment.options]
     if foreign := {option: value for option, value in options.items() if option not in own}:
         raise click.UsageError(f"--experiment {name} has no option {_flag(foreign)}")
     if others and not experiment.takes_several_maps:
