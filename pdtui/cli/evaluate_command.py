@@ -174,7 +174,7 @@ def evaluate_command(
     else:
         from pdtui.evaluation.protocol_settings import QUICK_SEEDS, choose_protocol
 
-        settings, drawn = choose_protocol(quick=quick, hold=hold), strip and (strip, overwrite)
+        settings, drawn = choose_protocol(quick=quick, hold=hold), (strip, overwrite) if strip else None
         seeds = seeds[:QUICK_SEEDS] if quick else seeds
         _evaluate_behaviors(config, seeds, settings, workers, drawn, update=update, as_json=as_json)
 
