@@ -35,7 +35,9 @@ def strict(text: str) -> Any:
     return json.loads(text, parse_constant=refuse)
 
 
-@pytest.mark.parametrize("env", WORLDS)
+@pytest.mark.parametrize(
+    "env", ["Pendulum-v1", *(pytest.param(env, marks=pytest.mark.slow) for env in list(WORLDS)[1:])]
+)
 def test_a_policy_is_dissected_measured_driven_and_replayed(env: str, tmp_path: Path) -> None:
     path, session, keys = tmp_path / "x.toml", tmp_path / "s.rrd", tmp_path / "keys.txt"
     statistics = FIXTURES / f"{WORLDS[env]}-normaliser.npz"

@@ -107,7 +107,7 @@ def _attribute_columns(block: StepBlock, header: SessionHeader) -> Columns:
 
 
 def _action_columns(block: StepBlock, _: SessionHeader) -> Columns:
-    actions = block.actions.astype(np.float32)
+    actions = block.actions_as_float32()
     return _name_columns(actions, [f"action {index}" for index in range(actions.shape[1])])
 
 

@@ -67,7 +67,7 @@ def read_session(path: Path | str) -> Session:
             **vars(header),
             digests=block.digests,
             attributes=block.attributes,
-            actions=block.actions.astype(np.float32),
+            actions=block.actions_as_float32(),
             rewards=block.rewards,
             costs=block.costs,
             episodes=block.episodes,

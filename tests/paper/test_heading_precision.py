@@ -158,7 +158,7 @@ def test_the_command_compares_maps_and_draws(map_path: Path, tmp_path: Path, vie
         (["tune", "nowhere", "--all"], "no map 'nowhere'"),
         (["tune", "MAP", "hop"], "no behavior 'hop'; of mode pid are: hold heading"),
         (["tune", "MAP", "push"], "behavior 'push': expected mode pid, found fixed"),
-        (["tune", "MAP", "--all", "--seeds", "200"], "expected at least 2 seeds"),
+        (["tune", "MAP", "--all", "--seeds", "2000"], "expected at least 2 seeds"),
     ],
 )
 def test_a_wrong_line_is_answered_in_one(map_path: Path, arguments: list[str], message: str) -> None:
@@ -170,7 +170,7 @@ def test_a_wrong_line_is_answered_in_one(map_path: Path, arguments: list[str], m
 def test_tune_writes_only_what_is_better(map_path: Path, tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(map_path.read_text())
-    line = ["tune", str(path), "hold heading", "--seeds", "200-201", "--points", "2", "--refinements", "0"]
+    line = ["tune", str(path), "hold heading", "--seeds", "2000-2001", "--points", "2", "--refinements", "0"]
     result = CliRunner().invoke(main, [*line, "--workers", "1", "--json"])
     assert result.exit_code == 0, result.output
     (found,) = json.loads(result.output)["behaviors"]

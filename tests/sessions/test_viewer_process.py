@@ -39,7 +39,10 @@ def opening(tmp_path: Path, mark: str) -> Iterator[subprocess.Popen[bytes]]:
     script.chmod(0o755)
     command = [sys.executable, "-m", "pdtui", "sessions", "open", "--web", mark]
     environment = {**os.environ, "RERUN_CLI_PATH": str(script)}
+    # Where the tests run in the background, SIGINT is ignored, which a child would inherit.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     process = subprocess.Popen(command, env=environment, start_new_session=True)
+    signal.signal(signal.SIGINT, before)
     yield process
     process.kill()
     process.wait()

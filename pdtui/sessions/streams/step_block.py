@@ -93,6 +93,11 @@ class StepBlock:
         """The row of the block to which each stimulated unit belongs, shape (sum of the counts,)."""
         return np.repeat(np.arange(len(self)), self.stimulated_counts)
 
+    def actions_as_float32(self) -> NDArray[np.float32]:
+        """Return the actions as the policy gave them; numbers beyond float32, which are damage, are infinite."""
+        with np.errstate(over="ignore"):
+            return self.actions.astype(np.float32)
+
     def part(self, start: int, stop: int) -> StepBlock:
         """Return the rows from `start` up to, but not including, `stop`; arrays are views."""
         if (start, stop) == (0, len(self)):
