@@ -94,7 +94,7 @@ class StepBlock:
         return np.repeat(np.arange(len(self)), self.stimulated_counts)
 
     def actions_as_float32(self) -> NDArray[np.float32]:
-        """Return the actions as the policy gave them; a number beyond float32, which is damage, is infinite."""
+        """Return the actions as the policy gave them; what exceeds float32, as damage may, is infinite."""
         with np.errstate(over="ignore"):
             return self.actions.astype(np.float32)
 
