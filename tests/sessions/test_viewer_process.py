@@ -39,10 +39,11 @@ def opening(tmp_path: Path, mark: str) -> Iterator[subprocess.Popen[bytes]]:
     script.chmod(0o755)
     command = [sys.executable, "-m", "pdtui", "sessions", "open", "--web", mark]
     environment = {**os.environ, "RERUN_CLI_PATH": str(script)}
-    # Where the tests run in the background, SIGINT is ignored, which a child would inherit.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    # Where the tests run in the background, some signals are ignored, which a child would inherit.
+    before = {number: signal.signal(number, signal.SIG_DFL) for number in (signal.SIGINT, signal.SIGHUP)}
     process = subprocess.Popen(command, env=environment, start_new_session=True)
-    signal.signal(signal.SIGINT, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
     yield process
     process.kill()
     process.wait()
