@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 from pdtui.core.errors import SessionError
-from pdtui.core.untrusted_file import open_regular_file
 from pdtui.sessions.rrd import message_framing as framing
 from pdtui.sessions.rrd.message_decoder import MAX_MESSAGE, EntityChunk, RrdStoreInfo, read_chunk_head
-from pdtui.sessions.rrd.message_framing import RrdMessageSpan
+from pdtui.sessions.rrd.message_framing import RrdMessageSpan, open_rrd_file
 from pdtui.sessions.rrd.message_reader import DamagedSpan, MessageReader, RrdMessage, decode_message
 from pdtui.sessions.session_schema import APP
 
@@ -57,17 +55,12 @@ class ChunkStream:
         Raises:
             SessionError: the file does not exist, is no recording of pdtui, or is damaged, and at which byte.
         """
-        try:
-            with open_regular_file(self._path) as file:
-                self.size = os.fstat(file.fileno()).st_size
+        with open_rrd_file(self._path) as (file, self.size):
+            try:
                 yield from self._chunks(file)
-        except FileNotFoundError:
-            raise SessionError(f"{self._path}: no such file") from None
-        except OSError as error:
-            raise SessionError(f"{self._path}: cannot be read: {error.strerror}") from error
-        except SessionError as error:
-            hint = f"; {RESCUE}" if self.store is not None and "byte " in str(error) else ""
-            raise SessionError(f"{self._path}: {error}{hint}") from error
+            except SessionError as error:
+                hint = f"; {RESCUE}" if self.store is not None and "byte " in str(error) else ""
+                raise SessionError(f"{self._path}: {error}{hint}") from error
         self.require_store()
 
     def require_store(self) -> RrdStoreInfo:

@@ -9,7 +9,6 @@ XXH3 checksum (8 bytes). It is found from the end of the file, before the traile
 from __future__ import annotations
 
 import json
-import os
 import struct
 import zlib
 from pathlib import Path
@@ -17,9 +16,7 @@ from typing import Any, BinaryIO
 
 from xxhash import xxh3_64_intdigest
 
-from pdtui.core.errors import SessionError
-from pdtui.core.untrusted_file import open_regular_file
-from pdtui.sessions.rrd.message_framing import TRAILER_BYTES, is_trailer
+from pdtui.sessions.rrd.message_framing import TRAILER_BYTES, is_trailer, open_rrd_file
 from pdtui.sessions.rrd.protobuf_wire import encode_bytes_field
 
 _FIELD = 2046
@@ -42,13 +39,8 @@ def read_end_index(path: Path) -> dict[str, Any] | None:
     Raises:
         SessionError: the file does not exist or cannot be read.
     """
-    try:
-        with open_regular_file(path) as file:
-            return _read_index(file, os.fstat(file.fileno()).st_size)
-    except FileNotFoundError:
-        raise SessionError(f"{path}: no such file") from None
-    except OSError as error:
-        raise SessionError(f"{path}: cannot be read: {error.strerror}") from error
+    with open_rrd_file(path) as (file, size):
+        return _read_index(file, size)
 
 
 def _read_index(file: BinaryIO, size: int) -> dict[str, Any] | None:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from pdtui.core.errors import SessionError
-from pdtui.core.untrusted_file import open_regular_file
-from pdtui.sessions.rrd.message_framing import check_rrd_start
+from pdtui.sessions.rrd.message_framing import check_rrd_start, open_rrd_file
 from pdtui.sessions.rrd.message_reader import MessageReader
 
 
@@ -37,19 +35,14 @@ def check_file(path: Path) -> FileCheck:
     Raises:
         SessionError: the file does not exist or cannot be read.
     """
-    try:
-        with open_regular_file(path) as file:
-            reader = MessageReader(file, os.fstat(file.fileno()).st_size)
-            damage = ""
-            try:
-                file.seek(0)
-                check_rrd_start(file)
-                for _ in reader:
-                    pass
-            except SessionError as error:
-                damage = str(error)
-            return FileCheck(reader.sealed, reader.finished, reader.messages, reader.checksum, damage)
-    except FileNotFoundError:
-        raise SessionError(f"{path}: no such file") from None
-    except OSError as error:
-        raise SessionError(f"{path}: cannot be read: {error.strerror}") from error
+    with open_rrd_file(path) as (file, size):
+        reader = MessageReader(file, size)
+        damage = ""
+        try:
+            file.seek(0)
+            check_rrd_start(file)
+            for _ in reader:
+                pass
+        except SessionError as error:
+            damage = str(error)
+        return FileCheck(reader.sealed, reader.finished, reader.messages, reader.checksum, damage)

@@ -7,14 +7,18 @@ own recordings have a checksum in every message, too. An error names the byte bu
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from xxhash import xxh32
 
 from pdtui.core.errors import SessionError
+from pdtui.core.untrusted_file import open_regular_file
 
 LAST, STORE, CHUNK, ACTIVATION = 0, 1, 2, 3
 """Kinds of messages: the index of the others, the name of a recording, rows, and which blueprint applies."""
@@ -29,6 +33,18 @@ _SEED = 7850921  # prescribed by the format: the letters of RERUN as digits of b
 _BLOCK = 1 << 20
 _HEADER_PATTERN = re.compile(rb"(?=[\x01-\x03]\x00{7}.{4}\x00{4})", re.DOTALL)
 """What may be the header of a message of less than 4 GiB, except the last of a file. Matches may overlap."""
+
+
+@contextmanager
+def open_rrd_file(path: Path) -> Iterator[tuple[BinaryIO, int]]:
+    """Yield a file, opened for reading, and its size; a file that cannot be read is a `SessionError`."""
+    try:
+        with open_regular_file(path) as file:
+            yield file, os.fstat(file.fileno()).st_size
+    except FileNotFoundError:
+        raise SessionError(f"{path}: no such file") from None
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 class RrdMessageSpan(NamedTuple):
