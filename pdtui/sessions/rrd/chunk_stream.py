@@ -9,9 +9,15 @@ from typing import BinaryIO
 
 from pdtui.core.errors import SessionError
 from pdtui.sessions.rrd import message_framing as framing
-from pdtui.sessions.rrd.message_decoder import MAX_MESSAGE, EntityChunk, RrdStoreInfo, read_chunk_head
+from pdtui.sessions.rrd.message_decoder import EntityChunk, RrdStoreInfo, read_chunk_head
 from pdtui.sessions.rrd.message_framing import RrdMessageSpan, open_rrd_file
-from pdtui.sessions.rrd.message_reader import DamagedSpan, MessageReader, RrdMessage, decode_message
+from pdtui.sessions.rrd.message_reader import (
+    DamagedSpan,
+    MessageReader,
+    RrdMessage,
+    decode_message,
+    read_payload,
+)
 from pdtui.sessions.session_schema import APP
 
 RESCUE = "`pdtui sessions repair` rescues what is whole"
@@ -102,10 +108,7 @@ class ChunkStream:
                 self._check_announced(head.store, span)
                 self.skipped_rows[head.entity] += head.rows
                 continue
-            if span.length > MAX_MESSAGE:
-                raise SessionError(f"byte {span.begin}: expected at most {MAX_MESSAGE >> 20} MiB")
-            file.seek(span.start)
-            chunk = self._decode(RrdMessage(span, memoryview(file.read(span.length))))
+            chunk = self._decode(RrdMessage(span, read_payload(file, span)))
             if chunk is not None:
                 yield chunk
 

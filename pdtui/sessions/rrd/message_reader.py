@@ -99,14 +99,7 @@ class MessageReader:
         if span.kind == framing.LAST:
             framing.check_rrd_end(self._file, span)
             return memoryview(b"")
-        if span.length > decoder.MAX_MESSAGE:
-            most = decoder.MAX_MESSAGE >> 20
-            raise SessionError(f"byte {span.begin}: expected a message of at most {most} MiB")
-        self._file.seek(span.start)
-        payload = self._file.read(span.length)
-        if len(payload) < span.length:
-            raise SessionError("the file was shortened while it was read")
-        return memoryview(payload)
+        return read_payload(self._file, span)
 
     def _check_whole(self, span: RrdMessageSpan, payload: memoryview) -> None:
         """Check a message by its checksum; without one, if damage is to be skipped, by decoding it."""
@@ -163,6 +156,18 @@ class MessageReader:
         except SessionError:
             return False
         return True
+
+
+def read_payload(file: BinaryIO, span: RrdMessageSpan) -> memoryview:
+    """Read the payload of a message; one that is too long, or no longer there, is a `SessionError`."""
+    if span.length > decoder.MAX_MESSAGE:
+        most = decoder.MAX_MESSAGE >> 20
+        raise SessionError(f"byte {span.begin}: expected a message of at most {most} MiB")
+    file.seek(span.start)
+    payload = file.read(span.length)
+    if len(payload) < span.length:
+        raise SessionError("the file was shortened while it was read")
+    return memoryview(payload)
 
 
 def decode_message(
