@@ -31,7 +31,8 @@ def _found(summary: dict[str, Any]) -> list[str]:
         if one["reached"]:
             lines.append(
                 f"{one['name']}: {describe_units(one['units'])} reach the goal on {one['success']:.0%} of "
-                f"the held-out starts, with falls on {one['falls']:.0%}."
+                f"the held-out starts, with falls on {one['falls']:.0%}; the gain is {one['gain']:.2g}, and "
+                f"{one['rival']['gain']:.2g} with the best of as many random sets of units."
             )
     lines += [f"{one['attribute']}: can be held at a target." for one in summary["holds"] if one["holds"]]
     return lines
@@ -75,9 +76,16 @@ def _not_found(summary: dict[str, Any]) -> list[str]:
                     f"{one['effect']:+.2g} at first, but by {one['held']['effect']:+.2g} when it is held for "
                     "long: a passing change."
                 )
-    lost = [one["name"] for one in summary["behaviors"] if not one["reached"]]
+    lost = [one["name"] for one in summary["behaviors"] if not one["reliable"]]
     if lost:
         lines.append(f"No stimulation reached the goal of: {', '.join(lost)}.")
+    for one in summary["behaviors"]:
+        if one["reliable"] and not one["reached"]:
+            lines.append(
+                f"{one['name']}: {describe_units(one['units'])} reach the goal, but the best of as many "
+                f"random sets of units is about as good (a gain of {one['rival']['gain']:.2g} beside "
+                f"{one['gain']:.2g}; p = {one['rival']['p']:.2g})."
+            )
     lines += [
         f"{one['attribute']}: no controller holds it at a target."
         for one in summary["holds"]

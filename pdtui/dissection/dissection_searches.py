@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.dissection_config import DissectionSettings
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.measured_effects import UnitEffects
+from pdtui.probing.null_distributions import correct_for_comparisons
 from pdtui.robots.robot import Robot
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.behavior_search import BehaviorSearch, BehaviorSearchResult, SearchStartStates
@@ -26,6 +27,8 @@ _IMPRINT_SEEDS = 1000
 """Offset of the imprints' seeds from the first seed of a dissection; no other stage uses them."""
 _CONTROLLER_SHARES = 2
 """Shares of the time that the behaviors leave to the controllers."""
+_BEHAVIOR_SHARES = 2
+"""Shares of a behavior: the search ends after one, and choosing its rival takes about as long."""
 
 
 @dataclass(frozen=True)
@@ -87,9 +90,11 @@ class DissectionSearches:
             search = BehaviorSearch(
                 self.prober, goal, column, starts, sweeps, shared, seed, self.settings.behavior_search
             )
-            deadline = self.budget.share(len(goals) - number + _CONTROLLER_SHARES)
+            left = _BEHAVIOR_SHARES * (len(goals) - number)
+            deadline = self.budget.share(left + _CONTROLLER_SHARES)
             results.append(search.run(deadline, self.stage(f"search: {goal.name}")))
-        return tuple(results)
+        corrected = correct_for_comparisons([one.rival_p for one in results]).tolist()
+        return tuple(replace(one, rival_p=p) for one, p in zip(results, corrected, strict=True))
 
     def _controller_goals(self, sweep: UnitEffects) -> list[ControllerGoal]:
         """Return what the robot's goals hold; a robot that stands has no share of its speed to hold."""

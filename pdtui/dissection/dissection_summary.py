@@ -189,6 +189,12 @@ def _behavior(found: BehaviorSearchResult, layers: tuple[int, ...]) -> dict[str,
         **_numbers(found.gain, "low", "high"),
         **_numbers(found, "success", "falls", "value", "unperturbed", "score", "search_score"),
         "rollouts": found.rollouts,
+        "reliable": found.reliable,
+        "rival": {
+            "units": found.rival.by_address(layers),
+            "gain": _number(found.rival_gain),
+            "p": _number(found.rival_p),
+        },
     }
 
 

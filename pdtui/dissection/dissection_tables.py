@@ -147,10 +147,13 @@ def _behavior_table(summary: dict[str, Any]) -> Table:
         "Behaviors, on held-out starts",
         summary["behaviors"],
         {
-            "behavior": lambda one: one["name"] + ("" if one["reached"] else " (goal not reached)"),
+            "behavior": lambda one: one["name"] + _why_not_reached(one),
             "units": lambda one: describe_units(one["units"]),
             "gain [95 %]": lambda one: _effect(one, "gain", ".2f"),
             "goal": lambda one: f"{one['enough']:g}",
+            "best random set: gain (p)": lambda one: (
+                f"{_show(one['rival']['gain'], '.2f')} ({_show(one['rival']['p'], '.2g')})"
+            ),
             "success": lambda one: f"{one['success']:.0%}",
             "falls": lambda one: f"{one['falls']:.0%}",
             "attribute: without → with": lambda one: (
@@ -221,6 +224,12 @@ def _probed_unit(one: dict[str, Any] | None) -> str:
         return "none"
     outside = "" if one["in_range"] else " ‡"
     return f"{one['unit']} = {one['value']:g}{outside}" + ("" if one["confirmed"] else " (not confirmed)")
+
+
+def _why_not_reached(behavior: dict[str, Any]) -> str:
+    if behavior["reached"]:
+        return ""
+    return " (random units do as well)" if behavior["reliable"] else " (goal not reached)"
 
 
 def _p_values(one: dict[str, Any] | None) -> str:

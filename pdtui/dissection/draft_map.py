@@ -62,10 +62,16 @@ def _comments(dissection: Dissection, confirmed: set[str]) -> list[str]:
     for behavior in dissection.behaviors:
         if not behavior.reached:
             best = describe_units(behavior.stimulation.by_address(dissection.layers))
-            lines.append(
+            line = (
                 f"Not found: {behavior.goal.name}. The best stimulation, {best}, reached the goal on "
                 f"{behavior.success:.0%} of the held-out starts and fell on {behavior.falls:.0%}."
             )
+            if behavior.reliable:
+                line += (
+                    " The best of as many random sets of units did about as well: its gain is "
+                    f"{behavior.rival_gain:.2g} beside {behavior.gain.effect:.2g} (p {behavior.rival_p:.2g})."
+                )
+            lines.append(line)
     for controller in dissection.controllers:
         if not controller.holds:
             lines.append(

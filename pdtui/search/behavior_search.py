@@ -1,9 +1,9 @@
-"""Search for a few units, and their outputs, that reach a goal."""
+"""Search for a few units, and their outputs, that reach a goal, and for a rival among random ones."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 
@@ -15,6 +15,7 @@ from pdtui.core.units import Stimulation
 from pdtui.core.worker_pool import StepProgress
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.measured_effects import PlanEffects, UnitEffects
+from pdtui.probing.null_distributions import sign_flip_p_values
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.goal_scores import measure_goal_gains, score_plans_by_goal
@@ -22,6 +23,11 @@ from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionProb
 from pdtui.search.shared_candidates import SharedCandidates
 from pdtui.search.stimulation_sampler import StimulationSampler
 from pdtui.stimulation.stimulation_map import MeasuredEffect
+
+_RIVAL_SEED = 1
+"""Distinguishes the random numbers of the rival from those of the search."""
+_RIVAL_LEVEL = 0.05
+"""Largest corrected p-value of a stimulation that is better than its rival."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +71,10 @@ class BehaviorSearchResult:
         value: mean of the attribute with the stimulation, from the held-out starts.
         unperturbed: mean of the attribute without it.
         rollouts: number of roll-outs of the search.
+        rival: the best of as many random sets of as many units, chosen in the same stages.
+        rival_gain: mean gain of the rival over the held-out starts.
+        rival_p: p-value of the hypothesis that the rival gains as much, by flips of the signs of the paired
+            differences; corrected for the goals of a dissection.
     """
 
     goal: BehaviorGoal
@@ -78,11 +88,24 @@ class BehaviorSearchResult:
     value: float
     unperturbed: float
     rollouts: int
+    rival: Stimulation
+    rival_gain: float
+    rival_p: float
+
+    @property
+    def reliable(self) -> bool:
+        """Whether the stimulation reaches the goal from most of the held-out starts."""
+        return self.success >= 0.5 and self.gain.effect >= self.goal.enough and self.falls <= 0.2
+
+    @property
+    def beats_rival(self) -> bool:
+        """Whether the stimulation does better than what the same effort finds among random units."""
+        return self.rival_p <= _RIVAL_LEVEL and self.gain.effect > self.rival_gain
 
     @property
     def reached(self) -> bool:
-        """Whether the stimulation reaches the goal reliably enough to become a behavior of a map."""
-        return self.success >= 0.5 and self.gain.effect >= self.goal.enough and self.falls <= 0.2
+        """Whether the stimulation becomes a behavior of a map: it is reliable, and better than its rival."""
+        return self.reliable and self.beats_rival
 
 
 @dataclass(frozen=True)
@@ -119,10 +142,12 @@ class BehaviorSearch:
     settings: BehaviorSearchSettings
 
     def run(self, deadline: Deadline, progress: StepProgress | None = None) -> BehaviorSearchResult:
-        """Search, and measure the best stimulation from the held-out starts.
+        """Search, and measure the best stimulation and its rival from the held-out starts.
+
+        Choosing the rival takes about as many roll-outs as the search.
 
         Args:
-            deadline: asked between generations.
+            deadline: asked between the generations of the search.
             progress: called with (generations done, generations).
         """
         began, settings, starts = self.prober.pool.rollouts, self.settings, self.starts
@@ -138,8 +163,17 @@ class BehaviorSearch:
             satisfied=min(settings.satisfied, 0.96 * limit),
             safe=min(settings.safe, 0.92 * limit),
         )
-        search_score, stimulation = EvolutionarySearch(problem, settings).run(deadline, progress)
-        return self._measure(stimulation, search_score, began)
+        search = EvolutionarySearch(problem, settings)
+        search_score, stimulation = search.run(deadline, progress)
+        rival = search.choose_among(self._draw_rivals(len(stimulation.units), search.tried))
+        return self._measure(stimulation, rival, search_score, began)
+
+    def _draw_rivals(self, units: int, count: int) -> list[Stimulation]:
+        """Return random sets of so many units of the policy, with outputs as large as a search can reach."""
+        every_unit = np.ones(self.prober.pool.policy.units)
+        bounds = replace(self.settings.bounds, drawn=self.settings.bounds.largest)
+        sampler = StimulationSampler(every_unit, bounds, np.random.default_rng((self.seed, _RIVAL_SEED)))
+        return [sampler.draw(units) for _ in range(count)]
 
     def _first_plans(self, round_: int) -> list[Stimulation]:
         """Return the best shared candidates of the round's size, and in the first round single units."""
@@ -178,10 +212,12 @@ class BehaviorSearch:
             np.maximum.at(weights, np.array(sweep.units), np.maximum(means.max(axis=1), 0.0))
         return weights + (weights.mean() or 1.0)
 
-    def _measure(self, best: Stimulation, search_score: float, began: int) -> BehaviorSearchResult:
+    def _measure(
+        self, best: Stimulation, rival: Stimulation, search_score: float, began: int
+    ) -> BehaviorSearchResult:
         column = self.column
-        held = self._probe([best], self.starts.held_out, self.settings.final_steps)
-        gain = measure_goal_gains(self.goal, column, held)[0]
+        held = self._probe([best, rival], self.starts.held_out, self.settings.final_steps)
+        gain, rival_gain = measure_goal_gains(self.goal, column, held)
         low, high = bootstrap_interval(gain, 0)
         effects, falls = held.effects[0, :, column], held.falls[0]
         change = MeasuredEffect(
@@ -193,7 +229,7 @@ class BehaviorSearch:
         return BehaviorSearchResult(
             goal=self.goal,
             stimulation=best,
-            score=float(score_plans_by_goal(self.goal, column, held, [len(best.units)])[0]),
+            score=float(score_plans_by_goal(self.goal, column, held, [len(best.units)] * 2)[0]),
             search_score=search_score,
             change=change,
             gain=MeasuredEffect(float(gain.mean()), low, high),
@@ -202,4 +238,7 @@ class BehaviorSearch:
             value=float(np.nanmean(held.means[0, :, column])),
             unperturbed=float(held.unperturbed[:, column].mean()),
             rollouts=self.prober.pool.rollouts - began,
+            rival=rival,
+            rival_gain=float(rival_gain.mean()),
+            rival_p=float(sign_flip_p_values(gain - rival_gain)),
         )

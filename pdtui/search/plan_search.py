@@ -132,6 +132,11 @@ class EvolutionarySearch(Generic[Plan]):
         self._elite: list[tuple[float, Plan]] = []
         self._seen: set[Plan] = set()
 
+    @property
+    def tried(self) -> int:
+        """Number of plans that were scored."""
+        return len(self._seen)
+
     def run(self, deadline: Deadline, progress: StepProgress | None = None) -> tuple[float, Plan]:
         """Return the best plan with its full score, which flatters it a little.
 
@@ -159,6 +164,18 @@ class EvolutionarySearch(Generic[Plan]):
         scores = {plan: score for score, plan in self._elite[: settings.finalists]}
         ((_, winner),) = select_plans(list(scores), [PlanScoringStage(problem.final, 1)])
         return scores[winner], winner
+
+    def choose_among(self, plans: Sequence[Plan]) -> Plan:
+        """Return the best of some plans, chosen with as many scores per plan as those of the search."""
+        problem, settings = self._problem, self._settings
+        promoted = max(settings.finalists, len(plans) * settings.promoted // settings.children)
+        stages = (
+            PlanScoringStage(problem.quick, promoted),
+            PlanScoringStage(problem.full, settings.finalists),
+            PlanScoringStage(problem.final, 1),
+        )
+        ((_, winner),) = select_plans(plans, stages)
+        return winner
 
     def _child(self, max_units: int) -> Plan:
         elite = [plan for _, plan in self._elite]

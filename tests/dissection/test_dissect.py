@@ -125,8 +125,9 @@ def test_a_small_trembling_ant_gets_no_behavior_and_the_map_says_so(dissection: 
 def test_what_was_found_is_in_the_map(dissection: Dissection) -> None:
     sure = MeasuredEffect(1.2, 1.0, 1.4)
     up = BehaviorSearchResult(
-        GOALS[1], Stimulation((3, 9), (-2.5, 4.0)), 1.5, 1.6, sure, sure, 1.0, 0.0, 1.2, 0.0, 10
-    )
+        GOALS[1], Stimulation((3, 9), (-2.5, 4.0)), 1.5, 1.6, sure, sure, 1.0, 0.0, 1.2, 0.0, 10,
+        Stimulation((4, 8), (1.5, 2.0)), 0.1, 0.01,
+    )  # fmt: skip
     held = ControllerSearchResult(
         Stimulation((9,), (-1.0,)), PidGains("yaw", 6.0, 0.0, 0.0, 4.0, 0.2), 0.1, 0.6, 0.0, (-0.4, 0.4), True
     )
