@@ -88,6 +88,13 @@ def test_evaluate_refuses_a_quick_look_at_anything_but_behaviors(map_path: Path)
     assert "--policy-only and --quick are mutually exclusive" in refused.output
 
 
+def test_evaluate_refuses_to_watch_without_a_terminal_before_it_runs(map_path: Path) -> None:
+    refused = run("evaluate", "ant", "--map", map_path, "--watch")
+    assert refused.exit_code == 1
+    assert "pdtui: the screen needs a terminal" in refused.output
+    assert "control steps" not in refused.output
+
+
 def test_evaluate_measures_a_target_and_the_policy_alone(map_path: Path) -> None:
     tracked = run("evaluate", "ant", "--map", map_path, "--seeds", "100", "--target", "yaw", "--json")
     data = json.loads(tracked.output)

@@ -149,7 +149,7 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
 
 def show_drive(config: DriveConfig, *, fps: int = 12, watching: bool = False) -> None:
     """Start the simulation's process, then show it on the screen."""
-    _check_terminal()
+    require_terminal()
     from pdtui.driving.drive_client import DriveClient
 
     connection = DriveClient(config)
@@ -168,7 +168,7 @@ def show_drive(config: DriveConfig, *, fps: int = 12, watching: bool = False) ->
 
 def pick_and_drive() -> None:
     """Let the user choose a map, then drive with it."""
-    _check_terminal()
+    require_terminal()
     from pdtui.stimulation.map_library import list_maps
     from pdtui.tui.map_picker import MapPickerApp, map_picker_rows
 
@@ -177,6 +177,7 @@ def pick_and_drive() -> None:
         show_drive(_record_into_new_session(build_drive_config(str(chosen), None, "")))
 
 
-def _check_terminal() -> None:
+def require_terminal() -> None:
+    """Raise a `ScreenError` unless standard input and output are a terminal."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise ScreenError("the screen needs a terminal; use --headless to drive without one")

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from pdtui.cli.drive_command import require_terminal
+from pdtui.cli.evaluate.experiments import EXPERIMENTS, check_experiment, experiment_options, run_experiment
+from pdtui.cli.evaluate.run_watching import watch_runs
 from pdtui.cli.shared_options import (
     FILE_PATH,
     SeedList,
@@ -32,30 +35,6 @@ from pdtui.policies.weights.import_options import ImportOptions
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
     from pdtui.evaluation.protocol_settings import ProtocolSettings
-    from pdtui.paper.experiment import Experiment
-
-
-def find_experiments() -> dict[str, Experiment]:
-    """Return the paper's experiments by name; none where `pdtui.paper` is not installed."""
-    try:
-        from pdtui.paper.experiment import list_experiments
-    except ModuleNotFoundError as error:
-        if error.name == "pdtui.paper":
-            return {}
-        raise
-    return list_experiments()
-
-
-EXPERIMENTS = find_experiments()
-
-
-def experiment_options(command: click.Command) -> click.Command:
-    """Add the options of the experiments to a command."""
-    for name, experiment in EXPERIMENTS.items():
-        for option in experiment.options:
-            option.help = f"With --experiment {name}: {option.help}"
-            command.params.append(option)
-    return command
 
 
 @experiment_options
@@ -84,6 +63,11 @@ def experiment_options(command: click.Command) -> click.Command:
     type=FILE_PATH,
     metavar="FILE.png",
     help="Draw frames of the best, the median and the worst seed of each behavior.",
+)
+@click.option(
+    "--watch",
+    is_flag=True,
+    help="Then show the best, the median and the worst seed of each behavior on the screen.",
 )
 @click.option(
     "--experiment",
@@ -117,6 +101,7 @@ def evaluate_command(
     quick: bool,
     hold: int | None,
     strip: Path | None,
+    watch: bool,
     experiment: str | None,
     pictures: tuple[Path, ...],
     overwrite: bool,
@@ -128,7 +113,7 @@ def evaluate_command(
     own_options = {name: value for name, value in own_options.items() if value not in (None, ())}
     _check_modes(
         {"--policy-only": policy_only, "--target": target, "--experiment": experiment},
-        {"--update": update, "--quick": quick, "--hold": hold, "--strip": strip},
+        {"--update": update, "--quick": quick, "--hold": hold, "--strip": strip, "--watch": watch},
     )
     if experiment is None and (others or pictures):
         raise click.UsageError(f"{'more than one map' if others else '-o'} needs --experiment")
@@ -138,16 +123,15 @@ def evaluate_command(
         raise MapError("--update cannot be used with --force: the map would get another policy's figures")
     if others and (map_name or policy):
         raise click.UsageError("--map and --policy work with one map only; compared maps name their policies")
-    if experiment is None and own_options:
-        raise click.UsageError(f"{_flag(own_options)} needs --experiment")
-    if experiment is not None:
-        _check_experiment(EXPERIMENTS.get(experiment), others, pictures, own_options)
+    check_experiment(experiment, others, pictures, own_options)
     config = build_drive_config(robot, map_name, policy, import_options, force=force, start=start)
     if not policy_only:
         check_judging_seeds(config, seeds)
     if experiment is not None:
         rest = [build_drive_config(other, None, "", import_options, force=force) for other in others]
-        _run_experiment(
+        for one in rest:
+            check_judging_seeds(one, seeds)
+        run_experiment(
             experiment,
             as_json,
             configs=(config, *rest),
@@ -176,7 +160,9 @@ def evaluate_command(
 
         settings, drawn = choose_protocol(quick=quick, hold=hold), (strip, overwrite) if strip else None
         seeds = seeds[:QUICK_SEEDS] if quick else seeds
-        _evaluate_behaviors(config, seeds, settings, workers, drawn, update=update, as_json=as_json)
+        _evaluate_behaviors(
+            config, seeds, settings, workers, drawn, watch=watch, update=update, as_json=as_json
+        )
 
 
 def _evaluate_behaviors(
@@ -186,6 +172,7 @@ def _evaluate_behaviors(
     workers: int,
     drawn: tuple[Path, bool] | None,
     *,
+    watch: bool,
     update: bool,
     as_json: bool,
 ) -> None:
@@ -197,6 +184,8 @@ def _evaluate_behaviors(
 
     if drawn is not None:
         check_figure_path(*drawn)
+    if watch:
+        require_terminal()
     plan = evaluation.plan_evaluation(config, seeds, settings)
     if not as_json:
         click.echo(f"{evaluation.count_control_steps(plan):,} control steps, {workers} processes", err=True)
@@ -209,41 +198,11 @@ def _evaluate_behaviors(
     if drawn is not None:
         with progress_bar("filming", quiet=as_json) as advance:
             draw_strips(drawn[0], plan, result, film_strips(plan, result, advance))
+    if watch:
+        watch_runs(plan, result)
 
 
 def _check_modes(modes: Mapping[str, Any], behaviors_only: Mapping[str, Any]) -> None:
     chosen, given = ([flag for flag, on in flags.items() if on] for flags in (modes, behaviors_only))
     if len(chosen) > 1 or (chosen and given):
         raise click.UsageError(f"{' and '.join((chosen + given)[:2])} are mutually exclusive")
-
-
-def _check_experiment(
-    experiment: Experiment | None, others: Sequence[str], pictures: Sequence[Path], options: Mapping[str, Any]
-) -> None:
-    """Refuse what the experiment would otherwise silently ignore."""
-    if experiment is None:
-        return  # `pdtui.paper` is not installed, which running it will say
-    name, own = experiment.name, [option.name for option in experiment.options]
-    if foreign := {option: value for option, value in options.items() if option not in own}:
-        raise click.UsageError(f"--experiment {name} has no option {_flag(foreign)}")
-    if others and not experiment.takes_several_maps:
-        raise click.UsageError(f"--experiment {name} takes one map")
-    if pictures and not experiment.draws_pictures:
-        raise click.UsageError(f"--experiment {name} draws no pictures; leave -o out")
-
-
-def _flag(options: Mapping[str, Any]) -> str:
-    """The first of these options as it is typed."""
-    name = next(iter(options))
-    return next(one.opts[0] for e in EXPERIMENTS.values() for one in e.options if one.name == name)
-
-
-def _run_experiment(name: str, as_json: bool, **request: Any) -> None:
-    from pdtui.paper.experiment import ExperimentRequest
-
-    experiment = EXPERIMENTS[name]
-    with progress_bar(experiment.progress_label, quiet=as_json) as advance:
-        report = experiment.run(ExperimentRequest(**request, progress=advance))
-    print_result(report.data, as_json, lambda: report.table)
-    if report.pictures and not as_json:
-        click.echo(f"wrote {', '.join(map(str, report.pictures))}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from pdtui.evaluation.run_conditions import (
 )
 from pdtui.evaluation.substitute_pushes import PushSize, PushSizeMeter, SubstitutePush, act_in_place
 from pdtui.robots.geometry import root_body_row
+from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,18 @@ def measure_push(built: ControlLoop, plan: HeldRunPlan) -> PushMeasurement:
     for _ in run_episode(loop, plan.times.press + plan.times.window, press):
         pass
     return PushMeasurement(meter.size(), np.array(meter.observations).std(axis=0))
+
+
+def record_held_run(built: ControlLoop, plan: HeldRunPlan, path: Path) -> None:
+    """Drive one run and record it as a session.
+
+    Raises:
+        SessionError: The file exists, or cannot be written.
+    """
+    info = ControlLoop(built.robot, built.policy, built.map, plan.seed).info
+    with SessionRecorder(path, info) as recorder:
+        for record in drive_held_run(built, plan):
+            recorder.write(record)
 
 
 @dataclass(frozen=True)

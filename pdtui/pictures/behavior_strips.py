@@ -57,6 +57,12 @@ def rank_seeds(row: BehaviorEvaluation) -> list[int]:
     )
 
 
+def pick_seeds(row: BehaviorEvaluation) -> dict[str, int]:
+    """Return the positions of the ``best``, the ``median`` and the ``worst`` seed of a behavior."""
+    order = rank_seeds(row)
+    return {"best": order[0], "median": order[len(order) // 2], "worst": order[-1]}
+
+
 def frame_seconds(times: RunTimes) -> list[float]:
     """Return when frames are taken: at the press, in the first and the last 5 s, and after the release."""
     held, end = times.held * times.dt, (times.held + min(times.after, times.window) - 1) * times.dt
@@ -78,9 +84,7 @@ def film_strips(
         raise PictureError(f"{robot.name}: {missing}, so there is nothing to show in a strip")
     strips, rows = [], result.undisturbed()
     for row in rows:
-        order = rank_seeds(row)
-        chosen = {"best": order[0], "median": order[len(order) // 2], "worst": order[-1]}
-        for rank, place in chosen.items():
+        for rank, place in pick_seeds(row).items():
             seed = result.seeds[place]
             times = plan.times(row.behavior, seed)
             run = HeldRunPlan(row.behavior, seed, times)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,19 @@ from pdtui.core.attributes import Floats
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.evaluation.held_run import HeldRunPlan, drive_held_run, measure_push, run_held_behavior
+from pdtui.driving.session_replay import replay_session
+from pdtui.evaluation.held_run import (
+    HeldRunPlan,
+    drive_held_run,
+    measure_push,
+    record_held_run,
+    run_held_behavior,
+)
 from pdtui.evaluation.protocol_settings import RunTimes
 from pdtui.evaluation.run_conditions import CONDITIONS, UNDISTURBED, find_condition, plan_pushes
 from pdtui.robots import make_robot
+from pdtui.sessions.session_header import read_session_header
+from pdtui.sessions.streams.step_block_reader import read_step_blocks
 from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.turning_robot import Vehicle, turning_loop
 
@@ -42,6 +52,17 @@ def test_a_trace_has_means_over_bins_from_the_press_on(loop: ControlLoop) -> Non
     assert trace.values[:, column] == pytest.approx(rows[20:, column].reshape(6, 5).mean(axis=1))
     assert trace.places[2] == pytest.approx(records[34].poses[0, :2])
     assert not trace.fell
+
+
+def test_a_recorded_run_is_the_run_and_replays(loop: ControlLoop, tmp_path: Path) -> None:
+    plan, path = HeldRunPlan("push", 3, TIMES), tmp_path / "run.rrd"
+    record_held_run(loop, plan, path)
+    header = read_session_header(path)
+    pressed = [(event.step, event.kind, event.name) for event in header.events]
+    assert pressed == [(20, "behavior", "push"), (40, "default", "")]
+    assert replay_session(path).identical
+    (block,) = read_step_blocks(header)
+    assert block.digests.tolist() == [record.digest for record in drive_held_run(loop, plan)]
 
 
 class _Tipping(Vehicle):
