@@ -15,11 +15,15 @@ import pytest
 from click.testing import CliRunner, Result
 
 from pdtui.cli import main
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.sessions.session_reader import read_activations, read_session
+from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_library import shipped_folder
 from pdtui.stimulation.map_reader import load_map
+from tests.obstacle_course import Course, course_loop
 
 KEYS = "10 w\n20 t\n30 space\n35 h\n40 left\n50 r\n"
 
@@ -224,3 +228,20 @@ def test_another_processor_repeats_within_the_tolerance() -> None:
     assert (code, row["repeats"], row["tolerance"]) == (3, False, None)
     code, row = verify("--tolerance", "0")
     assert (code, row["repeats"]) == (3, False)
+
+
+def test_a_session_with_obstacles_but_no_distance_is_shown(tmp_path: Path) -> None:
+    class Undirected(Course):
+        attributes = (Attribute("vx", "m/s"),)
+
+        def read_attributes(self) -> Floats:
+            return super().read_attributes()[:1]
+
+    usual = course_loop()
+    loop = ControlLoop(Undirected(), usual.policy, usual.map, 1)
+    with SessionRecorder(tmp_path / "course.rrd", loop.info) as recorder:
+        for _ in range(20):
+            recorder.write(loop.advance())
+    shown = run("sessions", "show", tmp_path / "course.rrd")
+    assert shown.exit_code == 0, shown.output
+    assert "collisions" in shown.output

@@ -124,7 +124,9 @@ def evaluate_command(
     if others and (map_name or policy):
         raise click.UsageError("--map and --policy work with one map only; compared maps name their policies")
     check_experiment(experiment, others, pictures, own_options)
-    config = build_drive_config(robot, map_name, policy, import_options, force=force, start=start)
+    config = build_drive_config(
+        robot, map_name, policy, import_options, force=force, start=start, without_map=policy_only
+    )
     if not policy_only:
         check_judging_seeds(config, seeds)
     if experiment is not None:

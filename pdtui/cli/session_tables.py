@@ -61,7 +61,7 @@ def session_details(session: SessionHeader, summary: SessionSummary) -> Any:
     facts = [
         ("session", session.path),
         ("robot", info.robot),
-        ("policy", f"{info.policy}, SHA-256 {info.policy_hash[:12]}…"),
+        ("policy", f"{info.policy}, SHA-256 {info.policy_hash}"),
         ("layers", " ".join(map(str, info.layers))),
         ("activations", _KEPT[info.activations]),
         ("map", f"{len(info.map_text.splitlines())} lines, inside the session"),
@@ -108,9 +108,13 @@ def _episodes(summary: SessionSummary) -> list[Table]:
     columns = ["distance"] * far + ["collisions"] * hits
     table = new_table("", "episode", "steps", *columns, "human involvement")
     for tally in tallies:
-        cells = [f"{tally.distance:.2f} m"] * far + [f"{tally.collisions:g}"] * hits
+        cells = [_figure(tally.distance, ".2f", " m")] * far + [_figure(tally.collisions, "g")] * hits
         table.add_row(str(tally.episode), str(tally.steps), *cells, _keyed(tally.involvement, tally.steps))
     return [table]
+
+
+def _figure(value: float | None, form: str, unit: str = "") -> str:
+    return "" if value is None else f"{value:{form}}{unit}"
 
 
 def _happened(session: SessionHeader) -> Table:

@@ -164,8 +164,8 @@ class StimulationMap:
         hash_matters = self.policy_hash or self.behaviors
         if hash_matters and self.policy_hash != policy_hash and not force:
             raise MapError(
-                f"{self.source}: made for a policy with SHA-256 {self.policy_hash[:12]}…, "
-                f"the policy here has {policy_hash[:12]}…; --force uses it anyway"
+                f"{self.source}: made for a policy with SHA-256 {self.policy_hash or '(none given)'}, "
+                f"the policy here has {policy_hash}"
             )
         for behavior in self.behaviors.values():
             for address in {**self.units_of(behavior), **behavior.base}:

@@ -83,7 +83,7 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 
 
 def test_a_map_of_another_policy_is_refused_unless_forced(small_map: StimulationMap) -> None:
-    with pytest.raises(MapError, match=r"made for a policy with SHA-256 .* --force"):
+    with pytest.raises(MapError, match=r"made for a policy with SHA-256 .*, the policy here has "):
         small_map.check("ant", (16, 16), "0" * 64)
     small_map.check("ant", (16, 16), "0" * 64, force=True)
     with pytest.raises(
