@@ -27,7 +27,7 @@ def assemble_network(
         raise PolicyError(
             f"{source}: expected a hidden layer before the head, found {len(found.layers)} layers"
         )
-    output = _output_kind(found, spaces)
+    output = _output_kind(found, spaces, source)
     outputs, observations = found.layers[-1].shape[0], found.layers[0].shape[1]
     actions = outputs // 2 if output == "gaussian pair" else outputs
     discrete = output == "categorical"
@@ -57,16 +57,19 @@ def assemble_network(
     return network.eval()
 
 
-def _output_kind(found: PartialPolicy, spaces: ObservationActionSpaces | None) -> str:
+def _output_kind(found: PartialPolicy, spaces: ObservationActionSpaces | None, source: str) -> str:
     """Return what the head's outputs are; the world's spaces decide where the file does not say."""
     if found.output != "unknown pair":
         return found.output
     outputs = found.layers[-1].shape[0]
-    if spaces is not None and spaces.discrete_actions:
+    if spaces is None:
+        raise PolicyError(
+            f"{source}: {found.origin} does not say whether its {outputs} outputs are actions, pairs of mean "
+            "and deviation, or logits; name the robot that it drives (--robot)"
+        )
+    if spaces.discrete_actions:
         return "categorical"
-    if spaces is not None and outputs == 2 * spaces.actions:
-        return "gaussian pair"
-    return "action"
+    return "gaussian pair" if outputs == 2 * spaces.actions else "action"
 
 
 def _choose_head(

@@ -172,6 +172,10 @@ def test_rllib_ppo_is_a_pair_or_logits_as_the_world_says(tmp_path: Path, observa
         spaces=ObservationActionSpaces("world", 5, 1, discrete_actions=4),
     )
     agree(logits, lambda x: chain(x).argmax().reshape(1).float(), observations(5))
+    with pytest.raises(PolicyError, match=r"whether its 4 outputs are actions, pairs .*--robot"):
+        convert_policy(
+            tmp_path / "ppo.npz", tmp_path / "out.safetensors", ImportOptions("tanh", "none"), None
+        )
 
 
 def test_a_converted_policy_states_everything(tmp_path: Path, observations: Draw) -> None:
