@@ -36,6 +36,24 @@ def test_what_is_found_scores_above_the_untouched_policy_where_it_was_found_and_
     assert first.search_score > np.mean(untouched)
 
 
+def test_a_search_that_ends_early_starts_anew() -> None:
+    small = replace(
+        QUICK_TASK_SEARCH, values=(6.0,), screen_units=4, children=2, promoted=1, held_out_seeds=1
+    )
+    found = []
+    for restarts in (0, 2):
+        with RolloutPool("bipedal_walker", "bipedal_walker", workers=1) as pool:
+            search = TaskSearch(
+                pool, pool.robot.find_task("front flip"), 1000, replace(small, restarts=restarts)
+            )
+            found.append(search.run(SharedTimeBudget(None).share()))
+    once, again = found
+    assert again.rollouts > once.rollouts
+    with RolloutPool("bipedal_walker", "bipedal_walker", workers=1) as pool:
+        search = TaskSearch(pool, pool.robot.find_task("front flip"), 1000, replace(small, restarts=2))
+        assert search.run(SharedTimeBudget(1e-9).share()).rollouts <= once.rollouts
+
+
 def test_the_command_writes_a_behavior_and_keeps_what_the_map_says(tmp_path: Path) -> None:
     path = tmp_path / "biped.toml"
     arguments = ["pursue", "bipedal_walker", "jump", "--quick", "--workers", "2", "-o", str(path), "--json"]
