@@ -107,7 +107,7 @@ def test_bullets_product_of_two_frictions_is_scaled(start: str) -> None:
         robot.reset(seed=2, options={"start": start})
         bullet, toe = robot.bullet, robot.bullet.getDynamicsInfo(robot.robot_id, 5)
         others = [bullet.getDynamicsInfo(body, -1) for body in range(robot.robot_id)]
-        # Lateral friction of a contact, and rolling friction, which Bullet multiplies with the other's lateral.
+        # Bullet multiplies rolling friction with the other body's lateral friction.
         return np.array([(toe[1] * one[1], toe[1] * one[6] + toe[6] * one[1]) for one in others])
 
     own = products()

@@ -155,8 +155,8 @@ class GymnasiumRobot(Robot):
         mark = np.array([digest, self._seed, start], np.int64).view(np.float64)
         if self._repeats:
             taken, pushes = self._actions.so_far(), self._actions.pushes_so_far()
-            extras = (mark, pushes) if len(pushes) else (mark,)
-            return RobotState(self.name, taken, extras, self.np_random.bit_generator.state)
+            logged = (mark, pushes) if len(pushes) else (mark,)
+            return RobotState(self.name, taken, logged, self.np_random.bit_generator.state)
         info, seen = gymnasium_spaces.numeric_entries(self.info), self._observation.copy()
         mine = {"reward": self.reward, "info": info, "seen": seen}
         memory = {"environment": python_state.copy_python_state(self.env), "robot": mine}
