@@ -43,3 +43,8 @@ def format_mean_with_interval(mean: float, low: float, high: float, form: str = 
     if not (math.isfinite(low) and math.isfinite(high)):
         return f"{mean:{form}}"
     return f"{mean:{form}} [{low:{form}}, {high:{form}}]"
+
+
+def format_p_value(value: float) -> str:
+    """Return a p-value with two digits, or that it is below 0.001."""
+    return f"{value:.2g}" if value >= 0.001 else "< 0.001"

@@ -32,12 +32,13 @@ from pdtui.evaluation.held_run import (
 )
 from pdtui.evaluation.protocol_settings import ProtocolSettings
 from pdtui.evaluation.run_conditions import UNDISTURBED
-from pdtui.evaluation.task_evaluation import (
-    TaskEvaluation,
+from pdtui.evaluation.tasks.task_evaluation import TaskEvaluation, summarise_tasks
+from pdtui.evaluation.tasks.task_runs import (
     count_task_steps,
     list_task_runs,
+    plan_task_episode,
     run_task_episode,
-    summarise_tasks,
+    task_measuring_runs,
 )
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
 
@@ -59,7 +60,7 @@ class MapEvaluation:
         nearly_one_start: Whether that is less than 2 %, so that many seeds tell hardly more than one.
         not_offered: Conditions that the robot cannot be put in.
         behaviors: Every behavior with an aim, in each condition.
-        tasks: Every behavior with a task.
+        tasks: Every behavior with a task, in each condition.
     """
 
     robot: str
@@ -99,8 +100,8 @@ def plan_evaluation(
 def count_control_steps(plan: EvaluationPlan) -> int:
     """Return how many control steps an evaluation runs; falls make it fewer."""
     held = sum(plan.times(key.behavior, key.seed).steps for key in plan.held_runs())
-    times = [plan.times(key.behavior, key.seed) for key in plan.measuring_runs()]
-    first = sum(one.press + one.window for one in times)
+    measuring = [*plan.measuring_runs(), *task_measuring_runs(plan)]
+    first = sum(run.times.press + run.times.window for run in measuring)
     return held + first + sum(count_task_steps(plan, run) for run in list_task_runs(plan))
 
 
@@ -115,26 +116,37 @@ def evaluate_behaviors(
         workers: Number of worker processes.
         progress: Called with the number of runs done and of all runs.
     """
-    measuring, held, tasks = plan.measuring_runs(), plan.held_runs(), list_task_runs(plan)
-    total, done = len(measuring) + len(held) + len(tasks), 0
+    measuring, in_tasks = plan.measuring_runs(), task_measuring_runs(plan)
+    held, tasks = plan.held_runs(), list_task_runs(plan)
+    trials = [*measuring, *in_tasks]
+    total, done = len(trials) + len(held) + len(tasks), 0
 
     def advance(finished: int, _jobs: int) -> None:
         if progress is not None:
             progress(done + finished, total)
 
     with WorkerPool(f"evaluation of {config.robot}", workers, plan.loop, build_control_loop, config) as pool:
-        measured: dict[str, list[PushMeasurement]] = {}
-        trials = [
-            HeldRunPlan(key.behavior, key.seed, plan.times(key.behavior, key.seed)) for key in measuring
-        ]
-        for key, found in zip(measuring, pool.map(measure_push, trials, advance), strict=True):
-            measured.setdefault(key.behavior, []).append(found)
-        done += len(measuring)
+        found = pool.map(measure_push, trials, advance)
+        measured = _by_behavior(measuring, found[: len(measuring)])
+        measured_in_tasks = measured | _by_behavior(in_tasks, found[len(measuring) :])
+        done += len(trials)
         runs = {key: run for key in held if (run := plan.held_plan(key, measured)) is not None}
         traces = dict(zip(runs, pool.map(run_held_behavior, list(runs.values()), advance), strict=True))
         done += len(held)
-        verdicts = dict(zip(tasks, pool.map(run_task_episode, tasks, advance), strict=True))
+        planned = [plan_task_episode(plan, run, measured_in_tasks) for run in tasks]
+        episodes = [one for one in planned if one is not None]
+        judged = pool.map(run_task_episode, episodes, advance)
+        verdicts = {one.run: verdict for one, verdict in zip(episodes, judged, strict=True)}
     return _summarise(plan, traces, summarise_tasks(plan, verdicts))
+
+
+def _by_behavior(
+    runs: Sequence[HeldRunPlan], found: Sequence[PushMeasurement]
+) -> dict[str, list[PushMeasurement]]:
+    measured: dict[str, list[PushMeasurement]] = {}
+    for run, one in zip(runs, found, strict=True):
+        measured.setdefault(run.behavior, []).append(one)
+    return measured
 
 
 def _summarise(

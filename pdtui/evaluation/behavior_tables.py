@@ -7,11 +7,12 @@ import math
 from rich.console import Group
 from rich.table import Table
 
-from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
+from pdtui.core.text_tables import format_mean_with_interval, format_p_value, format_seed_range, new_table
 from pdtui.evaluation.behavior_evaluation import MapEvaluation
 from pdtui.evaluation.behavior_summary import AS_LARGE, BehaviorEvaluation
 from pdtui.evaluation.effect_figures import WindowEffect
 from pdtui.evaluation.run_conditions import UNDISTURBED
+from pdtui.evaluation.tasks.task_tables import task_tables
 
 
 def behavior_tables(result: MapEvaluation) -> Group:
@@ -23,8 +24,9 @@ def behavior_tables(result: MapEvaluation) -> Group:
             tables.append(_substitutes_table(result))
         if any(row.condition != UNDISTURBED.name for row in result.behaviors):
             tables.append(_conditions_table(result))
-        tables += _notes(result)
-    return Group(*tables, *([_task_table(result)] if result.tasks else []))
+    if result.tasks:
+        tables += task_tables(_title(result), result.tasks, result.settings)
+    return Group(*tables, *_notes(result))
 
 
 def _criteria_table(result: MapEvaluation) -> Table:
@@ -60,7 +62,7 @@ def _time_table(result: MapEvaluation) -> Table:
             f"{row.first.default:.2f}",
             _effect(row.first),
             _effect(row.last),
-            _p_value(row.last.corrected),
+            format_p_value(row.last.corrected),
             "yes" if row.holds else "no",
             "–" if math.isnan(row.onset) else f"{row.onset:.1f} s",
             f"{row.lasts:.1f} s ({row.lasting}/{row.runs} to the end)",
@@ -124,7 +126,7 @@ def _condition_cells(row: BehaviorEvaluation) -> list[str]:
     return [
         row.condition,
         _effect(row.last),
-        _p_value(row.last.corrected),
+        format_p_value(row.last.corrected),
         "yes" if row.holds else "no",
         *(f"{count}/{row.runs}" for count in counts),
     ]
@@ -142,48 +144,9 @@ def _notes(result: MapEvaluation) -> list[str]:
     return notes
 
 
-def _task_table(result: MapEvaluation) -> Table:
-    left = ["behavior", "success means"]
-    table = new_table(
-        f"{_title(result)}: tasks",
-        *left,
-        *("success [95 %]", "without it", "p", "holds", "after a long hold", "falls", "random units as good"),
-        "measured (without it)",
-        left=left,
-    )
-    for row in result.tasks:
-        nothing = float("nan")
-        measured = ", ".join(
-            f"{name} {value:.2f} ({row.figures_by_itself.get(name, nothing):.2f})"
-            for name, value in row.figures.items()
-        )
-        table.add_row(
-            row.behavior,
-            row.wanted,
-            f"{row.done}/{row.runs} [{row.low:.0%}, {row.high:.0%}]",
-            f"{row.by_itself}/{row.runs}",
-            _p_value(row.corrected),
-            "yes" if row.holds else "no",
-            "–" if row.still_done is None else f"{row.still_done}/{row.runs}",
-            f"{row.falls}/{row.runs} ({row.falls_by_itself})",
-            f"{row.as_good}/{row.draws}" if row.draws else "–",
-            measured,
-        )
-    table.caption = (
-        "p: paired sign-flip test (McNemar's), corrected over the rows (Holm). After a long hold: the judge "
-        "sees the last part of it. Random units: draws of as many of the same layers at the same |v| that "
-        "succeed as often."
-    )
-    return table
-
-
 def _title(result: MapEvaluation) -> str:
     return f"{result.robot}, policy {result.policy}, {format_seed_range(result.seeds)}"
 
 
 def _effect(window: WindowEffect) -> str:
     return format_mean_with_interval(window.effect, window.low, window.high, "+.2f")
-
-
-def _p_value(value: float) -> str:
-    return f"{value:.2g}" if value >= 0.001 else "< 0.001"

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from pdtui.core.attributes import Floats
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.evaluation.held_run import HeldRunPlan, PushMeasurement
@@ -117,11 +118,18 @@ class EvaluationPlan:
         ]
         return keys
 
-    def measuring_runs(self) -> list[RunKey]:
-        """Return the runs that measure how far behaviors move units and actions, and observations spread."""
+    def measuring_runs(self) -> list[HeldRunPlan]:
+        """Return the runs that measure how far behaviors with an aim move units and actions.
+
+        Those without a press measure how far observations spread in a walk from the robot's usual start.
+        """
         named = [b.name for b in self.behaviors if self.outputs(b).units]
-        names = ["", *named] if self.behaviors else []
-        return [RunKey(name, seed) for name in names for seed in self.seeds[:MEASURED_SEEDS]]
+        names = ["", *named] if self.behaviors or self.tasked else []
+        return [
+            HeldRunPlan(name, seed, self.times(name, seed))
+            for name in names
+            for seed in self.seeds[:MEASURED_SEEDS]
+        ]
 
     def times(self, name: str, seed: int) -> RunTimes:
         """Return the times of a run; one without a press lasts as long as the longest with one."""
@@ -142,28 +150,50 @@ class EvaluationPlan:
         Returns:
             The run; None for a substitute whose size was not measured, because the robot fell before.
         """
-        spread = np.mean([one.observation_spread for one in measured[""]], axis=0)
-        plan = HeldRunPlan(
+        substitute = self.draw_substitute(key.kind, key.behavior, key.draw, measured)
+        if key.kind != "units" and substitute is None:
+            return None
+        return HeldRunPlan(
             key.behavior,
             key.seed,
             self.times(key.behavior, key.seed),
             find_condition(key.condition),
-            observation_spread=spread,
+            substitute,
+            self.mean_observation_spread(measured),
         )
-        if key.kind == "units":
-            return plan
-        substitute = self._draw(key, measured[key.behavior])
-        return None if substitute is None else replace(plan, substitute=substitute)
 
-    def _draw(self, key: RunKey, measured: Sequence[PushMeasurement]) -> SubstitutePush | None:
+    def mean_observation_spread(self, measured: Mapping[str, Sequence[PushMeasurement]]) -> Floats:
+        """Return the standard deviation of every observation in an undisturbed walk."""
+        spread: Floats = np.mean([one.observation_spread for one in measured[""]], axis=0)
+        return spread
+
+    def draw_substitute(
+        self,
+        kind: SubstituteKind,
+        behavior: str,
+        draw: int,
+        measured: Mapping[str, Sequence[PushMeasurement]],
+    ) -> SubstitutePush | None:
+        """Return what acts in the place of a behavior's units.
+
+        Args:
+            kind: What is pushed.
+            behavior: Name of the behavior.
+            draw: Number of the draw of a random kind.
+            measured: What the measuring runs found, by behavior.
+
+        Returns:
+            The substitute; None for the units themselves, and for a size that could not be measured.
+        """
         layers = self.loop.policy.layers
-        if key.kind == "random units":
-            outputs = self.outputs(self.loop.map.behaviors[key.behavior])
-            return draw_random_units(outputs, layers, key.behavior, key.draw)
-        sizes = [one.size for one in measured if one.size is not None]
+        if kind == "units":
+            return None
+        if kind == "random units":
+            return draw_random_units(self.outputs(self.loop.map.behaviors[behavior]), layers, behavior, draw)
+        sizes = [one.size for one in measured[behavior] if one.size is not None]
         if not sizes:
             return None
         size = mean_push_size(sizes)
-        if key.kind == "actions":
+        if kind == "actions":
             return ActionPush(size.action)
-        return draw_random_direction(size, layers, key.behavior, key.draw)
+        return draw_random_direction(size, layers, behavior, draw)

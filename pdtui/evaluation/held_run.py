@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -38,6 +39,7 @@ class HeldRunPlan:
         condition: How the run is disturbed.
         substitute: What acts in the place of the behavior's units; None for the units.
         observation_spread: Standard deviation of every observation in an undisturbed walk, for noise.
+        start: Name of the state in which the run starts; empty for the robot's usual one.
     """
 
     behavior: str
@@ -46,6 +48,7 @@ class HeldRunPlan:
     condition: EvaluationCondition = UNDISTURBED
     substitute: SubstitutePush | None = None
     observation_spread: Floats = field(default_factory=lambda: np.zeros(()))
+    start: str = ""
 
 
 @dataclass(frozen=True)
@@ -69,8 +72,11 @@ class HeldRunTrace:
         return self.fell_at is not None
 
 
-def drive_held_run(built: ControlLoop, plan: HeldRunPlan) -> Iterator[StepRecord]:
-    """Drive one run and yield its records, up to the end of the episode."""
+@contextmanager
+def begin_held_run(
+    built: ControlLoop, plan: HeldRunPlan
+) -> Iterator[tuple[ControlLoop, Iterator[StepRecord]]]:
+    """Begin one run; give its loop and, to be driven within the block, its records up to the end."""
     robot, times = built.robot, plan.times
     pushes = plan_pushes(plan.condition, plan.seed, times.dt, times.steps)
 
@@ -81,10 +87,16 @@ def drive_held_run(built: ControlLoop, plan: HeldRunPlan) -> Iterator[StepRecord
         return [DriveEvent(step, "default")] if step == times.press + times.held else []
 
     with disturbed_world(robot, plan.condition):
-        loop = ControlLoop(robot, built.policy, built.map, plan.seed)
+        loop = ControlLoop(robot, built.policy, built.map, plan.seed, start=plan.start)
         act = act_in_place(loop.act, built.policy, robot, plan.substitute)
         loop.act = disturb_policy(act, robot, plan.condition, plan.seed, plan.observation_spread)
-        yield from run_episode(loop, times.steps, before_step)
+        yield loop, run_episode(loop, times.steps, before_step)
+
+
+def drive_held_run(built: ControlLoop, plan: HeldRunPlan) -> Iterator[StepRecord]:
+    """Drive one run and yield its records, up to the end of the episode."""
+    with begin_held_run(built, plan) as (_, records):
+        yield from records
 
 
 def run_held_behavior(built: ControlLoop, plan: HeldRunPlan) -> HeldRunTrace:
@@ -116,7 +128,7 @@ class PushMeasurement:
 
 def measure_push(built: ControlLoop, plan: HeldRunPlan) -> PushMeasurement:
     """Run up to the end of the first window and measure how far the behavior moves units and actions."""
-    loop = ControlLoop(built.robot, built.policy, built.map, plan.seed)
+    loop = ControlLoop(built.robot, built.policy, built.map, plan.seed, start=plan.start)
     meter = PushSizeMeter(built.policy)
     loop.act = meter.act
 

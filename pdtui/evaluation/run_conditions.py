@@ -16,12 +16,6 @@ from pdtui.driving.control_loop import PolicyAct
 from pdtui.evaluation.protocol_settings import RandomPurpose, purpose_generator
 from pdtui.policies.runtime.policy import PolicyStep
 from pdtui.robots.robot import Robot
-from pdtui.robots.simulators.mujoco_disturbances import (
-    offers_pushes,
-    offers_scaled_physics,
-    push_trunk,
-    scaled_physics,
-)
 
 PUSH_SECONDS = (1.0, 3.0)
 """Shortest and longest time between two pushes, s; ANYmal's training pushes every 8 s."""
@@ -56,8 +50,8 @@ class EvaluationCondition:
         scaled = self.friction != 1.0 or self.mass != 1.0
         bounded = bool(np.isfinite(_half_range(robot)).all())
         return (
-            (not self.push or offers_pushes(robot))
-            and (not scaled or offers_scaled_physics(robot))
+            (not self.push or robot.offers_pushes)
+            and (not scaled or robot.offers_scaled_physics)
             and (not self.spread or bounded)
         )
 
@@ -88,7 +82,7 @@ def find_condition(name: str) -> EvaluationCondition:
 def disturbed_world(robot: Robot, condition: EvaluationCondition) -> Iterator[None]:
     """Give the robot the condition's friction and masses while the block runs; begin it before the reset."""
     scaled = condition.friction != 1.0 or condition.mass != 1.0
-    with scaled_physics(robot, condition.friction, condition.mass) if scaled else nullcontext():
+    with robot.scaled_physics(condition.friction, condition.mass) if scaled else nullcontext():
         yield
 
 
@@ -148,7 +142,7 @@ def plan_pushes(
 def push_robot(robot: Robot, pushes: dict[int, tuple[float, float]], step: int) -> None:
     """Push the robot if it is time."""
     if step in pushes:
-        push_trunk(robot, *pushes[step])
+        robot.push_trunk(*pushes[step])
 
 
 def shift_action(acted: PolicyStep, robot: Robot, shift: Floats) -> PolicyStep:

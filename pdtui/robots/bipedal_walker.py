@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import Box2D
@@ -35,11 +37,16 @@ class FlatBipedalWalker(stock.BipedalWalker):
     Args:
         torque: Torque of the strongest motor command, N m; Gymnasium's is 80. The bodies are made lighter
             instead of the motors stronger, which gives the same motion.
+        friction: Factor on the friction of every contact.
+        mass: Factor on all masses and inertias.
     """
 
-    def __init__(self, torque: float) -> None:
+    def __init__(self, torque: float, friction: float = 1.0, mass: float = 1.0) -> None:
         super().__init__()
         self.strength = torque / float(stock.MOTORS_TORQUE)
+        # Box2D takes the geometric mean of two frictions, and one of them is always that of the ground.
+        self.fd_edge.friction *= friction**2
+        self._mass = mass
         self.hull: Any
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
@@ -49,7 +56,7 @@ class FlatBipedalWalker(stock.BipedalWalker):
         observation, info = super().reset(seed=seed)
         for body in (self.hull, *self.legs):
             for fixture in body.fixtures:
-                fixture.density /= self.strength
+                fixture.density *= self._mass / self.strength
             body.ResetMassData()
         if options is not None and options.get("start") == "split":
             observation = self._split()
@@ -125,7 +132,7 @@ class BipedalWalker(GymnasiumRobot):
     starts = ("split",)
 
     def __init__(self, torque: float = 300.0) -> None:
-        self._torque = torque
+        self._torque, self._scales = torque, (1.0, 1.0)
         super().__init__(self.name, self.title)
         self.links = _links()
         self.attributes = (
@@ -142,7 +149,30 @@ class BipedalWalker(GymnasiumRobot):
         )
 
     def make_world(self) -> gymnasium.Env[Any, Any]:
-        return FlatBipedalWalker(self._torque)
+        return FlatBipedalWalker(self._torque, *self._scales)
+
+    @property
+    def offers_pushes(self) -> bool:
+        return True
+
+    def push_trunk(self, vx: float, vy: float) -> None:
+        self._actions.append_push(vx, vy)  # its world is a plane, so vy has no effect
+        for body in (self.world.hull, *self.world.legs):
+            x, z = body.linearVelocity
+            body.linearVelocity = (x + vx, z)
+
+    @property
+    def offers_scaled_physics(self) -> bool:
+        return True
+
+    @contextmanager
+    def scaled_physics(self, friction: float, mass: float) -> Iterator[None]:
+        before = self._scales
+        self._scales = (friction, mass)  # a reset makes the world anew
+        try:
+            yield
+        finally:
+            self._scales = before
 
     def read_attributes(self) -> Floats:
         world = self.world

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -142,6 +143,42 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         """
         del values
         return False
+
+    @property
+    def offers_pushes(self) -> bool:
+        """Whether the robot can be pushed."""
+        return False
+
+    def push_trunk(self, vx: float, vy: float) -> None:
+        """Change the velocity of the trunk in the world, m/s, and with it that of all that hangs on it.
+
+        Joints keep their speeds, and a robot that moves in a plane takes its part. The policy has not yet
+        observed the push when it acts next, as with one that comes from outside.
+
+        Raises:
+            RobotError: The robot cannot be pushed.
+        """
+        del vx, vy
+        raise RobotError(f"{self.name}: expected a robot whose trunk can be pushed, which this one's cannot")
+
+    @property
+    def offers_scaled_physics(self) -> bool:
+        """Whether the robot's friction and masses can be scaled."""
+        return False
+
+    def scaled_physics(self, friction: float, mass: float) -> AbstractContextManager[None]:
+        """Multiply the friction of every contact, and all masses and inertias, while the block runs.
+
+        It counts for episodes that begin within the block. The first reset after the block has the robot's
+        own world again, to the last bit.
+
+        Raises:
+            RobotError: The robot's friction and masses cannot be scaled.
+        """
+        del friction, mass
+        raise RobotError(
+            f"{self.name}: expected a robot whose friction and masses can be scaled, which this one's cannot"
+        )
 
     def check_start(self, start: str) -> str:
         """Return the name of a start state, empty for the usual one.

@@ -69,8 +69,10 @@ def test_the_command_writes_a_behavior_and_keeps_what_the_map_says(tmp_path: Pat
     text = path.read_text()
     assert "# mine" in text
     assert "# the end" in text
-    evaluated = CliRunner().invoke(main, ["evaluate", str(path), "--seeds", "100-101", "--json"])
+    evaluated = CliRunner().invoke(main, ["evaluate", str(path), "--seeds", "100", "--quick", "--json"])
     assert evaluated.exit_code == 0, evaluated.output
-    (task,) = json.loads(evaluated.output)["tasks"]
+    task, *disturbed = json.loads(evaluated.output)["tasks"]
     assert (task["behavior"], task["task"]) == ("jump", "jump")
     assert task["figures"].keys() == task["figures_by_itself"].keys()
+    assert (task["condition"], len(task["substitutes"])) == ("undisturbed", 3)
+    assert {row["condition"] for row in disturbed} >= {"pushed", "friction −20 %", "mass +20 %"}

@@ -16,7 +16,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.core.robot_links_and_state import RobotState
 from pdtui.robots.environments import gymnasium_spaces
-from pdtui.robots.environments.action_log import ActionLog
+from pdtui.robots.environments.action_log import ActionLog, repeat_log
 from pdtui.robots.robot import ResetResult, Robot, StepResult
 from pdtui.robots.simulators import python_state
 
@@ -154,7 +154,9 @@ class GymnasiumRobot(Robot):
         start = self.starts.index(self._start) + 1 if self._start else 0
         mark = np.array([digest, self._seed, start], np.int64).view(np.float64)
         if self._repeats:
-            return RobotState(self.name, self._actions.so_far(), (mark,), self.np_random.bit_generator.state)
+            taken, pushes = self._actions.so_far(), self._actions.pushes_so_far()
+            logged = (mark, pushes) if len(pushes) else (mark,)
+            return RobotState(self.name, taken, logged, self.np_random.bit_generator.state)
         info, seen = gymnasium_spaces.numeric_entries(self.info), self._observation.copy()
         mine = {"reward": self.reward, "info": info, "seen": seen}
         memory = {"environment": python_state.copy_python_state(self.env), "robot": mine}
@@ -168,8 +170,7 @@ class GymnasiumRobot(Robot):
         self._start = self.starts[start - 1] if start else ""
         if snapshot.memory is None:
             self.reset(seed=self._seed, options={"start": self._start} if self._start else None)
-            for action in snapshot.state.astype(np.float32):
-                self.step(action)
+            repeat_log(self, snapshot.state.astype(np.float32), *snapshot.extras[1:])
         else:
             self._set_simulator_state(snapshot.state, snapshot.extras[1:])
             python_state.restore_python_state(self.env, snapshot.memory["environment"])

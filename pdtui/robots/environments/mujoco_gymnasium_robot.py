@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import gymnasium
@@ -13,6 +15,7 @@ from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
 from pdtui.robots.robot import ResetResult
 from pdtui.robots.simulators import mujoco_robot
 from pdtui.robots.simulators.mujoco_attributes import find_model_attributes
+from pdtui.robots.simulators.mujoco_disturbances import find_push_directions, push_root, scale_model
 
 
 def is_mujoco(env: gymnasium.Env[Any, Any]) -> bool:
@@ -29,6 +32,8 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
     quantities that MuJoCo derived in the last one (observations and rewards read them one physics step old),
     and the Python state. Restoring computes the contacts anew.
     """
+
+    _scales: tuple[float, float] | None = None  # on friction and masses
 
     def __init__(self, name: str, title: str = "", environment: str = "") -> None:
         super().__init__(name, title, environment)
@@ -47,7 +52,36 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
 
     def make_world(self) -> gymnasium.Env[Any, Any]:
         with mujoco_robot.suppress_warnings():  # they are advice to the model's author
-            return super().make_world()
+            env = super().make_world()
+        if self._scales is not None:
+            world: Any = env.unwrapped
+            world.model = scale_model(world.model, *self._scales)
+        return env
+
+    @property
+    def offers_pushes(self) -> bool:
+        return bool(find_push_directions(self.world.model))
+
+    def push_trunk(self, vx: float, vy: float) -> None:
+        if not self.offers_pushes:
+            super().push_trunk(vx, vy)
+        self._actions.append_push(vx, vy)
+        push_root(self.world.model, self.world.data, vx, vy)
+
+    @property
+    def offers_scaled_physics(self) -> bool:
+        return True
+
+    @contextmanager
+    def scaled_physics(self, friction: float, mass: float) -> Iterator[None]:
+        world = self.world
+        own, before = world.model, self._scales
+        self._scales = (friction, mass)  # for environments that a reset makes anew
+        world.model = scale_model(own, friction, mass)
+        try:
+            yield
+        finally:
+            world.model, self._scales = own, before
 
     @property
     def control_dt(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import sys
 import tempfile
@@ -78,6 +79,8 @@ class BulletRobot(Robot):
             ) from error
         self.robot_id = -1
         self._world: tuple[int, str] | None = None
+        # Factors on friction and masses: of the next world that is built, and of the present one.
+        self._scales = self._built_scales = (1.0, 1.0)
 
     @abstractmethod
     def build_world(self, seed: int, start: str) -> int:
@@ -93,7 +96,30 @@ class BulletRobot(Robot):
         # Otherwise the solver meets contacts in the order in which they arose, which no snapshot holds.
         self.bullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
         self.robot_id = self.build_world(seed, start)
-        self._world = (seed, start)
+        if self._scales != (1.0, 1.0):
+            scale_bodies(self.bullet, *self._scales)
+        self._world, self._built_scales = (seed, start), self._scales
+
+    @property
+    def offers_pushes(self) -> bool:
+        return True
+
+    def push_trunk(self, vx: float, vy: float) -> None:
+        x, y, z = self.bullet.getBaseVelocity(self.robot_id)[0]
+        self.bullet.resetBaseVelocity(self.robot_id, linearVelocity=[x + vx, y + vy, z])
+
+    @property
+    def offers_scaled_physics(self) -> bool:
+        return True
+
+    @contextmanager
+    def scaled_physics(self, friction: float, mass: float) -> Iterator[None]:
+        before = self._scales
+        self._scales = (friction, mass)
+        try:
+            yield
+        finally:
+            self._scales = before
 
     def snapshot(self) -> RobotState:
         if self._world is None:
@@ -113,7 +139,7 @@ class BulletRobot(Robot):
         length, seed, start = (int(value) for value in snapshot.extras[0])
         if not 0 <= length <= snapshot.state.nbytes < length + 8:
             raise RobotError(f"{self.name}: expected a state of {length} bytes, got {snapshot.state.nbytes}")
-        if self._world != (seed, self.starts[start]):
+        if (self._world, self._built_scales) != ((seed, self.starts[start]), self._scales):
             self.rebuild_world(seed, self.starts[start])
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "world.bullet"
@@ -132,6 +158,24 @@ class BulletRobot(Robot):
         if self.bullet is not None:
             self.bullet.disconnect()
             self.bullet = None
+
+
+def scale_bodies(bullet: Any, friction: float, mass: float) -> None:
+    """Multiply the friction of every contact, and all masses and inertias, of what is in the world.
+
+    Bullet multiplies the frictions of two surfaces, so each gets the root of the factor. Rolling and spinning
+    friction are scaled, too.
+    """
+    root = math.sqrt(friction)
+    for body in map(bullet.getBodyUniqueId, range(bullet.getNumBodies())):
+        for link in range(-1, bullet.getNumJoints(body)):
+            now = bullet.getDynamicsInfo(body, link)
+            changed = {"lateralFriction": now[1], "rollingFriction": now[6], "spinningFriction": now[7]}
+            changed = {name: root * value for name, value in changed.items()}
+            if now[0] > 0.0 and mass != 1.0:  # what stands still has no mass
+                inertia = [mass * value for value in now[2]]
+                bullet.changeDynamics(body, link, mass=mass * now[0], localInertiaDiagonal=inertia)
+            bullet.changeDynamics(body, link, **changed)
 
 
 def add_ground_plane(bullet: Any, friction: dict[str, float], level: float = 0.0) -> None:

@@ -15,6 +15,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.core.robot_links_and_state import Link, RobotState
 from pdtui.robots.robot import Robot
+from pdtui.robots.simulators.mujoco_disturbances import find_push_directions, push_root, scale_model
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _SHAPES = {
@@ -166,6 +167,28 @@ class MujocoRobot(Robot):
     def digest(self) -> int:
         mujoco.mj_getState(self.model, self.data, self._state_buffer, _STATE)
         return digest_simulator_state(self._state_buffer)
+
+    @property
+    def offers_pushes(self) -> bool:
+        return bool(find_push_directions(self.model))
+
+    def push_trunk(self, vx: float, vy: float) -> None:
+        if not self.offers_pushes:
+            super().push_trunk(vx, vy)
+        push_root(self.model, self.data, vx, vy)
+
+    @property
+    def offers_scaled_physics(self) -> bool:
+        return True
+
+    @contextmanager
+    def scaled_physics(self, friction: float, mass: float) -> Iterator[None]:
+        own = self.model
+        self.model = scale_model(own, friction, mass)
+        try:
+            yield
+        finally:
+            self.model = own
 
     @cached_property
     def _state_buffer(self) -> Floats:

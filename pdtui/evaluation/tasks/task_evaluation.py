@@ -1,0 +1,168 @@
+"""The success of behaviors in their tasks, in each condition, and of what stands in for their units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pdtui.evaluation.evaluation_plan import EvaluationPlan
+from pdtui.evaluation.paired_statistics import holm_correction, share_interval, sign_flip_p_value
+from pdtui.evaluation.run_conditions import UNDISTURBED
+from pdtui.evaluation.tasks.task_runs import TaskRun, TaskRunResult
+from pdtui.robots.task import average_figures
+from pdtui.stimulation.stimulation_map import Behavior
+
+TaskResults = Mapping[TaskRun, TaskRunResult]
+
+
+@dataclass(frozen=True)
+class TaskSubstituteFigures:
+    """How a substitute for the behavior's units did in the task, on seeds on which the behavior was run, too.
+
+    Attributes:
+        kind: ``random units``, ``random directions`` or ``actions``.
+        draws: Number of draws; 1 for a push on the actions.
+        seeds: Number of seeds of each draw.
+        as_good: Draws that succeed on at least as many of these seeds as the behavior.
+        low, high: 95 % interval of the share `as_good` of `draws` (Clopper and Pearson).
+        done: Runs with success, of `draws` × `seeds`.
+        own_done: Number of these seeds on which the behavior succeeds.
+        falls: Runs in which the robot fell, of `draws` × `seeds`.
+    """
+
+    kind: str
+    draws: int
+    seeds: int
+    as_good: int
+    low: float
+    high: float
+    done: int
+    own_done: int
+    falls: int
+
+
+@dataclass(frozen=True)
+class TaskEvaluation:
+    """The success of one behavior over the seeds of one condition.
+
+    Attributes:
+        behavior, task: Their names.
+        condition: Name of the condition.
+        wanted: What counts as success.
+        runs: Number of seeds.
+        done: Number of seeds with success with the behavior.
+        low, high: 95 % interval of that share (Clopper and Pearson).
+        by_itself: Number of seeds with success without it.
+        p_value: That of a paired sign-flip test of the successes, which is McNemar's.
+        corrected: The same, corrected over the undisturbed or over the disturbed rows.
+        holds: Whether it succeeds more often than by itself, and `corrected` is below the level.
+        still_done: Number of seeds on which it also succeeds at the end of a long hold; None for a behavior
+            with a period, and for a disturbed condition.
+        falls: Number of seeds on which the robot fell with the behavior, in the task or in the long hold.
+        falls_by_itself: Number of seeds on which it fell without it.
+        figures: The task's measures with the behavior, means over seeds.
+        figures_by_itself: The same without it.
+        substitutes: How random units, random directions and a push on the actions did; empty for a disturbed
+            condition, and for a behavior that overwrites no units.
+    """
+
+    behavior: str
+    task: str
+    condition: str
+    wanted: str
+    runs: int
+    done: int
+    low: float
+    high: float
+    by_itself: int
+    p_value: float
+    corrected: float
+    holds: bool
+    still_done: int | None
+    falls: int
+    falls_by_itself: int
+    figures: dict[str, float]
+    figures_by_itself: dict[str, float]
+    substitutes: tuple[TaskSubstituteFigures, ...] = ()
+
+
+def summarise_tasks(plan: EvaluationPlan, results: TaskResults) -> tuple[TaskEvaluation, ...]:
+    """Summarise the runs of every task in each condition, the undisturbed rows first.
+
+    P-values are corrected over the undisturbed rows, and over the disturbed ones.
+    """
+    rows: list[TaskEvaluation] = []
+    disturbed = [name for name in plan.conditions if name != UNDISTURBED.name]
+    for table in ([UNDISTURBED.name], disturbed):
+        found = [_summarise(plan, behavior, name, results) for name in table for behavior in plan.tasked]
+        corrected = holm_correction([row.p_value for row in found])
+        rows += [
+            replace(row, corrected=p, holds=p < plan.settings.level and row.done > row.by_itself)
+            for row, p in zip(found, corrected, strict=True)
+        ]
+    return tuple(rows)
+
+
+def _summarise(
+    plan: EvaluationPlan, behavior: Behavior, condition: str, results: TaskResults
+) -> TaskEvaluation:
+    own = {
+        run: one
+        for run, one in results.items()
+        if (run.behavior, run.condition) == (behavior.name, condition)
+    }
+    task = plan.loop.robot.find_task(behavior.task)
+    pressed = [one for run, one in own.items() if run.pressed and run.kind == "units"]
+    untouched = [one for run, one in own.items() if not run.pressed]
+    done = [one.verdict.success for one in pressed]
+    by_itself = [one.verdict.success for one in untouched]
+    p_value = sign_flip_p_value(np.subtract(done, by_itself, dtype=np.float64))
+    low, high = share_interval(sum(done), len(done))
+    return TaskEvaluation(
+        behavior=behavior.name,
+        task=task.name,
+        condition=condition,
+        wanted=task.wanted,
+        runs=len(done),
+        done=sum(done),
+        low=low,
+        high=high,
+        by_itself=sum(by_itself),
+        p_value=p_value,
+        corrected=p_value,
+        holds=False,
+        still_done=_count_still_done(pressed),
+        falls=sum(one.fell for one in pressed),
+        falls_by_itself=sum(one.fell for one in untouched),
+        figures=average_figures(one.verdict for one in pressed),
+        figures_by_itself=average_figures(one.verdict for one in untouched),
+        substitutes=_summarise_substitutes(done, own),
+    )
+
+
+def _summarise_substitutes(done: Sequence[bool], own: TaskResults) -> tuple[TaskSubstituteFigures, ...]:
+    kinds: dict[str, dict[int, list[TaskRunResult]]] = {}
+    for run, one in own.items():
+        if run.kind != "units":
+            kinds.setdefault(run.kind, {}).setdefault(run.draw, []).append(one)
+    figures = []
+    for kind, draws in kinds.items():
+        seeds = len(draws[0])
+        successes = [sum(one.verdict.success for one in drawn) for drawn in draws.values()]
+        own_done = sum(done[:seeds])
+        as_good = sum(count >= own_done for count in successes)
+        low, high = share_interval(as_good, len(draws))
+        falls = sum(one.fell for drawn in draws.values() for one in drawn)
+        figures.append(
+            TaskSubstituteFigures(
+                kind, len(draws), seeds, as_good, low, high, sum(successes), own_done, falls
+            )
+        )
+    return tuple(figures)
+
+
+def _count_still_done(pressed: Sequence[TaskRunResult]) -> int | None:
+    held = [one.still for one in pressed if one.still is not None]
+    return sum(one.success for one in held) if held else None

@@ -1,0 +1,106 @@
+"""The tables of tasks: their success, what would do as well, and both in disturbed worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.table import Table
+
+from pdtui.core.text_tables import format_p_value, new_table
+from pdtui.evaluation.protocol_settings import ProtocolSettings
+from pdtui.evaluation.run_conditions import UNDISTURBED
+from pdtui.evaluation.tasks.task_evaluation import TaskEvaluation
+
+
+def task_tables(title: str, rows: Sequence[TaskEvaluation], settings: ProtocolSettings) -> list[Table]:
+    """Return the tables of tasks; those of substitutes and conditions only if there are any."""
+    undisturbed = [row for row in rows if row.condition == UNDISTURBED.name]
+    tables = [_success_table(title, undisturbed)]
+    if any(row.substitutes for row in undisturbed):
+        tables.append(_substitutes_table(undisturbed, settings))
+    if len(undisturbed) < len(rows):
+        tables.append(_conditions_table(rows))
+    return tables
+
+
+def _success_table(title: str, rows: Sequence[TaskEvaluation]) -> Table:
+    left = ["behavior", "success means"]
+    table = new_table(
+        f"{title}: tasks",
+        *left,
+        *(
+            "success [95 %]",
+            "without it",
+            "p",
+            "holds",
+            "after a long hold",
+            "falls",
+            "measured (without it)",
+        ),
+        left=left,
+    )
+    for row in rows:
+        nothing = float("nan")
+        measured = ", ".join(
+            f"{name} {value:.2f} ({row.figures_by_itself.get(name, nothing):.2f})"
+            for name, value in row.figures.items()
+        )
+        table.add_row(
+            row.behavior,
+            row.wanted,
+            *_success(row),
+            "–" if row.still_done is None else f"{row.still_done}/{row.runs}",
+            f"{row.falls}/{row.runs} ({row.falls_by_itself})",
+            measured,
+        )
+    table.caption = (
+        "p: paired sign-flip test (McNemar's), corrected over the rows (Holm). After a long hold: the judge "
+        "sees the last part of it."
+    )
+    return table
+
+
+def _substitutes_table(rows: Sequence[TaskEvaluation], settings: ProtocolSettings) -> Table:
+    kinds = ("random units", "random directions", "actions")
+    table = new_table(
+        "Tasks: would something else do as well?",
+        *("behavior", "random units: as good, success, falls", "random directions", "on the actions"),
+    )
+    for row in rows:
+        cells = {}
+        for one in row.substitutes:
+            runs = one.draws * one.seeds
+            cells[one.kind] = f"{one.as_good}/{one.draws}, {one.done}/{runs}, {one.falls}/{runs}"
+        table.add_row(row.behavior, *(cells.get(kind, "–") for kind in kinds))
+    table.caption = (
+        f"{settings.draws} draws of as many random units of the same layers at the same |v|, and of random "
+        "directions as long as the behavior's own change of its layers; on the actions, its mean change of "
+        f"them. {settings.draw_seeds} seeds each. As good: succeeds on at least as many of these seeds as "
+        "the behavior."
+    )
+    return table
+
+
+def _conditions_table(rows: Sequence[TaskEvaluation]) -> Table:
+    table = new_table(
+        "Tasks, disturbed; p is corrected over the disturbed rows",
+        *("behavior", "condition", "success [95 %]", "without it", "p", "holds", "falls", "falls by itself"),
+        left=["behavior", "condition"],
+    )
+    for name in dict.fromkeys(row.behavior for row in rows):
+        table.add_section()
+        for row in rows:
+            if row.behavior == name:
+                counts = (f"{count}/{row.runs}" for count in (row.falls, row.falls_by_itself))
+                first = name if row.condition == UNDISTURBED.name else ""
+                table.add_row(first, row.condition, *_success(row), *counts)
+    return table
+
+
+def _success(row: TaskEvaluation) -> list[str]:
+    return [
+        f"{row.done}/{row.runs} [{row.low:.0%}, {row.high:.0%}]",
+        f"{row.by_itself}/{row.runs}",
+        format_p_value(row.corrected),
+        "yes" if row.holds else "no",
+    ]
