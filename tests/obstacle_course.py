@@ -27,7 +27,7 @@ class Course(Robot):
 
     name = "course"
     title = "Course"
-    attributes = (Attribute("vx", "m/s"), Attribute("distance", "m"))
+    attributes: tuple[Attribute, ...] = (Attribute("vx", "m/s"), Attribute("distance", "m"))
     links = (Link("ball", 0, "sphere", (0.1,), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),)
     observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float64)
     action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,))

@@ -180,6 +180,7 @@ def _evaluate_behaviors(
 ) -> None:
     from pdtui.evaluation import behavior_evaluation as evaluation
     from pdtui.evaluation.behavior_tables import behavior_tables
+    from pdtui.evaluation.ranked_runs import rank_runs
     from pdtui.pictures.behavior_strips import draw_strips, film_strips
     from pdtui.pictures.matplotlib_page import check_figure_path
     from pdtui.stimulation.map_writer import replace_effects, rewrite_map
@@ -199,9 +200,9 @@ def _evaluate_behaviors(
     print_result(asdict(result), as_json, lambda: behavior_tables(result))
     if drawn is not None:
         with progress_bar("filming", quiet=as_json) as advance:
-            draw_strips(drawn[0], plan, result, film_strips(plan, result, advance))
+            draw_strips(drawn[0], plan, film_strips(plan, rank_runs(plan, result), advance))
     if watch:
-        watch_runs(plan, result)
+        watch_runs(plan, rank_runs(plan, result))
 
 
 def _check_modes(modes: Mapping[str, Any], behaviors_only: Mapping[str, Any]) -> None:

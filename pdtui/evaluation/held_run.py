@@ -147,7 +147,7 @@ def record_held_run(built: ControlLoop, plan: HeldRunPlan, path: Path) -> None:
     Raises:
         SessionError: The file exists, or cannot be written.
     """
-    info = ControlLoop(built.robot, built.policy, built.map, plan.seed).info
+    info = ControlLoop(built.robot, built.policy, built.map, plan.seed, start=plan.start).info
     with SessionRecorder(path, info) as recorder:
         for record in drive_held_run(built, plan):
             recorder.write(record)

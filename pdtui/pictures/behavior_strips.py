@@ -13,11 +13,10 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import PictureError
 from pdtui.core.robot_links_and_state import Link
 from pdtui.core.worker_pool import StepProgress
-from pdtui.evaluation.behavior_evaluation import MapEvaluation
-from pdtui.evaluation.behavior_summary import BehaviorEvaluation
 from pdtui.evaluation.evaluation_plan import EvaluationPlan
-from pdtui.evaluation.held_run import HeldRunFilm, HeldRunPlan, film_held_run
+from pdtui.evaluation.held_run import HeldRunFilm, film_held_run
 from pdtui.evaluation.protocol_settings import RunTimes
+from pdtui.evaluation.ranked_runs import RankedRun
 from pdtui.pictures.matplotlib_page import open_figure_page
 from pdtui.pictures.perspective_camera import PerspectiveCamera
 from pdtui.pictures.plot_colors import BLUE, GREEN, GREY, VERMILLION, color_to_hex
@@ -33,80 +32,54 @@ _POINTS_PER_INCH = 72.0
 
 @dataclass(frozen=True)
 class BehaviorStrip:
-    """The frames of one seed of a behavior.
+    """The frames of one run."""
 
-    Attributes:
-        behavior: Name of the behavior.
-        seed: The seed.
-        rank: ``best``, ``median`` or ``worst``.
-        met: Whether the run meets the behavior's criterion.
-        film: The frames.
-    """
-
-    behavior: str
-    seed: int
-    rank: str
-    met: bool
+    run: RankedRun
     film: HeldRunFilm
 
 
-def rank_seeds(row: BehaviorEvaluation) -> list[int]:
-    """Return the positions of a behavior's seeds, the best first: whether they meet it, then by effect."""
-    return sorted(
-        range(row.runs), key=lambda one: (row.seed_met[one], row.wanted * row.seed_effects[one]), reverse=True
-    )
-
-
-def pick_seeds(row: BehaviorEvaluation) -> dict[str, int]:
-    """Return the positions of the ``best``, the ``median`` and the ``worst`` seed of a behavior."""
-    order = rank_seeds(row)
-    return {"best": order[0], "median": order[len(order) // 2], "worst": order[-1]}
-
-
 def frame_seconds(times: RunTimes) -> list[float]:
-    """Return when frames are taken: at the press, in the first and the last 5 s, and after the release."""
+    """Return when frames are taken.
+
+    Of a long hold: at the press, in the first and the last 5 s, and after the release. Of a short one: at
+    equal distances from the press to the end.
+    """
     held, end = times.held * times.dt, (times.held + min(times.after, times.window) - 1) * times.dt
+    if held < 10.0:
+        return [round(one, 3) for one in np.linspace(0.0, end, 8).tolist()]
     wanted = [0.0, 1.0, 2.5, 5.0, held / 2.0, held - 2.5, held, end]
     return sorted({round(one, 3) for one in wanted if 0.0 <= one <= end})
 
 
 def film_strips(
-    plan: EvaluationPlan, result: MapEvaluation, progress: StepProgress | None = None
+    plan: EvaluationPlan, runs: Sequence[RankedRun], progress: StepProgress | None = None
 ) -> list[BehaviorStrip]:
-    """Run the best, the median and the worst seed of each behavior with an aim once more.
+    """Run every run once more and keep its frames.
 
     Raises:
-        PictureError: The robot has no shapes to draw, or no behavior has an aim.
+        PictureError: The robot has no shapes to draw, or there is no run.
     """
-    robot = plan.loop.robot
-    if not robot.links or not result.behaviors:
-        missing = "no behavior with an aim" if robot.links else "no shapes to draw"
+    robot, strips = plan.loop.robot, []
+    if not robot.links or not runs:
+        missing = "no behavior with an aim or a task" if robot.links else "no shapes to draw"
         raise PictureError(f"{robot.name}: {missing}, so there is nothing to show in a strip")
-    strips, rows = [], result.undisturbed()
-    for row in rows:
-        for rank, place in pick_seeds(row).items():
-            seed = result.seeds[place]
-            times = plan.times(row.behavior, seed)
-            run = HeldRunPlan(row.behavior, seed, times)
-            film = film_held_run(plan.loop, run, frame_seconds(times))
-            strips.append(BehaviorStrip(row.behavior, seed, rank, row.seed_met[place], film))
-            if progress is not None:
-                progress(len(strips), 3 * len(rows))
+    for run in runs:
+        strips.append(BehaviorStrip(run, film_held_run(plan.loop, run.plan, frame_seconds(run.plan.times))))
+        if progress is not None:
+            progress(len(strips), len(runs))
     return strips
 
 
-def draw_strips(
-    path: Path, plan: EvaluationPlan, result: MapEvaluation, strips: Sequence[BehaviorStrip]
-) -> None:
+def draw_strips(path: Path, plan: EvaluationPlan, strips: Sequence[BehaviorStrip]) -> None:
     """Draw one row of frames for each strip, and the way from above.
 
     Raises:
         PictureError: The file cannot be written.
     """
     links = plan.loop.robot.links
-    criteria = {row.behavior: row.criterion for row in result.undisturbed()}
     columns = max(len(strip.film.seconds) for strip in strips) + 1
-    title = f"{result.robot}, {Path(result.policy).stem}: best, median and worst of {len(result.seeds)} seeds"
+    name = plan.loop.robot.name
+    title = f"{name}, {plan.loop.policy.name}: best, median and worst of {len(plan.seeds)} seeds"
     with open_figure_page(path, _HEAD + _ROW_HEIGHT * len(strips), title) as figure:
         axes = figure.subplots(len(strips), columns, squeeze=False)
         extent = _find_extent(links, strips)
@@ -117,10 +90,10 @@ def draw_strips(
                 _draw_robot(axis, links, poses, extent)
                 axis.set_title(f"{seconds:.1f} s", fontsize=5.5, pad=1, loc="center")
             _draw_way(row[0], strip)
-            word = "met" if strip.met else "not met"
-            head = f"{strip.behavior} ({criteria[strip.behavior]})\n" if strip.rank == "best" else ""
+            run, word = strip.run, "met" if strip.run.met else "not met"
+            head = f"{run.behavior} ({run.criterion})\n" if run.rank == "best" else ""
             row[0].set_title(
-                f"{head}{strip.rank}, seed {strip.seed}: {word}{', fell' if strip.film.fell else ''}",
+                f"{head}{run.rank}, seed {run.plan.seed}: {word}{', fell' if strip.film.fell else ''}",
                 fontsize=5.5,
                 pad=1,
                 loc="left",

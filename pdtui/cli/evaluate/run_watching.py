@@ -12,29 +12,26 @@ from pdtui.cli.drive_command import show_drive
 from pdtui.core.printable_text import make_printable
 
 if TYPE_CHECKING:
-    from pdtui.evaluation.behavior_evaluation import MapEvaluation
+    from collections.abc import Sequence
+
     from pdtui.evaluation.evaluation_plan import EvaluationPlan
+    from pdtui.evaluation.ranked_runs import RankedRun
 
 
-def watch_runs(plan: EvaluationPlan, result: MapEvaluation) -> None:
-    """Run three seeds of each behavior again, and show them one after the other, as a replay is shown."""
+def watch_runs(plan: EvaluationPlan, runs: Sequence[RankedRun]) -> None:
+    """Run every run again, and show them one after the other, as a replay is shown."""
     from pdtui.driving.session_replay import config_from_session
-    from pdtui.evaluation.held_run import HeldRunPlan, record_held_run
-    from pdtui.pictures.behavior_strips import pick_seeds
+    from pdtui.evaluation.held_run import record_held_run
     from pdtui.sessions.session_header import read_session_header
 
     with TemporaryDirectory() as folder:
-        for row in result.undisturbed():
-            for rank, place in pick_seeds(row).items():
-                seed, word = result.seeds[place], "met" if row.seed_met[place] else "not met"
-                times = plan.times(row.behavior, seed)
-                told = f"{row.behavior}, {rank} seed {seed}: {row.criterion}: {word}"
-                pressed = f"pressed before step {times.press}, released {times.held} steps later"
-                click.echo(make_printable(f"{told}; {pressed}"))
-                if not click.confirm("Watch it?", default=True):
-                    continue
-                path = Path(folder) / f"{rank}-{place}-{len(row.behavior)}.rrd"
-                record_held_run(plan.loop, HeldRunPlan(row.behavior, seed, times), path)
-                header = read_session_header(path)
-                show_drive(config_from_session(header, str(path)), watching=True)
+        for number, run in enumerate(runs):
+            times, word = run.plan.times, "met" if run.met else "not met"
+            told = f"{run.behavior}, {run.rank} seed {run.plan.seed}: {run.criterion}: {word}"
+            pressed = f"pressed before step {times.press}, released {times.held} steps later"
+            click.echo(make_printable(f"{told}; {pressed}"))
+            if click.confirm("Watch it?", default=True):
+                path = Path(folder) / f"{number}.rrd"
+                record_held_run(plan.loop, run.plan, path)
+                show_drive(config_from_session(read_session_header(path), str(path)), watching=True)
                 path.unlink()

@@ -62,6 +62,8 @@ class TaskEvaluation:
             with a period, and for a disturbed condition.
         falls: Number of seeds on which the robot fell with the behavior, in the task or in the long hold.
         falls_by_itself: Number of seeds on which it fell without it.
+        seed_done: Whether each seed succeeds with the behavior, in the order of the seeds.
+        seed_scores: How near each seed comes to that, by the task's judge.
         figures: The task's measures with the behavior, means over seeds.
         figures_by_itself: The same without it.
         substitutes: How random units, random directions and a push on the actions did; empty for a disturbed
@@ -83,6 +85,8 @@ class TaskEvaluation:
     still_done: int | None
     falls: int
     falls_by_itself: int
+    seed_done: tuple[bool, ...]
+    seed_scores: tuple[float, ...]
     figures: dict[str, float]
     figures_by_itself: dict[str, float]
     substitutes: tuple[TaskSubstituteFigures, ...] = ()
@@ -136,6 +140,8 @@ def _summarise(
         still_done=_count_still_done(pressed),
         falls=sum(one.fell for one in pressed),
         falls_by_itself=sum(one.fell for one in untouched),
+        seed_done=tuple(done),
+        seed_scores=tuple(one.verdict.score for one in pressed),
         figures=average_figures(one.verdict for one in pressed),
         figures_by_itself=average_figures(one.verdict for one in untouched),
         substitutes=_summarise_substitutes(done, own),
