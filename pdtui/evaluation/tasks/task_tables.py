@@ -34,7 +34,7 @@ def _success_table(title: str, rows: Sequence[TaskEvaluation]) -> Table:
             "p",
             "holds",
             "after a long hold",
-            "falls",
+            "falls (without)",
             "measured (without it)",
         ),
         left=left,
@@ -48,9 +48,10 @@ def _success_table(title: str, rows: Sequence[TaskEvaluation]) -> Table:
         table.add_row(
             row.behavior,
             row.wanted,
-            *_success(row),
+            f"{row.done}/{row.runs} [{row.low:.0%}, {row.high:.0%}]",
+            *_comparison(row),
             "–" if row.still_done is None else f"{row.still_done}/{row.runs}",
-            f"{row.falls}/{row.runs} ({row.falls_by_itself})",
+            _falls(row),
             measured,
         )
     table.caption = (
@@ -84,23 +85,23 @@ def _substitutes_table(rows: Sequence[TaskEvaluation], settings: ProtocolSetting
 def _conditions_table(rows: Sequence[TaskEvaluation]) -> Table:
     table = new_table(
         "Tasks, disturbed; p is corrected over the disturbed rows",
-        *("behavior", "condition", "success [95 %]", "without it", "p", "holds", "falls", "falls by itself"),
+        *("behavior", "condition", "success", "without", "p", "holds", "falls (without)"),
         left=["behavior", "condition"],
     )
     for name in dict.fromkeys(row.behavior for row in rows):
         table.add_section()
         for row in rows:
             if row.behavior == name:
-                counts = (f"{count}/{row.runs}" for count in (row.falls, row.falls_by_itself))
                 first = name if row.condition == UNDISTURBED.name else ""
-                table.add_row(first, row.condition, *_success(row), *counts)
+                done = f"{row.done}/{row.runs}"
+                table.add_row(first, row.condition, done, *_comparison(row), _falls(row))
     return table
 
 
-def _success(row: TaskEvaluation) -> list[str]:
-    return [
-        f"{row.done}/{row.runs} [{row.low:.0%}, {row.high:.0%}]",
-        f"{row.by_itself}/{row.runs}",
-        format_p_value(row.corrected),
-        "yes" if row.holds else "no",
-    ]
+def _comparison(row: TaskEvaluation) -> tuple[str, str, str]:
+    without, holds = f"{row.by_itself}/{row.runs}", "yes" if row.holds else "no"
+    return without, format_p_value(row.corrected), holds
+
+
+def _falls(row: TaskEvaluation) -> str:
+    return f"{row.falls}/{row.runs} ({row.falls_by_itself})"
