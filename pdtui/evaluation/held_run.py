@@ -40,6 +40,7 @@ class HeldRunPlan:
         substitute: What acts in the place of the behavior's units; None for the units.
         observation_spread: Standard deviation of every observation in an undisturbed walk, for noise.
         start: Name of the state in which the run starts; empty for the robot's usual one.
+        earlier: Behaviors that are pressed before that, and before which control step.
     """
 
     behavior: str
@@ -49,6 +50,7 @@ class HeldRunPlan:
     substitute: SubstitutePush | None = None
     observation_spread: Floats = field(default_factory=lambda: np.zeros(()))
     start: str = ""
+    earlier: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,9 @@ def begin_held_run(
         push_robot(robot, pushes, step)
         if plan.behavior and step == times.press:
             return [DriveEvent(step, "behavior", plan.behavior)]
-        return [DriveEvent(step, "default")] if step == times.press + times.held else []
+        if step == times.press + times.held:
+            return [DriveEvent(step, "default")]
+        return [DriveEvent(step, "behavior", name) for at, name in plan.earlier if at == step]
 
     with disturbed_world(robot, plan.condition):
         loop = ControlLoop(robot, built.policy, built.map, plan.seed, start=plan.start)

@@ -42,7 +42,7 @@ def rank_runs(plan: EvaluationPlan, result: MapEvaluation) -> list[RankedRun]:
             seed = plan.seeds[place]
             run = HeldRunPlan(row.behavior, seed, plan.times(row.behavior, seed))
             ranked.append(RankedRun(row.behavior, row.criterion, rank, row.seed_met[place], run))
-    for task in (row for row in result.tasks if row.condition == UNDISTURBED.name):
+    for task in (row for row in result.tasks if row.condition == UNDISTURBED.name and not row.after):
         for rank, place in _pick_seeds(task.seed_done, task.seed_scores).items():
             run = _plan_task_run(plan, task, plan.seeds[place])
             ranked.append(RankedRun(task.behavior, task.wanted, rank, task.seed_done[place], run))

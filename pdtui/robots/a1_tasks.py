@@ -18,8 +18,11 @@ _USUAL_STEPS = 50
 # Slowest yaw rate that counts as a turn (rad/s), the multiple of it up to which faster scores more, so that
 # somebody can steer by it, and the slowest speed of a turn (m/s).
 _TURN_RATE, _MAX_TURN_SCORE, _TURN_SPEED = 0.15, 6.0, 0.5
-# Fastest mean speed that counts as standing, m/s.
-_STAND_SPEED = 0.3
+# Fastest mean speed that counts as standing (m/s), and most touchdowns of all feet, a second.
+_STAND_SPEED, _STAND_TOUCHDOWNS = 0.1, 2.0
+# Speed from which on a search counts nothing more as slowing down, m/s.
+_SLOW_SPEED = 0.3
+_CONTACTS = tuple(f"{leg} contact" for leg in ("front right", "front left", "rear right", "rear left"))
 # Share of the usual speed that counts as faster.
 _FASTER = 1.1
 
@@ -37,14 +40,17 @@ def judge_turn(trace: TaskRunTrace, sign: float) -> TaskVerdict:
 
 
 def judge_stop(trace: TaskRunTrace) -> TaskVerdict:
-    """Judge whether it is slower than 0.3 m/s from 1.2 s on, on average, and on its feet for 2.4 s."""
+    """Judge whether it stands from 1.2 s on: under 0.1 m/s on average, feet still, and up for 2.4 s."""
     usual = trace.mean_before("speed", _USUAL_STEPS)
     left, up = trace.mean("speed", _LATE, usual), trace.stays_up(_STEPS)
-    gone = float(np.clip((usual - left) / max(usual - _STAND_SPEED, 1e-6), 0.0, 1.2))
+    gone = float(np.clip((usual - left) / max(usual - _SLOW_SPEED, 1e-6), 0.0, 1.2))
     score = gone if up else 0.5 * gone * len(trace) / _STEPS
+    late = np.stack([trace[name][_LATE] for name in _CONTACTS])
+    touchdowns = float((np.diff(late, axis=1) > 0.0).sum()) / (_STEP * max(1, late.shape[1]))
     steepest = float(trace["pitch"].max()) if len(trace) else 0.0
-    figures = {"speed (m/s)": left, "steepest pitch (rad)": steepest}
-    return TaskVerdict(up and left < _STAND_SPEED, score, figures)
+    figures = {"speed (m/s)": left, "touchdowns (1/s)": touchdowns, "steepest pitch (rad)": steepest}
+    stands = up and left < _STAND_SPEED and touchdowns <= _STAND_TOUCHDOWNS
+    return TaskVerdict(stands, score, figures)
 
 
 def judge_speed_up(trace: TaskRunTrace) -> TaskVerdict:
@@ -74,6 +80,6 @@ A1_TASKS: tuple[Task, ...] = (
         "0.15 rad/s to the right, on its feet",
         partial(judge_turn, sign=-1.0),
     ),
-    _task("stop", "s", "stops and stands", "under 0.3 m/s after 1.2 s, on its feet", judge_stop),
+    _task("stop", "s", "stops and stands", "under 0.1 m/s after 1.2 s, feet still, up", judge_stop),
     _task("forward", "w", "walks on faster", "a tenth faster than by itself", judge_speed_up),
 )

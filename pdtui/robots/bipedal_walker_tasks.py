@@ -8,12 +8,15 @@ import numpy as np
 
 from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 
+_STEP = 0.02  # control step, s
 # Control steps of each task.
 _JUMP_STEPS, _FLIP_STEPS, _STAND_STEPS = 200, 200, 300
 # Rise of the hull that counts as a jump (m), and turn that counts as a flip (degrees).
 _JUMP_HEIGHT, _FLIP_ANGLE = 0.5, 300.0
 # Share of the usual speed that counts as walking again, and the speed (m/s) of a robot that did not walk yet.
 _WALK_SHARE, _WALK_SPEED = 0.5, 5.0
+# Control steps in a row with both feet off the ground that count as being in the air.
+_AIRBORNE_STEPS = 10
 # Control steps over which the speed at the end, and the usual height and speed, are averaged.
 _LAST_STEPS, _USUAL_STEPS = 60, 50
 
@@ -24,24 +27,43 @@ def _walks(trace: TaskRunTrace, usual: float, steps: int) -> tuple[bool, float]:
     return trace.stays_up(steps) and speed >= _WALK_SHARE * usual, speed
 
 
+def _count_airborne(trace: TaskRunTrace) -> int:
+    """Return the longest stretch of control steps in which no foot touches the ground."""
+    in_air = (trace["foot 1 contact"] == 0.0) & (trace["foot 2 contact"] == 0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], in_air, [False])).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
 def judge_jump(trace: TaskRunTrace) -> TaskVerdict:
-    """Judge whether the hull rises by half a metre, and the robot lands and walks on."""
+    """Judge whether both feet leave the ground, the hull rises by half a metre, and the robot walks on."""
     rise = float(trace["height"].max()) - trace.mean_before("height", _USUAL_STEPS)
+    airborne = _count_airborne(trace)
     walks, speed = _walks(trace, trace.mean_before("vx", _USUAL_STEPS), _JUMP_STEPS)
     score = 0.5 * min(1.2, rise / _JUMP_HEIGHT) + (0.6 if walks else 0.25 * len(trace) / _JUMP_STEPS)
-    figures = {"rise (m)": rise, "walks on": float(walks), "vx at the end (m/s)": speed}
-    return TaskVerdict(rise >= _JUMP_HEIGHT and walks, score, figures)
+    figures = {
+        "rise (m)": rise,
+        "in the air (s)": airborne * _STEP,
+        "walks on": float(walks),
+        "vx at the end (m/s)": speed,
+    }
+    done = rise >= _JUMP_HEIGHT and airborne >= _AIRBORNE_STEPS and walks
+    return TaskVerdict(done, score, figures)
 
 
 def judge_flip(trace: TaskRunTrace) -> TaskVerdict:
-    """Judge whether it turns forward by 300° or more; whether it lands is a figure of its own."""
-    pitch = trace["pitch"]
+    """Judge whether it turns forward in the air by 300° or more; whether it lands is another figure."""
+    pitch, airborne = trace["pitch"], _count_airborne(trace)
     turned = math.degrees(float(np.max(pitch) - pitch[0]))
     walks, _ = _walks(trace, trace.mean_before("vx", _USUAL_STEPS), _FLIP_STEPS)
     lands = turned >= _FLIP_ANGLE and trace.stays_up(_FLIP_STEPS)
     score = min(1.2, turned / _FLIP_ANGLE) + (1.0 if lands and walks else 0.2 * len(trace) / _FLIP_STEPS)
-    figures = {"turned (degrees)": turned, "lands": float(lands), "walks on": float(lands and walks)}
-    return TaskVerdict(turned >= _FLIP_ANGLE, score, figures)
+    figures = {
+        "turned (degrees)": turned,
+        "in the air (s)": airborne * _STEP,
+        "lands": float(lands),
+        "walks on": float(lands and walks),
+    }
+    return TaskVerdict(turned >= _FLIP_ANGLE and airborne >= _AIRBORNE_STEPS, score, figures)
 
 
 def judge_stand_up(trace: TaskRunTrace) -> TaskVerdict:
@@ -57,7 +79,7 @@ BIPEDAL_WALKER_TASKS = (
         name="jump",
         key="j",
         says="jumps, lands and walks on",
-        wanted="hull 0.5 m over its usual height, then walks on",
+        wanted="both feet up, hull 0.5 m over its usual height, then walks on",
         walk=(60, 120),
         steps=_JUMP_STEPS,
         judge=judge_jump,
@@ -67,7 +89,7 @@ BIPEDAL_WALKER_TASKS = (
         name="front flip",
         key="f",
         says="turns over forward in the air",
-        wanted="turns forward by 300° or more",
+        wanted="turns forward by 300° or more, both feet up",
         walk=(60, 120),
         steps=_FLIP_STEPS,
         judge=judge_flip,
@@ -83,5 +105,6 @@ BIPEDAL_WALKER_TASKS = (
         judge=judge_stand_up,
         start="split",
         period=100,
+        follows="front flip",
     ),
 )

@@ -93,6 +93,8 @@ class Task:
         judge: Gives the verdict on a run.
         start: State in which the robot starts; empty for the usual one.
         period: Longest duration of the behavior, in control steps; None for no limit.
+        follows: Name of the task after which this one is needed; empty if it is done from a walk. An
+            evaluation also judges it there, where the map has a behavior for that task.
     """
 
     name: str
@@ -104,6 +106,7 @@ class Task:
     judge: Callable[[TaskRunTrace], TaskVerdict]
     start: str = ""
     period: int | None = None
+    follows: str = ""
 
 
 def find_task(name: str, tasks: Sequence[Task], owner: str) -> Task:

@@ -50,8 +50,9 @@ class TaskEvaluation:
     Attributes:
         behavior, task: Their names.
         condition: Name of the condition.
+        after: Name of the behavior that is done before; empty for the task's own start.
         wanted: What counts as success.
-        runs: Number of seeds.
+        runs: Number of seeds; after another behavior, those on which it succeeds and the robot stays up.
         done: Number of seeds with success with the behavior.
         low, high: 95 % interval of that share (Clopper and Pearson).
         by_itself: Number of seeds with success without it.
@@ -73,6 +74,7 @@ class TaskEvaluation:
     behavior: str
     task: str
     condition: str
+    after: str
     wanted: str
     runs: int
     done: int
@@ -101,6 +103,12 @@ def summarise_tasks(plan: EvaluationPlan, results: TaskResults) -> tuple[TaskEva
     disturbed = [name for name in plan.conditions if name != UNDISTURBED.name]
     for table in ([UNDISTURBED.name], disturbed):
         found = [_summarise(plan, behavior, name, results) for name in table for behavior in plan.tasked]
+        if UNDISTURBED.name in table:
+            follows = dict.fromkeys((run.behavior, run.after) for run in results if run.after)
+            behaviors = plan.loop.map.behaviors
+            found += [
+                _summarise(plan, behaviors[name], UNDISTURBED.name, results, after) for name, after in follows
+            ]
         corrected = holm_correction([row.p_value for row in found])
         rows += [
             replace(row, corrected=p, holds=p < plan.settings.level and row.done > row.by_itself)
@@ -110,12 +118,12 @@ def summarise_tasks(plan: EvaluationPlan, results: TaskResults) -> tuple[TaskEva
 
 
 def _summarise(
-    plan: EvaluationPlan, behavior: Behavior, condition: str, results: TaskResults
+    plan: EvaluationPlan, behavior: Behavior, condition: str, results: TaskResults, after: str = ""
 ) -> TaskEvaluation:
     own = {
         run: one
         for run, one in results.items()
-        if (run.behavior, run.condition) == (behavior.name, condition)
+        if (run.behavior, run.condition, run.after) == (behavior.name, condition, after) and one.began
     }
     task = plan.loop.robot.find_task(behavior.task)
     pressed = [one for run, one in own.items() if run.pressed and run.kind == "units"]
@@ -128,6 +136,7 @@ def _summarise(
         behavior=behavior.name,
         task=task.name,
         condition=condition,
+        after=after,
         wanted=task.wanted,
         runs=len(done),
         done=sum(done),

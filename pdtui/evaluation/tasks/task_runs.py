@@ -1,7 +1,9 @@
 """The runs of tasks in an evaluation: through the control loop, as in a drive, and judged.
 
-Each seed is driven with the behavior and without it. A behavior that lasts until it is released is also held
-for as long as one with an aim, and the task's judge sees the last part of that hold, too.
+Each seed is driven with the behavior and without it. What is needed after another task, such as standing up
+after a flip, is also driven there, on the seeds on which the behavior for that task succeeds. A behavior that
+lasts until it is released is also held for as long as one with an aim, and the task's judge sees the last
+part of that hold, too.
 """
 
 from __future__ import annotations
@@ -20,7 +22,6 @@ from pdtui.evaluation.protocol_settings import RunTimes, plan_run_times
 from pdtui.evaluation.run_conditions import UNDISTURBED, find_condition
 from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 from pdtui.search.task_rollout import count_walk_steps
-from pdtui.stimulation.stimulation_map import Behavior
 
 
 class TaskRun(NamedTuple):
@@ -34,6 +35,7 @@ class TaskRun(NamedTuple):
         condition: Name of the condition.
         kind: What is pushed.
         draw: Number of the draw of a random kind.
+        after: Name of the behavior that is done before; empty for a run from the task's own start.
     """
 
     behavior: str
@@ -43,6 +45,7 @@ class TaskRun(NamedTuple):
     condition: str = UNDISTURBED.name
     kind: SubstituteKind = "units"
     draw: int = 0
+    after: str = ""
 
 
 @dataclass(frozen=True)
@@ -55,11 +58,19 @@ class TaskEpisode:
 
 @dataclass(frozen=True)
 class TaskRunResult:
-    """The verdict on one run, that on the end of a long hold, and whether the robot fell."""
+    """The judgement of one run.
+
+    Attributes:
+        verdict: The verdict on the task.
+        fell: Whether the robot fell.
+        still: The verdict on the end of a long hold; None for a run without.
+        began: Whether the run came as far as the press, with what is done before done.
+    """
 
     verdict: TaskVerdict
     fell: bool
     still: TaskVerdict | None = None
+    began: bool = True
 
 
 def list_task_runs(plan: EvaluationPlan) -> list[TaskRun]:
@@ -79,13 +90,29 @@ def list_task_runs(plan: EvaluationPlan) -> list[TaskRun]:
             for draw in range(draws)
             for seed in plan.seeds[: plan.settings.draw_seeds]
         ]
+        runs += [
+            TaskRun(name, seed, pressed, task.steps, after=earlier.name)
+            for earlier in plan.tasked
+            if earlier.task == task.follows
+            for pressed in (True, False)
+            for seed in plan.seeds
+        ]
     return runs
 
 
 def count_task_steps(plan: EvaluationPlan, run: TaskRun) -> int:
     """Return how many control steps a run of a task has; a fall makes it fewer."""
-    task = plan.loop.robot.find_task(plan.loop.map.behaviors[run.behavior].task)
-    return count_walk_steps(task, run.seed) + run.steps
+    return _press_step(plan.loop, run) + run.steps
+
+
+def _press_step(loop: ControlLoop, run: TaskRun) -> int:
+    """Return the control step before which the behavior is pressed."""
+    first = _task_of(loop, run.after or run.behavior)
+    return count_walk_steps(first, run.seed) + (first.steps if run.after else 0)
+
+
+def _task_of(loop: ControlLoop, behavior: str) -> Task:
+    return loop.robot.find_task(loop.map.behaviors[behavior].task)
 
 
 def task_measuring_runs(plan: EvaluationPlan) -> list[HeldRunPlan]:
@@ -119,10 +146,11 @@ def plan_task_episode(
     Returns:
         The episode; None for a substitute whose size was not measured, because the robot fell before.
     """
-    behavior = plan.loop.map.behaviors[run.behavior]
-    task, dt = plan.loop.robot.find_task(behavior.task), plan.loop.robot.control_dt
+    loop, dt = plan.loop, plan.loop.robot.control_dt
+    task, first = _task_of(loop, run.behavior), _task_of(loop, run.after or run.behavior)
     bin_steps = plan_run_times(plan.settings, run.seed, dt).bin
-    times = RunTimes(count_walk_steps(task, run.seed), run.steps, 0, task.steps, bin_steps, dt)
+    times = RunTimes(_press_step(loop, run), run.steps, 0, task.steps, bin_steps, dt)
+    earlier = ((count_walk_steps(first, run.seed), run.after),) if run.after else ()
     substitute = plan.draw_substitute(run.kind, run.behavior, run.draw, measured)
     if run.kind != "units" and substitute is None:
         return None
@@ -133,7 +161,8 @@ def plan_task_episode(
         find_condition(run.condition),
         substitute,
         plan.mean_observation_spread(measured),
-        task.start,
+        first.start,
+        earlier,
     )
     return TaskEpisode(run, held)
 
@@ -144,23 +173,27 @@ def run_task_episode(built: ControlLoop, episode: TaskEpisode) -> TaskRunResult:
     Raises:
         MapError: The robot has no such task.
     """
-    run, walk = episode.run, episode.plan.times.press
-    behavior: Behavior = built.map.behaviors[run.behavior]
-    task: Task = built.robot.find_task(behavior.task)
+    run, press = episode.run, episode.plan.times.press
+    task, attributes = _task_of(built, run.behavior), built.robot.attributes
     with begin_held_run(built, episode.plan) as (loop, driven):
         before = loop.attributes
         records = list(driven)
     rows = np.array([before, *(record.attributes for record in records)])
     fell = records[-1].fell
-    if len(rows) <= walk + 1:
-        return TaskRunResult(TaskVerdict(False, 0.0, {}), fell)
-    attributes = built.robot.attributes
-    after = unwrap_angles(rows[walk + 1 :], attributes)
+    if len(rows) <= press + 1:
+        return TaskRunResult(TaskVerdict(False, 0.0, {}), fell, began=not run.after)
+    if run.after:
+        walk = episode.plan.earlier[0][0]
+        done = unwrap_angles(rows[walk + 1 : press + 1], attributes)
+        first = _task_of(built, run.after).judge(TaskRunTrace(attributes, rows[: walk + 1], done, fell=False))
+        if not first.success:
+            return TaskRunResult(TaskVerdict(False, 0.0, {}), fell, began=False)
+    after = unwrap_angles(rows[press + 1 :], attributes)
     at_once = after[: task.steps]
     fell_at_once = fell and len(after) <= task.steps
-    verdict = task.judge(TaskRunTrace(attributes, rows[: walk + 1], at_once, fell_at_once))
+    verdict = task.judge(TaskRunTrace(attributes, rows[: press + 1], at_once, fell_at_once))
     if run.steps == task.steps:
         return TaskRunResult(verdict, fell)
     whole = not fell and len(after) == run.steps
-    still = task.judge(TaskRunTrace(attributes, rows[: walk + 1], after[-task.steps :], not whole))
+    still = task.judge(TaskRunTrace(attributes, rows[: press + 1], after[-task.steps :], not whole))
     return TaskRunResult(verdict, fell, still)

@@ -46,7 +46,7 @@ def _success_table(title: str, rows: Sequence[TaskEvaluation]) -> Table:
             for name, value in row.figures.items()
         )
         table.add_row(
-            row.behavior,
+            f"{row.behavior}, after {row.after}" if row.after else row.behavior,
             row.wanted,
             f"{row.done}/{row.runs} [{row.low:.0%}, {row.high:.0%}]",
             *_comparison(row),
@@ -67,7 +67,7 @@ def _substitutes_table(rows: Sequence[TaskEvaluation], settings: ProtocolSetting
         "Tasks: would something else do as well?",
         *("behavior", "random units: as good, success, falls", "random directions", "on the actions"),
     )
-    for row in rows:
+    for row in (one for one in rows if not one.after):
         cells = {}
         for one in row.substitutes:
             runs = one.draws * one.seeds
@@ -91,7 +91,7 @@ def _conditions_table(rows: Sequence[TaskEvaluation]) -> Table:
     for name in dict.fromkeys(row.behavior for row in rows):
         table.add_section()
         for row in rows:
-            if row.behavior == name:
+            if row.behavior == name and not row.after:
                 first = name if row.condition == UNDISTURBED.name else ""
                 done = f"{row.done}/{row.runs}"
                 table.add_row(first, row.condition, done, *_comparison(row), _falls(row))

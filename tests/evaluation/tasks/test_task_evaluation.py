@@ -219,3 +219,33 @@ def test_a_push_is_measured_from_the_start_of_the_task_on() -> None:
         observation, *_ = robot.step(acted.action)
     assert found.size is not None
     assert found.size.action == pytest.approx(np.mean(shifts, axis=0), abs=1e-6)
+
+
+UNWIND = """
+[[behaviors]]
+name = "unwind"
+key = "u"
+magnitudes = { "0:0" = -0.5 }
+task = "unwind"
+"""
+
+
+@pytest.mark.parametrize(("push", "runs"), [(0.5, 8), (0.01, 0)])
+def test_what_is_needed_after_a_task_is_judged_after_it(push: float, runs: int) -> None:
+    def judge_unwinding(trace: TaskRunTrace) -> TaskVerdict:
+        turned, begins_turned = float(trace["yaw"][-1] - trace["yaw"][0]), trace.before("yaw")[-1] > 0.2
+        return TaskVerdict(turned < -0.2 and begins_turned, -turned, {})
+
+    class Unwinding(Vehicle):
+        tasks = (*_Veering.tasks, Task("unwind", "u", "", "", (10, 20), 50, judge_unwinding, follows="veer"))
+
+    text = MAP[: MAP.rindex("[[behaviors]]")].replace('"0:0" = 0.5', f'"0:0" = {push}') + UNWIND
+    loop = ControlLoop(Unwinding(), turning_loop().policy, parse_map(text, "test"), 0)
+    few = replace(SMALL, draws=0, condition_seeds=0)
+    plan = EvaluationPlan(loop, range(100, 108), few)
+    rows = evaluate_behaviors(DriveConfig("vehicle", loop.map, 0), plan).tasks
+    (after,) = [row for row in rows if row.after]
+    alone = next(row for row in rows if row.behavior == "unwind" and not row.after)
+    assert (after.behavior, after.after, after.runs) == ("unwind", "veer", runs)
+    assert (after.done, after.by_itself) == (runs, 0)
+    assert alone.done == 0  # without the veer before it, it does not begin turned
