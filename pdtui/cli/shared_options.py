@@ -19,7 +19,6 @@ from pdtui.stimulation.seed_ranges import FIRST_SEARCH_SEED, parse_seed_range, r
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
-    from pdtui.stimulation.stimulation_map import StimulationMap
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -170,7 +169,7 @@ def build_drive_config(
     from pdtui.driving.drive_config import DriveConfig
     from pdtui.robots import resolve_robot_name, robot_file_stem, trust_module
     from pdtui.stimulation.map_library import find_map, map_without_behaviors
-    from pdtui.stimulation.map_policy_lookup import resolve_map_policy
+    from pdtui.stimulation.map_policy_lookup import is_of_another_policy, resolve_map_policy
     from pdtui.stimulation.map_reader import load_map
 
     if map_name is None and robot.endswith(".toml"):
@@ -190,25 +189,12 @@ def build_drive_config(
         else:
             stimulation_map = load_map(path)
             drives_alone = map_name is None and without_map and policy and not options.get("force")
-            if drives_alone and _is_of_another_policy(stimulation_map, robot, policy, import_options):
+            if drives_alone and is_of_another_policy(stimulation_map, robot, policy, import_options):
                 told = f"{path}: made for another policy than {policy}; driving without behaviors"
                 click.echo(make_printable(told), err=True)
                 stimulation_map = map_without_behaviors(robot, policy)
     stimulation_map = resolve_map_policy(stimulation_map, policy, import_options)
     return DriveConfig(robot, stimulation_map, seed, **options)
-
-
-def _is_of_another_policy(
-    stimulation_map: StimulationMap, robot: str, policy: str, import_options: ImportOptions
-) -> bool:
-    from pdtui.policies.weights.import_options import ObservationActionSpaces
-    from pdtui.policies.weights.policy_loading import load_policy
-    from pdtui.robots import open_robot
-
-    with open_robot(robot) as world:
-        spaces = ObservationActionSpaces.of_world(world)
-    given = load_policy(policy, robot, import_options=import_options, spaces=spaces)
-    return given.sha256 != stimulation_map.policy_hash
 
 
 def check_judging_seeds(config: DriveConfig, seeds: range) -> None:

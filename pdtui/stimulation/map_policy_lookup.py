@@ -5,8 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from pdtui.policies.weights.import_options import NO_NORMALISER, NO_OPTIONS, ImportOptions
+from pdtui.policies.weights.import_options import (
+    NO_NORMALISER,
+    NO_OPTIONS,
+    ImportOptions,
+    ObservationActionSpaces,
+)
 from pdtui.policies.weights.policy_file_lookup import find_file_inside_folders
+from pdtui.policies.weights.policy_loading import load_policy
+from pdtui.robots import open_robot
 from pdtui.stimulation.map_writer import compose_map, replace_policy
 from pdtui.stimulation.stimulation_map import StimulationMap
 
@@ -47,6 +54,20 @@ def locate_map_policy(
     if merged.normaliser != NO_NORMALISER and not import_options.normaliser:
         merged = replace(merged, normaliser=_path_from_here(merged.normaliser, folder, source))
     return replace(stimulation_map, policy=name, import_options=merged)
+
+
+def is_of_another_policy(
+    stimulation_map: StimulationMap, robot: str, policy: str, import_options: ImportOptions = NO_OPTIONS
+) -> bool:
+    """Return whether a map was made for another policy of a robot than the one of this file or name.
+
+    Raises:
+        PdtuiError: The robot or the policy cannot be loaded.
+    """
+    with open_robot(robot) as world:
+        spaces = ObservationActionSpaces.of_world(world)
+    given = load_policy(policy, robot, import_options=import_options, spaces=spaces)
+    return given.sha256 != stimulation_map.policy_hash
 
 
 def _path_from_here(name: str, folder: Path, source: str) -> str:
