@@ -17,7 +17,8 @@ from pdtui.robots.walker import WALKER_TASKS
 from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
 
 WALKER = ("vx", "right foot clearance", "left foot clearance")
-BIPED = ("vx", "height", "pitch")
+BIPED = ("vx", "height", "pitch", "foot 1 contact", "foot 2 contact")
+A1_FEET = tuple(f"{leg} contact" for leg in ("front right", "front left", "rear right", "rear left"))
 
 
 def _trace(
@@ -63,8 +64,14 @@ def test_a_hop_keeps_one_foot_up_in_one_stretch() -> None:
     assert not _hop(down, down).success
 
 
-def _biped(task: str, height: Floats, pitch: Floats, vx: Floats, *, fell: bool = False) -> TaskVerdict:
-    trace = _trace(BIPED, [[5.0, 2.0, 0.0]] * 80, np.stack((vx, height, pitch), axis=1), fell=fell)
+def _biped(
+    task: str, height: Floats, pitch: Floats, vx: Floats, *, fell: bool = False, airborne: int = 15
+) -> TaskVerdict:
+    """Both feet are off the ground for some steps, except that each touches it on its own before that."""
+    steps = np.arange(len(vx))
+    first, second = steps < 50, (steps >= 50 + airborne) | (steps == 20)
+    values = np.stack((vx, height, pitch, first, second), axis=1)
+    trace = _trace(BIPED, [[5.0, 2.0, 0.0, 1.0, 0.0]] * 80, values, fell=fell)
     return find_task(task, BIPEDAL_WALKER_TASKS, "bipedal_walker").judge(trace)
 
 
@@ -74,6 +81,8 @@ def test_a_jump_rises_half_a_metre_and_walks_on() -> None:
     assert _biped("jump", arc, flat, fast).success
     assert not _biped("jump", 2.0 + (arc - 2.0) / 2, flat, fast).success
     assert not _biped("jump", arc, flat, fast, fell=True).success
+    assert not _biped("jump", arc, flat, fast, airborne=14).success
+    assert _biped("jump", arc, flat, fast, airborne=20).figures["in the air (s)"] == pytest.approx(0.4)
     assert not _biped("jump", arc, flat, np.linspace(5.0, 0.0, 200)).success
 
 
@@ -87,14 +96,19 @@ def test_a_flip_turns_forward() -> None:
     fallen = _biped("front flip", height[:90], over[:190:2][:90] * 0.95, fast[:90], fell=True)
     assert fallen.figures["lands"] == 0.0
     assert not _biped("front flip", height, -over, fast).success
+    assert not _biped("front flip", height, over, fast, airborne=14).success
 
 
-def _a1(task: str, rate: float, speed: Floats, *, fell: bool = False) -> TaskVerdict:
-    names = ("vx", "speed", "yaw", "pitch")
-    steps = len(speed)
-    yaw = rate * 0.016 * np.arange(steps)
-    values = np.stack((speed, np.abs(speed), yaw, np.zeros(steps)), axis=1)
-    trace = _trace(names, [[2.0, 2.0, 0.0, 0.0]] * 90, values, fell=fell)
+def _a1(task: str, rate: float, speed: Floats, *, fell: bool = False, patter: int = 0) -> TaskVerdict:
+    """With `patter`, one foot touches down each so many steps."""
+    names = ("vx", "speed", "yaw", "pitch", *A1_FEET)
+    steps = np.arange(len(speed))
+    feet = np.ones((len(steps), 4))
+    if patter:
+        feet[steps % patter == 0, 0] = 0.0
+    yaw = rate * 0.016 * steps
+    values = np.column_stack((speed, np.abs(speed), yaw, np.zeros(len(steps)), feet))
+    trace = _trace(names, [[2.0, 2.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]] * 90, values, fell=fell)
     return find_task(task, A1_TASKS, "a1").judge(trace)
 
 
@@ -112,8 +126,10 @@ def test_the_a1_turns_while_it_walks() -> None:
 
 
 def test_the_a1_stops_on_its_feet_and_goes_faster() -> None:
-    braking = np.concatenate((np.linspace(2.0, 0.1, 60), np.full(90, 0.1)))
+    braking = np.concatenate((np.linspace(2.0, 0.05, 60), np.full(90, 0.05)))
     assert _a1("stop", 0.0, braking).success
+    assert not _a1("stop", 0.0, braking, patter=5).success  # 12 touchdowns a second
+    assert not _a1("stop", 0.0, braking + 0.06).success
     assert not _a1("stop", 0.0, braking[:100], fell=True).success
     assert not _a1("stop", 0.0, np.full(150, 0.4)).success
     assert _a1("forward", 0.0, np.full(150, 2.3)).success
