@@ -22,7 +22,7 @@ FONT = "/usr/share/fonts/truetype/dejavu/DejaVuSansMono{}.ttf"
 FONT_SIZE = 14
 FRAMES_PER_SECOND = 6
 LEAD_IN, LENGTH = 4.0, 14.0
-PRESSES = [(1.6, "a", "spin left"), (6.6, "v", "view from above"), (10.0, "x", "stop")]
+PRESSES = [(1.6, "a", "turn left"), (6.6, "v", "view from above"), (10.0, "x", "stop")]
 """Seconds into the picture, the key, and what the caption says of it."""
 CAPTION_SECONDS = 2.0
 BRAILLE_DOTS = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (0, 3), (1, 3)]

@@ -55,9 +55,9 @@ def test_a_sample_driven_on_the_screen_replays_bit_for_bit(path: Path) -> None:
     [
         ("a1", (256,) * 4, {"left", "right", "stop", "forward"}),
         ("anymal", (128, 64, 32), {"left", "right", "hold heading", "hold heading by command"}),
-        ("ant", (256, 256), {"stop", "up", "down", "spin left", "spin right"}),
-        ("walker", (256, 256), {"slow down"}),
-        ("bipedal_walker", (256, 256), {"jump", "front flip", "stand up"}),
+        ("ant", (256, 256), {"stop", "drift left", "drift right", "turn left", "spin right"}),
+        ("walker", (256, 256), {"risky brake"}),
+        ("bipedal_walker", (256, 256), {"jump", "front flip", "rise from split"}),
     ],
 )
 def test_the_weights_say_how_they_were_trained_and_the_map_fits_them(
@@ -87,7 +87,8 @@ def test_the_other_policies_earn_what_is_wanted(robot: str, least: float) -> Non
 @pytest.mark.parametrize("robot", LEAST)
 def test_every_task_is_done_as_often_as_the_readme_says(robot: str) -> None:
     figures = _figures("evaluate", robot, "--seeds", "100-119")
-    rows = {row["task"]: row for row in figures["tasks"]}  # type: ignore[attr-defined]
+    tasks = figures["tasks"]
+    rows = {row["task"]: row for row in tasks if row["condition"] == "undisturbed" and not row["after"]}  # type: ignore[attr-defined]
     for task, least in LEAST[robot].items():
         assert rows[task]["done"] >= least, rows[task]
         assert rows[task]["done"] > rows[task]["by_itself"]
@@ -107,9 +108,9 @@ def test_every_behavior_of_the_ant_does_something_at_first() -> None:
     first = {row["behavior"]: row["first"] for row in rows}
     assert first["stop"]["value"] < 0.2 * first["stop"]["default"]
     for name, sign, least in (
-        ("up", 1, 0.7),
-        ("down", -1, 0.7),
-        ("spin left", 1, 0.4),
+        ("drift left", 1, 0.7),
+        ("drift right", -1, 0.7),
+        ("turn left", 1, 0.4),
         ("spin right", -1, 0.3),
     ):
         assert sign * first[name]["value"] >= least

@@ -71,7 +71,7 @@ def test_a_task_is_shown_from_its_own_start_for_as_long_as_its_judge_looks() -> 
     runs = rank_runs(plan, evaluate_behaviors(config, plan))
     assert {run.behavior for run in runs} == set(plan.loop.map.behaviors)
     for run in runs:
-        task = plan.loop.robot.find_task(run.behavior)
+        task = plan.loop.robot.find_task(plan.loop.map.behaviors[run.behavior].task)
         assert (run.plan.start, run.plan.times.held) == (task.start, task.steps)
     (strip,) = film_strips(plan, [run for run in runs if run.behavior == "jump"][:1])
     assert len(strip.film.seconds) == 8

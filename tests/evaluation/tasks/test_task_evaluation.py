@@ -170,8 +170,8 @@ def _config_of_one(robot: str, behavior: str) -> DriveConfig:
 @pytest.mark.parametrize(
     ("robot", "behavior"),
     [
-        ("bipedal_walker", "stand up"),
-        pytest.param("walker", "slow down", marks=pytest.mark.slow),
+        ("bipedal_walker", "rise from split"),
+        pytest.param("walker", "risky brake", marks=pytest.mark.slow),
         pytest.param("a1", "left", marks=[pytest.mark.slow, NEEDS_BULLET]),
     ],
 )
@@ -204,7 +204,7 @@ def test_a_task_of_the_a1_is_planned_in_every_world_and_runs_there() -> None:
 
 
 def test_a_push_is_measured_from_the_start_of_the_task_on() -> None:
-    plan = plan_evaluation(_config_of_one("bipedal_walker", "stand up"), [100], REAL)
+    plan = plan_evaluation(_config_of_one("bipedal_walker", "rise from split"), [100], REAL)
     (run,) = task_measuring_runs(plan)
     # It is pressed at once, in a split, and measured for the half second that is less than its period.
     assert (run.start, run.times.press, run.times.window) == ("split", 0, 36)
