@@ -100,7 +100,7 @@ def search_task_into_map(
         search = TaskSearch(pool, goal, seed, settings, begin)
         result = search.run(SharedTimeBudget(minutes).share(), progress)
         new_map = StimulationMap(
-            robot, pool.policy.name, pool.policy.sha256, "space", {}, {}, import_options=import_options
+            robot, policy, pool.policy.sha256, "space", {}, {}, import_options=import_options
         )
     units = result.plan.stimulation.by_address(layers)
     seconds = None if result.plan.steps is None else round(result.plan.steps * dt, 6)
