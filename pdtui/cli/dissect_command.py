@@ -98,15 +98,15 @@ def dissect_command(
     """
     from pdtui.dissection.dissect_into_map import WrittenDissection, dissect_into_map
     from pdtui.dissection.dissection_config import QUICK_DISSECTION, DissectionConfig, DissectionSettings
-    from pdtui.dissection.null_dissection import NullDissection, dissect_null
+    from pdtui.dissection.null_dissection import NullDissection, count_false_confirmations
     from pdtui.pictures.dissection_report import PictureOutputs
-    from pdtui.robots import resolve_robot_name, robot_file_stem, trust_module
+    from pdtui.robots import require_robot_name, robot_file_stem, trust_module
 
     if (robot is None) == (env is None):
         raise click.UsageError("expected either ROBOT or --env ID")
     name = str(robot or env)
     trust_module(name)
-    resolve_robot_name(name)
+    require_robot_name(name)
     output = output or Path("maps") / f"{robot_file_stem(name)}-dissected.toml"
     outputs = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite)
     if not null:
@@ -127,7 +127,7 @@ def dissect_command(
         )
         result: NullDissection | WrittenDissection
         if null:
-            result = dissect_null(config)
+            result = count_false_confirmations(config)
         else:
             result = dissect_into_map(config, output, overwrite=overwrite, draw=outputs.draw)
     print_result(result.as_dict(), as_json, result.table)

@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pdtui.cli.drive_command import require_terminal
-from pdtui.cli.evaluate.experiments import EXPERIMENTS, check_experiment, experiment_options, run_experiment
+from pdtui.cli.evaluate.paper_experiments import (
+    EXPERIMENTS,
+    check_experiment,
+    experiment_options,
+    run_experiment,
+)
 from pdtui.cli.evaluate.run_watching import watch_runs
 from pdtui.cli.shared_options import (
     FILE_PATH,

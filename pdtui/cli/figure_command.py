@@ -67,10 +67,10 @@ def episode_command(
     As in figure 2 of the paper. ROBOT is a robot's name or the ID of a Gymnasium environment.
     """
     from pdtui.pictures.matplotlib_page import check_figure_path
-    from pdtui.robots import resolve_robot_name, trust_module
+    from pdtui.robots import require_robot_name, trust_module
 
     trust_module(robot)
-    resolve_robot_name(robot)
+    require_robot_name(robot)
     check_figure_path(output, overwrite)
     from pdtui.pictures.unit_attribute_pairs import draw_unit_attribute_pairs, pair_units_with_attributes
 

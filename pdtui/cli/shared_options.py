@@ -167,18 +167,18 @@ def build_drive_config(
         options: further fields of `DriveConfig`.
     """
     from pdtui.driving.drive_config import DriveConfig
-    from pdtui.robots import resolve_robot_name, robot_file_stem, trust_module
+    from pdtui.robots import require_robot_name, robot_file_stem, trust_module
     from pdtui.stimulation.map_library import find_map, map_without_behaviors
     from pdtui.stimulation.map_policy_lookup import is_of_another_policy, resolve_map_policy
     from pdtui.stimulation.map_reader import load_map
 
     if map_name is None and robot.endswith(".toml"):
         stimulation_map = load_map(find_map(robot))
-        robot = resolve_robot_name(stimulation_map.robot)
+        robot = require_robot_name(stimulation_map.robot)
     else:
         # Typed by the user, unlike the name inside a map.
         trust_module(robot)
-        resolve_robot_name(robot)
+        require_robot_name(robot)
         try:
             path = find_map(map_name or robot_file_stem(robot))
         except MapError as error:

@@ -30,7 +30,7 @@ from pdtui.probing.unit_selection import (
     select_units_to_refine,
 )
 from pdtui.robots import open_robot
-from pdtui.search.plan_search import SharedTimeBudget
+from pdtui.search.evolutionary_search import SharedTimeBudget
 from pdtui.sessions.environment_versions import collect_versions
 from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.spectra.matching import match_units

@@ -17,9 +17,9 @@ from pdtui.robots.robot import Robot
 from pdtui.robots.robot_goals import BehaviorGoal
 from pdtui.search.behavior_search import BehaviorSearch, BehaviorSearchResult, SearchStartStates
 from pdtui.search.controller_search import ControllerGoal, ControllerSearch, ControllerSearchResult
+from pdtui.search.evolutionary_search import SharedTimeBudget
 from pdtui.search.goal_scores import STANDING, reachable_goals
 from pdtui.search.imprint_candidates import build_imprint_candidates
-from pdtui.search.plan_search import SharedTimeBudget
 from pdtui.search.shared_candidates import SharedCandidates, sample_random_candidates
 from pdtui.spectra.episode_monitor import monitor_episodes
 

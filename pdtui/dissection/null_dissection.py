@@ -21,7 +21,7 @@ from pdtui.dissection.probe_starts import gather_probe_starts
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.null_distributions import smallest_p_value
-from pdtui.probing.null_trials import NullTrials
+from pdtui.probing.null_resampling import NullResampler
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.unit_selection import sample_control_units
 from pdtui.robots import open_robot
@@ -119,7 +119,7 @@ class NullDissection:
         return Group(table, Text(f"At the level of {self.level:g}: {verdict}. {self.rollouts} roll-outs."))
 
 
-def dissect_null(config: DissectionConfig, draws: int = 400) -> NullDissection:
+def count_false_confirmations(config: DissectionConfig, draws: int = 400) -> NullDissection:
     """Dissect a policy where nothing is to be found, and count what is confirmed.
 
     The settings for choosing and judging are those of the dissection: units, outputs, starts, level.
@@ -130,7 +130,7 @@ def dissect_null(config: DissectionConfig, draws: int = 400) -> NullDissection:
     if isinstance(config.policy, nn.Module):
         with open_robot(config.robot) as world:
             policy = policy_from_network(config.policy, world.observation_space, world.action_space)
-            return dissect_null(replace(config, robot=world, policy=policy), draws)
+            return count_false_confirmations(replace(config, robot=world, policy=policy), draws)
     seed, settings, report = config.seed, config.settings, config.progress
     preset = find_matching_preset(config.preset, config.preset_changes)
     with RolloutPool(config.robot, config.policy, config.workers, config.import_options) as pool:
@@ -155,7 +155,7 @@ def dissect_null(config: DissectionConfig, draws: int = 400) -> NullDissection:
             (*both, *starts.screen, *starts.searches.search, *starts.searches.selection),
             steps=settings.refine_steps,
         )
-        trials = NullTrials(
+        trials = NullResampler(
             matching, controls, own_range, len(starts.refine), settings.screen_values, settings.judge_keep,
             settings.level, probed, bank,
         )  # fmt: skip

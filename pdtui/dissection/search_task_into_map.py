@@ -16,8 +16,8 @@ from pdtui.core.units import Stimulation, parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.task import average_figures
-from pdtui.search.plan_search import SharedTimeBudget
-from pdtui.search.task_rollout import TimedStimulation
+from pdtui.search.evolutionary_search import SharedTimeBudget
+from pdtui.search.task_rollout import StimulationWithDuration
 from pdtui.search.task_search import TaskSearch, TaskSearchResult, TaskSearchSettings
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.map_writer import add_behavior, add_seeds, compose_map, rewrite_map
@@ -116,7 +116,9 @@ def search_task_into_map(
     return WrittenBehavior(result, units, seconds, output)
 
 
-def _known_plans(stimulation_map: StimulationMap, task: str, pool: RolloutPool) -> list[TimedStimulation]:
+def _known_plans(
+    stimulation_map: StimulationMap, task: str, pool: RolloutPool
+) -> list[StimulationWithDuration]:
     """Return the plans of the map's behaviors for the task."""
     plans = []
     for behavior in stimulation_map.behaviors.values():
@@ -124,5 +126,5 @@ def _known_plans(stimulation_map: StimulationMap, task: str, pool: RolloutPool) 
             addressed = stimulation_map.units_of(behavior).items()
             values = {parse_unit(address, pool.policy.layers): value for address, value in addressed}
             steps = None if behavior.period is None else round(behavior.period / pool.robot.control_dt)
-            plans.append(TimedStimulation(Stimulation.of(values), steps))
+            plans.append(StimulationWithDuration(Stimulation.of(values), steps))
     return plans

@@ -21,18 +21,17 @@ from pdtui.evaluation.behavior_summary import (
     summarise_behavior,
     summarise_substitute,
 )
+from pdtui.evaluation.disturbance_conditions import UNDISTURBED
 from pdtui.evaluation.effect_figures import relative_spread
 from pdtui.evaluation.evaluation_plan import EvaluationPlan, RunKey
 from pdtui.evaluation.held_run import (
     HeldRunPlan,
     HeldRunTrace,
-    PushMeasurement,
-    measure_push,
+    InterventionMeasurement,
+    measure_intervention,
     run_held_behavior,
 )
 from pdtui.evaluation.protocol_settings import ProtocolSettings
-from pdtui.evaluation.run_conditions import UNDISTURBED
-from pdtui.evaluation.tasks.task_evaluation import TaskEvaluation, summarise_tasks
 from pdtui.evaluation.tasks.task_runs import (
     count_task_steps,
     list_task_runs,
@@ -40,6 +39,7 @@ from pdtui.evaluation.tasks.task_runs import (
     run_task_episode,
     task_measuring_runs,
 )
+from pdtui.evaluation.tasks.task_success import TaskEvaluation, summarise_tasks
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
 
 FEWEST_DIFFERENT = 0.02
@@ -126,7 +126,7 @@ def evaluate_behaviors(
             progress(done + finished, total)
 
     with WorkerPool(f"evaluation of {config.robot}", workers, plan.loop, build_control_loop, config) as pool:
-        found = pool.map(measure_push, trials, advance)
+        found = pool.map(measure_intervention, trials, advance)
         measured = _by_behavior(measuring, found[: len(measuring)])
         measured_in_tasks = measured | _by_behavior(in_tasks, found[len(measuring) :])
         done += len(trials)
@@ -141,9 +141,9 @@ def evaluate_behaviors(
 
 
 def _by_behavior(
-    runs: Sequence[HeldRunPlan], found: Sequence[PushMeasurement]
-) -> dict[str, list[PushMeasurement]]:
-    measured: dict[str, list[PushMeasurement]] = {}
+    runs: Sequence[HeldRunPlan], found: Sequence[InterventionMeasurement]
+) -> dict[str, list[InterventionMeasurement]]:
+    measured: dict[str, list[InterventionMeasurement]] = {}
     for run, one in zip(runs, found, strict=True):
         measured.setdefault(run.behavior, []).append(one)
     return measured

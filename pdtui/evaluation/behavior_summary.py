@@ -10,7 +10,7 @@ import numpy as np
 from pdtui.core.attributes import Attribute
 from pdtui.evaluation.behavior_criteria import BehaviorCriterion, JudgedRun, choose_criterion
 from pdtui.evaluation.effect_figures import (
-    SideEffects,
+    EffectSpecificity,
     WindowEffect,
     count_back_to_gait,
     measure_side_effects,
@@ -113,7 +113,7 @@ class BehaviorEvaluation:
     falls: int
     default_falls: int
     holds: bool
-    side_effects: SideEffects
+    side_effects: EffectSpecificity
     seed_effects: tuple[float, ...]
     seed_met: tuple[bool, ...]
     substitutes: tuple[SubstituteFigures, ...] = ()

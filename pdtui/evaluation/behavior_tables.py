@@ -10,8 +10,8 @@ from rich.table import Table
 from pdtui.core.text_tables import format_mean_with_interval, format_p_value, format_seed_range, new_table
 from pdtui.evaluation.behavior_evaluation import MapEvaluation
 from pdtui.evaluation.behavior_summary import AS_LARGE, BehaviorEvaluation
+from pdtui.evaluation.disturbance_conditions import UNDISTURBED
 from pdtui.evaluation.effect_figures import WindowEffect
-from pdtui.evaluation.run_conditions import UNDISTURBED
 from pdtui.evaluation.tasks.task_tables import task_tables
 
 

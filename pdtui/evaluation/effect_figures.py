@@ -41,7 +41,7 @@ class WindowEffect:
 
 
 @dataclass(frozen=True)
-class SideEffects:
+class EffectSpecificity:
     """The change over the whole hold, in standard deviations that attributes have in the default's walk.
 
     Attributes:
@@ -129,7 +129,7 @@ def measure_side_effects(
     attributes: Sequence[Attribute],
     column: int,
     times: RunTimes,
-) -> SideEffects:
+) -> EffectSpecificity:
     """Return the change of the wanted attribute and of the others over the whole hold."""
     changes = {}
     for other, attribute in enumerate(attributes):
@@ -140,10 +140,10 @@ def measure_side_effects(
             changes[attribute.name] = float(held.mean()) / spread
     wanted = changes.pop(attributes[column].name, float("nan"))
     if not changes:
-        return SideEffects(wanted, float("nan"), "", float("nan"))
+        return EffectSpecificity(wanted, float("nan"), "", float("nan"))
     others = float(np.mean(np.abs(list(changes.values()))))
     largest = max(changes, key=lambda name: abs(changes[name]))
-    return SideEffects(wanted, others, largest, abs(wanted) / others if others > 0.0 else float("inf"))
+    return EffectSpecificity(wanted, others, largest, abs(wanted) / others if others > 0.0 else float("inf"))
 
 
 def count_back_to_gait(

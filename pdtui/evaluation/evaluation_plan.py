@@ -12,16 +12,16 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.evaluation.held_run import HeldRunPlan, PushMeasurement
-from pdtui.evaluation.protocol_settings import ProtocolSettings, RunTimes, plan_run_times
-from pdtui.evaluation.run_conditions import CONDITIONS, UNDISTURBED, find_condition
-from pdtui.evaluation.substitute_pushes import (
-    ActionPush,
-    SubstitutePush,
+from pdtui.evaluation.behavior_substitutes import (
+    ActionShift,
+    BehaviorSubstitute,
     draw_random_direction,
     draw_random_units,
-    mean_push_size,
+    mean_intervention_size,
 )
+from pdtui.evaluation.disturbance_conditions import CONDITIONS, UNDISTURBED, find_condition
+from pdtui.evaluation.held_run import HeldRunPlan, InterventionMeasurement
+from pdtui.evaluation.protocol_settings import ProtocolSettings, RunTimes, plan_run_times
 from pdtui.stimulation.stimulation_map import Behavior
 
 SubstituteKind = Literal["units", "random units", "random directions", "actions"]
@@ -140,7 +140,9 @@ class EvaluationPlan:
         longest = max((self.times(b.name, seed).steps for b in self.behaviors), default=0)
         return replace(whole, after=max(whole.after, longest - whole.press - whole.held))
 
-    def held_plan(self, key: RunKey, measured: Mapping[str, Sequence[PushMeasurement]]) -> HeldRunPlan | None:
+    def held_plan(
+        self, key: RunKey, measured: Mapping[str, Sequence[InterventionMeasurement]]
+    ) -> HeldRunPlan | None:
         """Return what to run for a key.
 
         Args:
@@ -162,7 +164,7 @@ class EvaluationPlan:
             self.mean_observation_spread(measured),
         )
 
-    def mean_observation_spread(self, measured: Mapping[str, Sequence[PushMeasurement]]) -> Floats:
+    def mean_observation_spread(self, measured: Mapping[str, Sequence[InterventionMeasurement]]) -> Floats:
         """Return the standard deviation of every observation in an undisturbed walk."""
         spread: Floats = np.mean([one.observation_spread for one in measured[""]], axis=0)
         return spread
@@ -172,8 +174,8 @@ class EvaluationPlan:
         kind: SubstituteKind,
         behavior: str,
         draw: int,
-        measured: Mapping[str, Sequence[PushMeasurement]],
-    ) -> SubstitutePush | None:
+        measured: Mapping[str, Sequence[InterventionMeasurement]],
+    ) -> BehaviorSubstitute | None:
         """Return what acts in the place of a behavior's units.
 
         Args:
@@ -193,7 +195,7 @@ class EvaluationPlan:
         sizes = [one.size for one in measured[behavior] if one.size is not None]
         if not sizes:
             return None
-        size = mean_push_size(sizes)
+        size = mean_intervention_size(sizes)
         if kind == "actions":
-            return ActionPush(size.action)
+            return ActionShift(size.action)
         return draw_random_direction(size, layers, behavior, draw)

@@ -14,16 +14,21 @@ from pdtui.core.drive_events import DriveEvent
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import run_episode
-from pdtui.evaluation.protocol_settings import RunTimes
-from pdtui.evaluation.run_conditions import (
+from pdtui.evaluation.behavior_substitutes import (
+    BehaviorSubstitute,
+    InterventionSize,
+    InterventionSizeMeter,
+    act_in_place,
+)
+from pdtui.evaluation.disturbance_conditions import (
     UNDISTURBED,
-    EvaluationCondition,
+    DisturbanceCondition,
     disturb_policy,
     disturbed_world,
     plan_pushes,
     push_robot,
 )
-from pdtui.evaluation.substitute_pushes import PushSize, PushSizeMeter, SubstitutePush, act_in_place
+from pdtui.evaluation.protocol_settings import RunTimes
 from pdtui.robots.geometry import root_body_row
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
@@ -46,8 +51,8 @@ class HeldRunPlan:
     behavior: str
     seed: int
     times: RunTimes
-    condition: EvaluationCondition = UNDISTURBED
-    substitute: SubstitutePush | None = None
+    condition: DisturbanceCondition = UNDISTURBED
+    substitute: BehaviorSubstitute | None = None
     observation_spread: Floats = field(default_factory=lambda: np.zeros(()))
     start: str = ""
     earlier: tuple[tuple[int, str], ...] = ()
@@ -123,17 +128,17 @@ def run_held_behavior(built: ControlLoop, plan: HeldRunPlan) -> HeldRunTrace:
 
 
 @dataclass(frozen=True)
-class PushMeasurement:
+class InterventionMeasurement:
     """What one measuring run found: the size of the push, if any, and the spread of each observation."""
 
-    size: PushSize | None
+    size: InterventionSize | None
     observation_spread: Floats
 
 
-def measure_push(built: ControlLoop, plan: HeldRunPlan) -> PushMeasurement:
+def measure_intervention(built: ControlLoop, plan: HeldRunPlan) -> InterventionMeasurement:
     """Run up to the end of the first window and measure how far the behavior moves units and actions."""
     loop = ControlLoop(built.robot, built.policy, built.map, plan.seed, start=plan.start)
-    meter = PushSizeMeter(built.policy)
+    meter = InterventionSizeMeter(built.policy)
     loop.act = meter.act
 
     def press(step: int) -> Sequence[DriveEvent]:
@@ -142,7 +147,7 @@ def measure_push(built: ControlLoop, plan: HeldRunPlan) -> PushMeasurement:
 
     for _ in run_episode(loop, plan.times.press + plan.times.window, press):
         pass
-    return PushMeasurement(meter.size(), np.array(meter.observations).std(axis=0))
+    return InterventionMeasurement(meter.size(), np.array(meter.observations).std(axis=0))
 
 
 def record_held_run(built: ControlLoop, plan: HeldRunPlan, path: Path) -> None:

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pdtui.evaluation.behavior_evaluation import MapEvaluation
+from pdtui.evaluation.disturbance_conditions import UNDISTURBED
 from pdtui.evaluation.evaluation_plan import EvaluationPlan
 from pdtui.evaluation.held_run import HeldRunPlan
 from pdtui.evaluation.protocol_settings import RunTimes, plan_run_times
-from pdtui.evaluation.run_conditions import UNDISTURBED
-from pdtui.evaluation.tasks.task_evaluation import TaskEvaluation
+from pdtui.evaluation.tasks.task_success import TaskEvaluation
 from pdtui.search.task_rollout import count_walk_steps
 
 

@@ -21,7 +21,7 @@ _SPLITS = 40
 
 
 @dataclass(frozen=True)
-class MatchingHitRate:
+class MatchingAccuracy:
     """How well matching alone finds the units that move an attribute.
 
     A hit is a unit whose screened strength is in the highest tenth and not zero. Correlations are NaN where
@@ -56,7 +56,7 @@ def measure_matching_hits(
     matching: UnitDiscrepancies,
     judged: UnitEffects,
     controls: Sequence[int],
-) -> MatchingHitRate:
+) -> MatchingAccuracy:
     """Compare the ranking by discrepancy with the effects that probing measured.
 
     The judged effects are from other starts; the controls are those of the judged units drawn at random.
@@ -74,10 +74,10 @@ def measure_matching_hits(
     none = float("nan")
     if not ranked.size:
         empty = (none,) * len(TOP_MATCHES)
-        return MatchingHitRate(False, empty, float(hits.mean()), none, none, probing, ceiling, none)
+        return MatchingAccuracy(False, empty, float(hits.mean()), none, none, probing, ceiling, none)
     order = np.searchsorted(units, ranked)
     found = rank_correlation(-matching.discrepancy[column, list(controls)], held_out)
-    return MatchingHitRate(
+    return MatchingAccuracy(
         first=bool(hits[order[0]]),
         best=tuple(float(hits[order[:count]].mean()) for count in TOP_MATCHES),
         random=float(hits.mean()),

@@ -4,7 +4,7 @@ from pdtui.robots.robot_registry import (
     list_robot_names,
     make_robot,
     open_robot,
-    resolve_robot_name,
+    require_robot_name,
     robot_file_stem,
     trust_module,
 )
@@ -13,7 +13,7 @@ __all__ = [
     "list_robot_names",
     "make_robot",
     "open_robot",
-    "resolve_robot_name",
+    "require_robot_name",
     "robot_file_stem",
     "trust_module",
 ]

@@ -17,7 +17,7 @@ from pdtui.robots.legged.terrain import RoughGround, draw_rough_ground, scatter_
 from pdtui.robots.robot import TRUNK_ATTRIBUTES, ResetResult, StepResult, TrainingRecipe, torque_attributes
 from pdtui.robots.simulators import bullet_robot
 from pdtui.robots.simulators.bullet_robot import BulletRobot
-from pdtui.robots.simulators.urdf_links import read_urdf_links
+from pdtui.robots.simulators.urdf_link_shapes import read_urdf_link_shapes
 from pdtui.robots.task import Task
 
 _LEGS = {"FR": "front right", "FL": "front left", "RR": "rear right", "RL": "rear left"}
@@ -108,7 +108,7 @@ class A1(BulletRobot):
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93,), np.float64)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (6,), np.float32)
         self._urdf = bullet_robot.bullet_data_folder() / "a1" / "a1.urdf"
-        self.links = read_urdf_links(self._urdf, ("trunk", *_JOINTS))
+        self.links = read_urdf_link_shapes(self._urdf, ("trunk", *_JOINTS))
         self.rebuild_world(0, terrain)
         limits = [self.bullet.getJointInfo(self.robot_id, joint)[10] for joint in self._joints]
         self.attributes = (

@@ -58,7 +58,7 @@ def trust_module(robot: str) -> None:
         os.environ[TRUSTED] = ",".join([*_trusted_modules(), module])
 
 
-def resolve_robot_name(name: str) -> str:
+def require_robot_name(name: str) -> str:
     """Return the name of a robot that can be built here.
 
     Raises:

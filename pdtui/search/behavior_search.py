@@ -18,8 +18,8 @@ from pdtui.probing.measured_effects import PlanEffects, UnitEffects
 from pdtui.probing.null_distributions import sign_flip_p_values
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot_goals import BehaviorGoal
+from pdtui.search.evolutionary_search import Deadline, EvolutionarySearch, EvolutionProblem, EvolutionSettings
 from pdtui.search.goal_scores import measure_goal_gains, score_plans_by_goal
-from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionProblem, EvolutionSettings
 from pdtui.search.shared_candidates import SharedCandidates
 from pdtui.search.stimulation_sampler import StimulationSampler
 from pdtui.stimulation.stimulation_map import MeasuredEffect

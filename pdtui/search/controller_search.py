@@ -14,7 +14,7 @@ from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.measured_effects import UnitEffects
 from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import PidStimulationPlan
-from pdtui.search.plan_search import Deadline, PlanScoringStage, select_plans
+from pdtui.search.evolutionary_search import Deadline, PlanScoringStage, select_plans
 from pdtui.search.stimulation_sampler import round_outputs, round_to_three_digits
 from pdtui.stimulation.stimulation_map import PidGains
 

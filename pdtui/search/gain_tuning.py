@@ -21,8 +21,8 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
+from pdtui.search.evolutionary_search import Deadline, PlanScoringStage, SharedTimeBudget, select_plans
 from pdtui.search.pid_gain_space import gains_from_point, point_from_gains, sample_gain_points
-from pdtui.search.plan_search import Deadline, PlanScoringStage, SharedTimeBudget, select_plans
 from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveResult, TrackingDriveRunner
 from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarise_tracking
 from pdtui.stimulation.seed_ranges import require_search_seeds

@@ -16,7 +16,7 @@ from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 
 
 @dataclass(frozen=True)
-class TimedStimulation:
+class StimulationWithDuration:
     """A stimulation and how long it lasts.
 
     Attributes:
@@ -35,7 +35,7 @@ def count_walk_steps(task: Task, seed: int) -> int:
 
 
 def judge_stimulations(
-    robot: Robot, policy: Policy, task: Task, plans: Sequence[TimedStimulation], seed: int
+    robot: Robot, policy: Policy, task: Task, plans: Sequence[StimulationWithDuration], seed: int
 ) -> list[TaskVerdict]:
     """Judge each plan after the same unstimulated walk; if that ends early, every plan has failed."""
     options = {"start": task.start} if task.start else None
@@ -57,7 +57,7 @@ def judge_stimulations(
 
 
 def _watch(
-    robot: Robot, policy: Policy, task: Task, plan: TimedStimulation, walked: list[Floats]
+    robot: Robot, policy: Policy, task: Task, plan: StimulationWithDuration, walked: list[Floats]
 ) -> TaskRunTrace:
     observation, fell = robot.observe(), False
     values: list[Floats] = []

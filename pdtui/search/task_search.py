@@ -15,9 +15,9 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.robot import Robot
 from pdtui.robots.task import Task, TaskVerdict
-from pdtui.search.plan_search import Deadline, EvolutionarySearch, EvolutionProblem, EvolutionSettings
+from pdtui.search.evolutionary_search import Deadline, EvolutionarySearch, EvolutionProblem, EvolutionSettings
 from pdtui.search.stimulation_sampler import CROSSED, StimulationSampler
-from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
+from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
 from pdtui.stimulation.seed_ranges import JUDGING_SEEDS, require_search_seeds
 
 _SEEDS_APART = 1000
@@ -80,7 +80,7 @@ class TaskSearchResult:
     """
 
     task: Task
-    plan: TimedStimulation
+    plan: StimulationWithDuration
     search_score: float
     verdicts: tuple[TaskVerdict, ...]
     untouched: tuple[TaskVerdict, ...]
@@ -110,7 +110,7 @@ class TaskSearch:
         task: Task,
         seed: int,
         settings: TaskSearchSettings,
-        known: Sequence[TimedStimulation] = (),
+        known: Sequence[StimulationWithDuration] = (),
     ) -> None:
         self._pool, self._task, self._seed, self._settings, self._known = pool, task, seed, settings, known
         self._rng, self._rollouts = np.random.default_rng(seed), 0
@@ -134,13 +134,16 @@ class TaskSearch:
             final=self._count_successes,
         )
         search_score, best = self._search_again_and_again(problem, deadline, progress)
-        plans, seeds = [best, TimedStimulation()], JUDGING_SEEDS[-settings.held_out_seeds :]
+        plans, seeds = [best, StimulationWithDuration()], JUDGING_SEEDS[-settings.held_out_seeds :]
         verdicts, untouched = map(tuple, self._judge(plans, seeds))
         return TaskSearchResult(self._task, best, search_score, verdicts, untouched, self._rollouts)
 
     def _search_again_and_again(
-        self, problem: EvolutionProblem[TimedStimulation], deadline: Deadline, progress: StepProgress | None
-    ) -> tuple[float, TimedStimulation]:
+        self,
+        problem: EvolutionProblem[StimulationWithDuration],
+        deadline: Deadline,
+        progress: StepProgress | None,
+    ) -> tuple[float, StimulationWithDuration]:
         """Return the best plan of one search after the other, with its score on the walks of its search."""
         settings = self._settings
         found = []
@@ -154,26 +157,26 @@ class TaskSearch:
         return score, plan
 
     def _vary(
-        self, sampler: StimulationSampler, elite: Sequence[TimedStimulation], max_units: int
-    ) -> TimedStimulation:
+        self, sampler: StimulationSampler, elite: Sequence[StimulationWithDuration], max_units: int
+    ) -> StimulationWithDuration:
         """Cross two of the elite, or change the period or the stimulation of one."""
         rng = self._rng
         parent, other = sampler.choose_parent(elite), sampler.choose_parent(elite)
         kind = rng.random()
         if kind < CROSSED:
             crossed = sampler.cross_over(parent.stimulation, other.stimulation, max_units)
-            return TimedStimulation(crossed, parent.steps)
+            return StimulationWithDuration(crossed, parent.steps)
         if kind < _RETIMED and parent.steps is not None and self._task.period is not None:
             steps = round(parent.steps * float(np.exp(rng.normal(0.0, _PERIOD_SPREAD))))
-            return TimedStimulation(parent.stimulation, int(np.clip(steps, 2, self._task.period)))
-        return TimedStimulation(sampler.mutate(parent.stimulation, max_units), parent.steps)
+            return StimulationWithDuration(parent.stimulation, int(np.clip(steps, 2, self._task.period)))
+        return StimulationWithDuration(sampler.mutate(parent.stimulation, max_units), parent.steps)
 
-    def _count_successes(self, plans: Sequence[TimedStimulation]) -> list[tuple[int, float]]:
+    def _count_successes(self, plans: Sequence[StimulationWithDuration]) -> list[tuple[int, float]]:
         """Return on how many walks of the selection the task was done; scores decide between equals."""
         rows = self._judge(plans, self._seeds(1, self._settings.selection_seeds))
         return [(sum(v.success for v in row), sum(v.score for v in row)) for row in rows]
 
-    def _screen(self, progress: StepProgress | None) -> tuple[list[TimedStimulation], Floats]:
+    def _screen(self, progress: StepProgress | None) -> tuple[list[StimulationWithDuration], Floats]:
         """Return the best single units, and weights by which to draw units."""
         settings, units = self._settings, self._pool.policy.units
         period = None if self._task.period is None else self._task.period // 2
@@ -181,7 +184,7 @@ class TaskSearch:
         if settings.screen_units is not None and settings.screen_units < units:
             tried = np.sort(self._rng.choice(units, settings.screen_units, replace=False))
         plans = [
-            TimedStimulation(Stimulation.of({unit: value}), period)
+            StimulationWithDuration(Stimulation.of({unit: value}), period)
             for unit in tried.tolist()
             for value in settings.values
         ]
@@ -204,7 +207,7 @@ class TaskSearch:
         return range(first, first + count)
 
     def _score(
-        self, plans: Sequence[TimedStimulation], seeds: int, progress: StepProgress | None = None
+        self, plans: Sequence[StimulationWithDuration], seeds: int, progress: StepProgress | None = None
     ) -> Floats:
         table = self._judge(plans, self._seeds(0, seeds), progress)
         means = np.array([np.mean([verdict.score for verdict in row]) for row in table])
@@ -213,7 +216,10 @@ class TaskSearch:
         return scores
 
     def _judge(
-        self, plans: Sequence[TimedStimulation], seeds: Sequence[int], progress: StepProgress | None = None
+        self,
+        plans: Sequence[StimulationWithDuration],
+        seeds: Sequence[int],
+        progress: StepProgress | None = None,
     ) -> list[list[TaskVerdict]]:
         """Return the verdicts of each plan on each seed."""
         self._rollouts += len(plans) * len(seeds)
@@ -229,7 +235,7 @@ class TaskSearch:
 
 
 def judge_task_plans(
-    robot: Robot, policy: Policy, job: tuple[str, tuple[TimedStimulation, ...], int]
+    robot: Robot, policy: Policy, job: tuple[str, tuple[StimulationWithDuration, ...], int]
 ) -> list[TaskVerdict]:
     """Judge plans in a worker process; tasks hold functions, so they travel by name."""
     name, plans, seed = job

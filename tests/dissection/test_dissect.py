@@ -28,8 +28,8 @@ from pdtui.probing.start_states import collect_start_states
 from pdtui.robots.robot_goals import WALKING_GOALS
 from pdtui.search.behavior_search import BehaviorSearchResult, SearchStartStates
 from pdtui.search.controller_search import ControllerSearchResult
+from pdtui.search.evolutionary_search import SharedTimeBudget
 from pdtui.search.goal_scores import measure_goal_gains, score_plans_by_goal
-from pdtui.search.plan_search import SharedTimeBudget
 from pdtui.spectra.matching_presets import PRESETS, find_matching_preset, list_preset_values
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import MeasuredEffect, PidGains

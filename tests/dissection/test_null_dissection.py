@@ -12,7 +12,7 @@ from rich.console import Console
 
 from pdtui.cli.dissect_command import dissect_command
 from pdtui.dissection.dissection_config import DissectionConfig
-from pdtui.dissection.null_dissection import NullDissection, NullDraws, dissect_null
+from pdtui.dissection.null_dissection import NullDissection, NullDraws, count_false_confirmations
 from tests.small_dissection import SMALL
 from tests.small_worlds import Dot, dot_policy
 
@@ -23,7 +23,9 @@ STATED = replace(
 
 @pytest.fixture(scope="module")
 def tested() -> NullDissection:
-    return dissect_null(DissectionConfig(Dot(), dot_policy(), settings=STATED, episodes=2, workers=1), 60)
+    return count_false_confirmations(
+        DissectionConfig(Dot(), dot_policy(), settings=STATED, episodes=2, workers=1), 60
+    )
 
 
 def test_of_nothing_no_more_is_confirmed_than_stated(tested: NullDissection) -> None:

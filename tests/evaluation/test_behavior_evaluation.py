@@ -18,11 +18,11 @@ from pdtui.core.units import Stimulation
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.behavior_evaluation import MapEvaluation, evaluate_behaviors, plan_evaluation
 from pdtui.evaluation.behavior_tables import behavior_tables
+from pdtui.evaluation.disturbance_conditions import CONDITIONS
 from pdtui.evaluation.evaluation_tables import tracking_table
 from pdtui.evaluation.paired_statistics import holm_correction
 from pdtui.evaluation.policy_evaluation import evaluate_policy
 from pdtui.evaluation.protocol_settings import ProtocolSettings
-from pdtui.evaluation.run_conditions import CONDITIONS
 from pdtui.evaluation.target_tracking import evaluate_target_tracking, find_pid_behaviors
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot

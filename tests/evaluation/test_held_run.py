@@ -14,15 +14,15 @@ from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.session_replay import replay_session
+from pdtui.evaluation.disturbance_conditions import CONDITIONS, UNDISTURBED, find_condition, plan_pushes
 from pdtui.evaluation.held_run import (
     HeldRunPlan,
     drive_held_run,
-    measure_push,
+    measure_intervention,
     record_held_run,
     run_held_behavior,
 )
 from pdtui.evaluation.protocol_settings import RunTimes
-from pdtui.evaluation.run_conditions import CONDITIONS, UNDISTURBED, find_condition, plan_pushes
 from pdtui.robots import make_robot
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.streams.step_block_reader import read_step_blocks
@@ -95,7 +95,7 @@ def test_a_fall_is_counted_from_the_press_and_ends_the_trace(step: int, fell_at:
 @pytest.mark.parametrize("condition", CONDITIONS, ids=lambda one: one.name)
 def test_every_condition_repeats_itself_and_leaves_no_trace(loop: ControlLoop, condition: Any) -> None:
     times = RunTimes(press=70, held=20, after=10, window=10, bin=5, dt=0.05)
-    spread = measure_push(loop, HeldRunPlan("", 3, times)).observation_spread
+    spread = measure_intervention(loop, HeldRunPlan("", 3, times)).observation_spread
     usual = [record.digest for record in drive_held_run(loop, HeldRunPlan("push", 3, times))]
     plan = HeldRunPlan("push", 3, times, condition, observation_spread=spread)
     disturbed = [record.digest for record in drive_held_run(loop, plan)]

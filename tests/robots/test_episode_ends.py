@@ -23,7 +23,7 @@ from pdtui.probing.stimulated_rollout import run_rollout
 from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
 from pdtui.robots.robot import Robot
 from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
-from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
+from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
 from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.stimulation.map_reader import parse_map
 
@@ -114,7 +114,7 @@ def test_a_task_is_judged_on_what_the_episode_has(robot: Sprinter, walk: int) ->
         return TaskVerdict(not trace.fell, float(len(trace)), {})
 
     task = Task("run", "r", "runs", "any way", (walk, walk), 50, judge)
-    (verdict,) = judge_stimulations(robot, _policy(), task, [TimedStimulation()], 0)
+    (verdict,) = judge_stimulations(robot, _policy(), task, [StimulationWithDuration()], 0)
     if walk > LAST:
         assert verdict == TaskVerdict(False, 0.0, {})
     else:

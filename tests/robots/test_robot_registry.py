@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import RobotError
-from pdtui.robots import make_robot, resolve_robot_name, robot_file_stem
+from pdtui.robots import make_robot, require_robot_name, robot_file_stem
 
 GUIDE = Path(__file__).parents[2] / "pdtui" / "guide" / "your-world.md"
 MODULE = """\
@@ -49,9 +49,9 @@ def test_an_unknown_name_lists_close_ones() -> None:
     with pytest.raises(RobotError, match="unknown robot 'Hoper-v5'; did you mean Hopper-v5"):
         make_robot("Hoper-v5")
     with pytest.raises(RobotError, match="unknown robot 'qqqqqqqq'; available: a1, a1-vision, ant, anymal, "):
-        resolve_robot_name("qqqqqqqq")
+        require_robot_name("qqqqqqqq")
     with pytest.raises(RobotError, match="unknown robot 'Hopper'"):
-        resolve_robot_name("Hopper")  # a map must say which version its numbers hold for
+        require_robot_name("Hopper")  # a map must say which version its numbers hold for
 
 
 def test_an_environment_that_needs_more_says_what_to_install(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_a_module_that_the_user_named_is_imported(tmp_path: Path) -> None:
 
 def test_a_module_that_is_imported_already_is_looked_up(tmp_path: Path) -> None:
     (tmp_path / "things.py").write_text(MODULE)
-    code = "import things; from pdtui.robots import resolve_robot_name as r; print(r('things:Thing-v0'))"
+    code = "import things; from pdtui.robots import require_robot_name as r; print(r('things:Thing-v0'))"
     assert run_python(code, tmp_path).stdout == "things:Thing-v0\n"
 
 
@@ -221,8 +221,8 @@ USES = """
 import sys
 from pathlib import Path
 {prepare}
-from pdtui.robots import resolve_robot_name, make_robot, list_robot_names
-assert resolve_robot_name("iron-cart") in list_robot_names()
+from pdtui.robots import require_robot_name, make_robot, list_robot_names
+assert require_robot_name("iron-cart") in list_robot_names()
 assert not {{"gymnasium", "mujoco"}} & set(sys.modules)
 import numpy as np
 from pdtui.core.units import NO_STIMULATION
@@ -232,7 +232,7 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import drive_headless
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.policies.weights.policy_loading import load_policy
-from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
+from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
 from pdtui.stimulation.map_library import map_without_behaviors
 from tests.small_dissection import SMALL
 {train}
@@ -242,7 +242,7 @@ assert policy.layers == (4, 4)
 alone = map_without_behaviors("iron-cart", str(weights))
 loop = build_control_loop(DriveConfig("iron-cart", alone, 3, start="moving"))
 assert drive_headless(loop, {{}}, 40, None).steps == 40
-(verdict,) = judge_stimulations(robot, policy, robot.find_task("run"), [TimedStimulation()], 0)
+(verdict,) = judge_stimulations(robot, policy, robot.find_task("run"), [StimulationWithDuration()], 0)
 assert list(verdict.figures) == ["way (m)"]
 found = dissect(DissectionConfig(robot, policy, episodes=1, settings=SMALL, budget_minutes=0.0))
 assert [one.goal.name for one in found.behaviors] == ["rush"] and not found.controllers

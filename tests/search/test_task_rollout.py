@@ -14,7 +14,7 @@ from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
 from pdtui.robots.task import TaskRunTrace, TaskVerdict, find_task
 from pdtui.robots.walker import WALKER_TASKS
-from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
+from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
 
 WALKER = ("vx", "right foot clearance", "left foot clearance")
 BIPED = ("vx", "height", "pitch", "foot 1 contact", "foot 2 contact")
@@ -156,8 +156,10 @@ def test_bursts_of_one_seed_begin_from_the_same_walk(robot: str) -> None:
     """Judged together or alone, a plan does the same; an empty one is the untouched policy."""
     world, policy = make_robot(robot), load_policy(robot, robot)
     task = world.tasks[0]
-    plan = TimedStimulation(Stimulation.of({3: 5.0}), 20)
-    together = judge_stimulations(world, policy, task, [TimedStimulation(), plan, TimedStimulation()], 5)
+    plan = StimulationWithDuration(Stimulation.of({3: 5.0}), 20)
+    together = judge_stimulations(
+        world, policy, task, [StimulationWithDuration(), plan, StimulationWithDuration()], 5
+    )
     assert together[0] == together[2]
     assert judge_stimulations(world, policy, task, [plan], 5) == [together[1]]
     assert together[0] != together[1]

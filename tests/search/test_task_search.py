@@ -14,8 +14,8 @@ from safetensors.torch import save_file
 from pdtui.cli import main
 from pdtui.policies.weights.weights_file import find_weights_file
 from pdtui.probing.rollout_pool import RolloutPool
-from pdtui.search.plan_search import SharedTimeBudget
-from pdtui.search.task_rollout import TimedStimulation, judge_stimulations
+from pdtui.search.evolutionary_search import SharedTimeBudget
+from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
 from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearch
 from pdtui.stimulation.map_reader import load_map
 
@@ -29,7 +29,7 @@ def test_what_is_found_scores_above_the_untouched_policy_where_it_was_found_and_
             search = TaskSearch(pool, task, 1000, settings)
             results.append(search.run(SharedTimeBudget(None).share()))
             untouched = [
-                judge_stimulations(pool.robot, pool.policy, task, [TimedStimulation()], seed)[0].score
+                judge_stimulations(pool.robot, pool.policy, task, [StimulationWithDuration()], seed)[0].score
                 for seed in search.seeds[0]
             ]
     first, again = results

@@ -16,15 +16,15 @@ import numpy as np
 
 from pdtui.core.attributes import unwrap_angles
 from pdtui.driving.control_loop import ControlLoop
+from pdtui.evaluation.disturbance_conditions import UNDISTURBED, find_condition
 from pdtui.evaluation.evaluation_plan import MEASURED_SEEDS, EvaluationPlan, SubstituteKind
-from pdtui.evaluation.held_run import HeldRunPlan, PushMeasurement, begin_held_run
+from pdtui.evaluation.held_run import HeldRunPlan, InterventionMeasurement, begin_held_run
 from pdtui.evaluation.protocol_settings import RunTimes, plan_run_times
-from pdtui.evaluation.run_conditions import UNDISTURBED, find_condition
 from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 from pdtui.search.task_rollout import count_walk_steps
 
 
-class TaskRun(NamedTuple):
+class TaskRunKey(NamedTuple):
     """One run of a task.
 
     Attributes:
@@ -52,7 +52,7 @@ class TaskRun(NamedTuple):
 class TaskEpisode:
     """A run of a task with everything that it takes to run it."""
 
-    run: TaskRun
+    run: TaskRunKey
     plan: HeldRunPlan
 
 
@@ -73,7 +73,7 @@ class TaskRunResult:
     began: bool = True
 
 
-def list_task_runs(plan: EvaluationPlan) -> list[TaskRun]:
+def list_task_runs(plan: EvaluationPlan) -> list[TaskRunKey]:
     """Return the runs of all tasks; only those in the robot's own world include a long hold."""
     runs = []
     for behavior in plan.tasked:
@@ -82,16 +82,16 @@ def list_task_runs(plan: EvaluationPlan) -> list[TaskRun]:
         for condition in plan.conditions:
             long = condition == UNDISTURBED.name and behavior.period is None
             seeds = plan.seeds_of(condition)
-            runs += [TaskRun(name, seed, True, held if long else task.steps, condition) for seed in seeds]
-            runs += [TaskRun(name, seed, False, task.steps, condition) for seed in seeds]
+            runs += [TaskRunKey(name, seed, True, held if long else task.steps, condition) for seed in seeds]
+            runs += [TaskRunKey(name, seed, False, task.steps, condition) for seed in seeds]
         runs += [
-            TaskRun(name, seed, True, task.steps, UNDISTURBED.name, kind, draw)
+            TaskRunKey(name, seed, True, task.steps, UNDISTURBED.name, kind, draw)
             for kind, draws in plan.substitutes_of(behavior)
             for draw in range(draws)
             for seed in plan.seeds[: plan.settings.draw_seeds]
         ]
         runs += [
-            TaskRun(name, seed, pressed, task.steps, after=earlier.name)
+            TaskRunKey(name, seed, pressed, task.steps, after=earlier.name)
             for earlier in plan.tasked
             if earlier.task == task.follows
             for pressed in (True, False)
@@ -100,12 +100,12 @@ def list_task_runs(plan: EvaluationPlan) -> list[TaskRun]:
     return runs
 
 
-def count_task_steps(plan: EvaluationPlan, run: TaskRun) -> int:
+def count_task_steps(plan: EvaluationPlan, run: TaskRunKey) -> int:
     """Return how many control steps a run of a task has; a fall makes it fewer."""
     return _press_step(plan.loop, run) + run.steps
 
 
-def _press_step(loop: ControlLoop, run: TaskRun) -> int:
+def _press_step(loop: ControlLoop, run: TaskRunKey) -> int:
     """Return the control step before which the behavior is pressed."""
     first = _task_of(loop, run.after or run.behavior)
     return count_walk_steps(first, run.seed) + (first.steps if run.after else 0)
@@ -134,7 +134,7 @@ def task_measuring_runs(plan: EvaluationPlan) -> list[HeldRunPlan]:
 
 
 def plan_task_episode(
-    plan: EvaluationPlan, run: TaskRun, measured: Mapping[str, Sequence[PushMeasurement]]
+    plan: EvaluationPlan, run: TaskRunKey, measured: Mapping[str, Sequence[InterventionMeasurement]]
 ) -> TaskEpisode | None:
     """Return what to run.
 

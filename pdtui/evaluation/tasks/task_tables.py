@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from rich.table import Table
 
 from pdtui.core.text_tables import format_p_value, new_table
+from pdtui.evaluation.disturbance_conditions import UNDISTURBED
 from pdtui.evaluation.protocol_settings import ProtocolSettings
-from pdtui.evaluation.run_conditions import UNDISTURBED
-from pdtui.evaluation.tasks.task_evaluation import TaskEvaluation
+from pdtui.evaluation.tasks.task_success import TaskEvaluation
 
 
 def task_tables(title: str, rows: Sequence[TaskEvaluation], settings: ProtocolSettings) -> list[Table]:

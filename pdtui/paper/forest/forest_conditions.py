@@ -31,7 +31,7 @@ from pdtui.paper.forest.key_motion_fit import fit_key_motion_models
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
 from pdtui.paper.forest.scripted_operator import operator_keys
 from pdtui.policies.weights.weights_file import find_weights_file
-from pdtui.robots import resolve_robot_name, robot_file_stem
+from pdtui.robots import require_robot_name, robot_file_stem
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 ForestCondition = Literal["alone", "operator", "vision"]
@@ -180,7 +180,7 @@ def _configs(
 
 def _with_vision(config: DriveConfig) -> DriveConfig:
     """Return the drive of the robot with vision, with its shipped policy and without behaviors."""
-    name = resolve_robot_name(f"{config.robot}-vision")
+    name = require_robot_name(f"{config.robot}-vision")
     try:
         find_weights_file(name)
     except PolicyError as error:

@@ -13,14 +13,13 @@ from rich.console import Console
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.behavior_evaluation import MapEvaluation, evaluate_behaviors, plan_evaluation
+from pdtui.evaluation.behavior_substitutes import InterventionSize, draw_random_direction
 from pdtui.evaluation.behavior_tables import behavior_tables
+from pdtui.evaluation.disturbance_conditions import CONDITIONS
 from pdtui.evaluation.evaluation_plan import EvaluationPlan
-from pdtui.evaluation.held_run import PushMeasurement, measure_push
+from pdtui.evaluation.held_run import InterventionMeasurement, measure_intervention
 from pdtui.evaluation.paired_statistics import holm_correction
 from pdtui.evaluation.protocol_settings import ProtocolSettings
-from pdtui.evaluation.run_conditions import CONDITIONS
-from pdtui.evaluation.substitute_pushes import PushSize, draw_random_direction
-from pdtui.evaluation.tasks.task_evaluation import TaskEvaluation
 from pdtui.evaluation.tasks.task_runs import (
     count_task_steps,
     list_task_runs,
@@ -28,6 +27,7 @@ from pdtui.evaluation.tasks.task_runs import (
     run_task_episode,
     task_measuring_runs,
 )
+from pdtui.evaluation.tasks.task_success import TaskEvaluation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 from pdtui.stimulation.map_library import find_map
@@ -113,7 +113,7 @@ def test_substitutes_are_judged_by_the_same_task(rows: list[TaskEvaluation]) -> 
     # The unit is the action, so a push on the actions is the behavior itself.
     assert (actions.kind, actions.draws, actions.as_good, actions.done) == ("actions", 1, 1, 2)
     assert (actions.own_done, actions.falls) == (2, 0)
-    size = PushSize({0: 0.5}, ())
+    size = InterventionSize({0: 0.5}, ())
     drawn = [draw_random_direction(size, (2,), "veer", draw).added[0] for draw in range(24)]
     enough = 0.5 * 0.3 / rows[0].figures["turned (rad)"]  # it turns in proportion to its first action
     turning = sum(first > enough for first, _ in drawn)
@@ -192,7 +192,7 @@ def test_a_task_of_the_a1_is_planned_in_every_world_and_runs_there() -> None:
     plan = plan_evaluation(_config_of_one("a1", "left"), [100], REAL)
     usual = [run for run in list_task_runs(plan) if run.pressed and run.kind == "units"]
     assert [run.condition for run in usual] == [one.name for one in CONDITIONS]
-    measured = {"": [PushMeasurement(None, np.zeros(93))]}
+    measured = {"": [InterventionMeasurement(None, np.zeros(93))]}
     figures = []
     for run in (usual[1], usual[3], usual[6]):  # pushed, friction −20 %, mass +20 %
         episode = plan_task_episode(plan, run, measured)
@@ -208,7 +208,7 @@ def test_a_push_is_measured_from_the_start_of_the_task_on() -> None:
     (run,) = task_measuring_runs(plan)
     # It is pressed at once, in a split, and measured for the half second that is less than its period.
     assert (run.start, run.times.press, run.times.window) == ("split", 0, 36)
-    found = measure_push(plan.loop, run)
+    found = measure_intervention(plan.loop, run)
     robot, policy = plan.loop.robot, plan.loop.policy
     observation, _ = robot.reset(seed=100, options={"start": "split"})
     outputs, shifts = plan.outputs(plan.tasked[0]), []

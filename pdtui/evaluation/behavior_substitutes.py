@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from pdtui.core.units import Stimulation, split_flat_index
 from pdtui.driving.control_loop import PolicyAct
+from pdtui.evaluation.disturbance_conditions import shift_action
 from pdtui.evaluation.protocol_settings import RandomPurpose, purpose_generator
-from pdtui.evaluation.run_conditions import shift_action
 from pdtui.policies.runtime.policy import Policy, PolicyStep
 from pdtui.robots.robot import Robot
 
 
-class SubstitutePush(Protocol):
+class BehaviorSubstitute(Protocol):
     """Acts in a behavior's place while it is latched."""
 
     def act(self, policy: Policy, robot: Robot, observation: NDArray[Any]) -> PolicyStep:
@@ -65,7 +65,7 @@ class RandomDirection:
 
 
 @dataclass(frozen=True)
-class ActionPush:
+class ActionShift:
     """The mean change that the behavior makes to the action, added to the action of the untouched policy."""
 
     shift: tuple[float, ...]
@@ -77,7 +77,7 @@ class ActionPush:
 
 
 @dataclass(frozen=True)
-class PushSize:
+class InterventionSize:
     """How far a behavior moves units and actions, on average over the steps in which it is held.
 
     Attributes:
@@ -89,8 +89,8 @@ class PushSize:
     action: tuple[float, ...]
 
 
-class PushSizeMeter:
-    """Measures a `PushSize` and the spread of observations while it acts in the policy's place."""
+class InterventionSizeMeter:
+    """Measures a `InterventionSize` and the spread of observations while it acts in the policy's place."""
 
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
@@ -120,18 +120,18 @@ class PushSizeMeter:
                 self._squares.setdefault(layer, []).append(length)
         return acted
 
-    def size(self) -> PushSize | None:
+    def size(self) -> InterventionSize | None:
         """Return what was measured; None if no unit was overwritten."""
         if not self._shifts:
             return None
         layers = {layer: float(np.sqrt(np.mean(squares))) for layer, squares in self._squares.items()}
-        return PushSize(layers, tuple(np.mean(self._shifts, axis=0).ravel().tolist()))
+        return InterventionSize(layers, tuple(np.mean(self._shifts, axis=0).ravel().tolist()))
 
 
-def mean_push_size(sizes: Sequence[PushSize]) -> PushSize:
+def mean_intervention_size(sizes: Sequence[InterventionSize]) -> InterventionSize:
     """Return the mean of what was measured on several seeds."""
     layers = {layer: float(np.mean([size.layers[layer] for size in sizes])) for layer in sizes[0].layers}
-    return PushSize(layers, tuple(np.mean([size.action for size in sizes], axis=0).tolist()))
+    return InterventionSize(layers, tuple(np.mean([size.action for size in sizes], axis=0).tolist()))
 
 
 def draw_random_units(outputs: Stimulation, layers: Sequence[int], behavior: str, draw: int) -> RandomUnits:
@@ -157,7 +157,9 @@ def draw_random_units(outputs: Stimulation, layers: Sequence[int], behavior: str
     return RandomUnits(Stimulation.of(dict(sorted(values.items()))))
 
 
-def draw_random_direction(size: PushSize, layers: Sequence[int], behavior: str, draw: int) -> RandomDirection:
+def draw_random_direction(
+    size: InterventionSize, layers: Sequence[int], behavior: str, draw: int
+) -> RandomDirection:
     """Draw a direction of each layer that a behavior overwrites, as long as its own change of that layer."""
     rng = purpose_generator(RandomPurpose.RANDOM_DIRECTION, draw, crc32(behavior.encode()))
     added = {}
@@ -168,7 +170,7 @@ def draw_random_direction(size: PushSize, layers: Sequence[int], behavior: str, 
 
 
 def act_in_place(
-    act: PolicyAct, policy: Policy, robot: Robot, substitute: SubstitutePush | None
+    act: PolicyAct, policy: Policy, robot: Robot, substitute: BehaviorSubstitute | None
 ) -> PolicyAct:
     """Return what acts with a substitute for the stimulation while there is one."""
     if substitute is None:

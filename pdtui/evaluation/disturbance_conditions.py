@@ -24,7 +24,7 @@ SPREAD_STEPS = 25
 
 
 @dataclass(frozen=True)
-class EvaluationCondition:
+class DisturbanceCondition:
     """A way to disturb a run.
 
     Attributes:
@@ -56,30 +56,30 @@ class EvaluationCondition:
         )
 
 
-UNDISTURBED = EvaluationCondition("undisturbed", "the robot's own world")
+UNDISTURBED = DisturbanceCondition("undisturbed", "the robot's own world")
 CONDITIONS = (
     UNDISTURBED,
-    EvaluationCondition(
+    DisturbanceCondition(
         "pushed", "up to ±0.8 m/s every 1 to 3 s, as large as in ANYmal's training", push=0.8
     ),
-    EvaluationCondition("pushed hard", "twice as strongly", push=1.6),
-    EvaluationCondition("friction −20 %", "all surfaces", friction=0.8),
-    EvaluationCondition("friction +20 %", "all surfaces", friction=1.2),
-    EvaluationCondition("mass −20 %", "all bodies", mass=0.8),
-    EvaluationCondition("mass +20 %", "all bodies", mass=1.2),
-    EvaluationCondition("noisy sensors", "10 % of each observation's standard deviation", noise=0.1),
-    EvaluationCondition("spread starts", "the first 25 actions half random", spread=0.5),
+    DisturbanceCondition("pushed hard", "twice as strongly", push=1.6),
+    DisturbanceCondition("friction −20 %", "all surfaces", friction=0.8),
+    DisturbanceCondition("friction +20 %", "all surfaces", friction=1.2),
+    DisturbanceCondition("mass −20 %", "all bodies", mass=0.8),
+    DisturbanceCondition("mass +20 %", "all bodies", mass=1.2),
+    DisturbanceCondition("noisy sensors", "10 % of each observation's standard deviation", noise=0.1),
+    DisturbanceCondition("spread starts", "the first 25 actions half random", spread=0.5),
 )
 """Every condition, the undisturbed one first."""
 
 
-def find_condition(name: str) -> EvaluationCondition:
+def find_condition(name: str) -> DisturbanceCondition:
     """Return the condition of a name."""
     return next(condition for condition in CONDITIONS if condition.name == name)
 
 
 @contextmanager
-def disturbed_world(robot: Robot, condition: EvaluationCondition) -> Iterator[None]:
+def disturbed_world(robot: Robot, condition: DisturbanceCondition) -> Iterator[None]:
     """Give the robot the condition's friction and masses while the block runs; begin it before the reset."""
     scaled = condition.friction != 1.0 or condition.mass != 1.0
     with robot.scaled_physics(condition.friction, condition.mass) if scaled else nullcontext():
@@ -87,7 +87,7 @@ def disturbed_world(robot: Robot, condition: EvaluationCondition) -> Iterator[No
 
 
 def disturb_policy(
-    act: PolicyAct, robot: Robot, condition: EvaluationCondition, seed: int, observation_spread: Floats
+    act: PolicyAct, robot: Robot, condition: DisturbanceCondition, seed: int, observation_spread: Floats
 ) -> PolicyAct:
     """Return what acts in a condition's place: with noisy observations, or with half random first actions.
 
@@ -126,7 +126,7 @@ def disturb_policy(
 
 
 def plan_pushes(
-    condition: EvaluationCondition, seed: int, dt: float, steps: int
+    condition: DisturbanceCondition, seed: int, dt: float, steps: int
 ) -> dict[int, tuple[float, float]]:
     """Return the pushes of a run, changes of vx and vy, by the control step before which they come."""
     if not condition.push:

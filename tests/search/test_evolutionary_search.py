@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from pdtui.search.plan_search import (
+from pdtui.search.evolutionary_search import (
     EvolutionarySearch,
     EvolutionProblem,
     EvolutionSettings,
@@ -95,7 +95,7 @@ def test_a_search_out_of_time_returns_the_best_of_its_first_plans() -> None:
 
 def test_a_time_budget_is_shared_by_the_searches_to_come(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 1000.0
-    monkeypatch.setattr("pdtui.search.plan_search.time.monotonic", lambda: now)
+    monkeypatch.setattr("pdtui.search.evolutionary_search.time.monotonic", lambda: now)
     budget = SharedTimeBudget(1.0)
     first = budget.share(3)
     assert not first()

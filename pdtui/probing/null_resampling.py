@@ -23,7 +23,7 @@ from pdtui.spectra.matching import UnitDiscrepancies
 
 
 @dataclass(frozen=True)
-class NullTrials:
+class NullResampler:
     """What draws of a null are made from. All that a draw confirms is false.
 
     Attributes:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pdtui.robots.simulators.urdf_links import read_urdf_links
+from pdtui.robots.simulators.urdf_link_shapes import read_urdf_link_shapes
 
 ROBOT = """<robot name="r">
   <link name="base"><collision><geometry><box size="0.4 0.2 0.1"/></geometry></collision></link>
@@ -24,7 +24,7 @@ ROBOT = """<robot name="r">
 def test_shapes_of_fixed_links_move_with_the_body_that_they_are_fixed_to(tmp_path: Path) -> None:
     path = tmp_path / "robot.urdf"
     path.write_text(ROBOT)
-    base, arm, tip = read_urdf_links(path, ("base", "arm"))
+    base, arm, tip = read_urdf_link_shapes(path, ("base", "arm"))
     assert (base.body, base.shape, base.size) == (0, "box", (0.2, 0.1, 0.05))
     assert (arm.body, arm.shape, arm.position) == (1, "capsule", (0.0, 0.0, -0.1))
     np.testing.assert_allclose(arm.size, (0.05, 0.1))

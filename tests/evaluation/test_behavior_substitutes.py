@@ -9,15 +9,15 @@ from pdtui.core.units import Stimulation
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.evaluation.held_run import HeldRunPlan, drive_held_run, measure_push
-from pdtui.evaluation.protocol_settings import RunTimes
-from pdtui.evaluation.substitute_pushes import (
-    ActionPush,
-    PushSize,
+from pdtui.evaluation.behavior_substitutes import (
+    ActionShift,
+    InterventionSize,
     RandomDirection,
     draw_random_direction,
     draw_random_units,
 )
+from pdtui.evaluation.held_run import HeldRunPlan, drive_held_run, measure_intervention
+from pdtui.evaluation.protocol_settings import RunTimes
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -49,7 +49,7 @@ def test_random_units_are_others_of_the_same_layers_at_the_same_dose() -> None:
 
 
 def test_a_random_direction_is_as_long_as_the_behaviors_own_change(policy: Policy) -> None:
-    drawn = draw_random_direction(PushSize({0: 2.5, 1: 0.5}, ()), (16, 16), "push", 0)
+    drawn = draw_random_direction(InterventionSize({0: 2.5, 1: 0.5}, ()), (16, 16), "push", 0)
     assert [np.linalg.norm(drawn.added[layer]) for layer in (0, 1)] == pytest.approx([2.5, 0.5])
     observation = np.random.default_rng(1).normal(size=27)
     natural = policy.act(observation).activations
@@ -72,17 +72,17 @@ def test_the_push_is_measured_where_the_behavior_is_held(loop: ControlLoop, poli
             shifts.append(acted.action - natural.action)
             squares.append((acted.activations[3] - natural.activations[3]) ** 2)
         observation, *_ = robot.step(acted.action)
-    found = measure_push(loop, HeldRunPlan("push", 5, TIMES)).size
+    found = measure_intervention(loop, HeldRunPlan("push", 5, TIMES)).size
     assert found is not None
     assert found.action == pytest.approx(np.mean(shifts, axis=0), abs=1e-6)
     assert found.layers[0] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-5)
     assert set(found.layers) == {0, 1}
-    assert measure_push(loop, HeldRunPlan("", 5, TIMES)).size is None
+    assert measure_intervention(loop, HeldRunPlan("", 5, TIMES)).size is None
 
 
 def test_a_substitute_acts_only_while_the_behavior_is_held() -> None:
     loop = turning_loop()
-    records = list(drive_held_run(loop, HeldRunPlan("turn", 1, TIMES, substitute=ActionPush((0.25, -0.5)))))
+    records = list(drive_held_run(loop, HeldRunPlan("turn", 1, TIMES, substitute=ActionShift((0.25, -0.5)))))
     assert len(records) == TIMES.steps
     for record in records:
         held = TIMES.press <= record.step < TIMES.press + TIMES.held
@@ -91,5 +91,5 @@ def test_a_substitute_acts_only_while_the_behavior_is_held() -> None:
 
 def test_a_push_stays_within_the_range_of_actions() -> None:
     loop = turning_loop()
-    records = list(drive_held_run(loop, HeldRunPlan("turn", 1, TIMES, substitute=ActionPush((0.0, 9.0)))))
+    records = list(drive_held_run(loop, HeldRunPlan("turn", 1, TIMES, substitute=ActionShift((0.0, 9.0)))))
     assert max(record.action[1] for record in records) == 4.0

@@ -15,7 +15,7 @@ from pdtui.core.robot_links_and_state import Link
 from pdtui.robots.geometry import multiply_quaternions
 
 
-def read_urdf_links(path: Path, bodies: Sequence[str]) -> tuple[Link, ...]:
+def read_urdf_link_shapes(path: Path, bodies: Sequence[str]) -> tuple[Link, ...]:
     """Return the boxes, spheres and cylinders among the collision shapes of a robot.
 
     A link on a fixed joint belongs to the body that it is fixed to. A cylinder becomes a capsule of the same

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pdtui.evaluation.disturbance_conditions import UNDISTURBED
 from pdtui.evaluation.evaluation_plan import EvaluationPlan
 from pdtui.evaluation.paired_statistics import holm_correction, share_interval, sign_flip_p_value
-from pdtui.evaluation.run_conditions import UNDISTURBED
-from pdtui.evaluation.tasks.task_runs import TaskRun, TaskRunResult
+from pdtui.evaluation.tasks.task_runs import TaskRunKey, TaskRunResult
 from pdtui.robots.task import average_figures
 from pdtui.stimulation.stimulation_map import Behavior
 
-TaskResults = Mapping[TaskRun, TaskRunResult]
+TaskResults = Mapping[TaskRunKey, TaskRunResult]
 
 
 @dataclass(frozen=True)
-class TaskSubstituteFigures:
+class TaskSubstituteSuccess:
     """How a substitute for the behavior's units did in the task, on seeds on which the behavior was run, too.
 
     Attributes:
@@ -91,7 +91,7 @@ class TaskEvaluation:
     seed_scores: tuple[float, ...]
     figures: dict[str, float]
     figures_by_itself: dict[str, float]
-    substitutes: tuple[TaskSubstituteFigures, ...] = ()
+    substitutes: tuple[TaskSubstituteSuccess, ...] = ()
 
 
 def summarise_tasks(plan: EvaluationPlan, results: TaskResults) -> tuple[TaskEvaluation, ...]:
@@ -157,7 +157,7 @@ def _summarise(
     )
 
 
-def _summarise_substitutes(done: Sequence[bool], own: TaskResults) -> tuple[TaskSubstituteFigures, ...]:
+def _summarise_substitutes(done: Sequence[bool], own: TaskResults) -> tuple[TaskSubstituteSuccess, ...]:
     kinds: dict[str, dict[int, list[TaskRunResult]]] = {}
     for run, one in own.items():
         if run.kind != "units":
@@ -171,7 +171,7 @@ def _summarise_substitutes(done: Sequence[bool], own: TaskResults) -> tuple[Task
         low, high = share_interval(as_good, len(draws))
         falls = sum(one.fell for drawn in draws.values() for one in drawn)
         figures.append(
-            TaskSubstituteFigures(
+            TaskSubstituteSuccess(
                 kind, len(draws), seeds, as_good, low, high, sum(successes), own_done, falls
             )
         )
