@@ -11,9 +11,9 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
-from scipy import stats
 
 from pdtui.core.attributes import Floats
+from pdtui.core.confidence_intervals import PairedRatio, paired_ratio
 from pdtui.core.errors import MapError
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
@@ -29,20 +29,6 @@ from pdtui.stimulation.stimulation_map import Behavior
 
 ATTRIBUTE = "yaw"
 ControlInput = Literal["command", "units", "both"]
-
-
-@dataclass(frozen=True)
-class TrackingErrorRatio:
-    """Mean |error| with units over mean |error| with the command.
-
-    Attributes:
-        value: ratio of the means over seeds.
-        low, high: 95 % interval, bootstrapped over pairs of the same seed.
-    """
-
-    value: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -64,7 +50,7 @@ class HeadingControllerResult:
     inputs: tuple[str, ...]
     other_commands: dict[str, float]
     tracking: TrackingSummary
-    ratio: TrackingErrorRatio | None
+    ratio: PairedRatio | None
     headings: Floats
 
 
@@ -182,20 +168,8 @@ def _rows(
 
 def paired_error_ratio(
     units: Sequence[TrackingDriveResult], command: Sequence[TrackingDriveResult]
-) -> TrackingErrorRatio:
+) -> PairedRatio:
     """Return the ratio of mean |error| over the seeds on which both drives reached the first target."""
     above, below = mean_errors_by_seed(units), mean_errors_by_seed(command)
     both = np.isfinite(above) & np.isfinite(below)
-    above, below = above[both], below[both]
-    value = float(above.mean() / below.mean()) if len(above) else float("nan")
-    if len(above) < 2:
-        return TrackingErrorRatio(value, 0.0, float("inf"))
-    drawn = stats.bootstrap(
-        (above, below),
-        lambda a, b, axis: a.mean(axis=axis) / b.mean(axis=axis),
-        paired=True,
-        vectorized=True,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    return TrackingErrorRatio(value, float(drawn.low), float(drawn.high))
+    return paired_ratio(above[both], below[both])

@@ -59,8 +59,8 @@ def build_heading_figure(result: HeadingPrecisionComparison) -> HeadingFigure:
 
 def heading_precision_table(result: HeadingPrecisionComparison) -> Table:
     """Return a table with one column per behavior, map by map."""
-    from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
-    from pdtui.evaluation.evaluation_tables import add_tracking_figures
+    from pdtui.core.text_tables import format_seed_range, new_table
+    from pdtui.evaluation.evaluation_tables import add_tracking_figures, format_ratio
     from pdtui.search.tracking_drives import STEPS_EACH
 
     table = new_table(
@@ -76,10 +76,7 @@ def heading_precision_table(result: HeadingPrecisionComparison) -> Table:
     add_tracking_figures(table, [row.tracking for row in result.rows])
     ratios = [row.ratio for row in result.rows]
     if any(ratios):
-        cells = [
-            "" if one is None else format_mean_with_interval(one.value, one.low, one.high) for one in ratios
-        ]
-        table.add_row("|error| / |error| of the command", *cells)
+        table.add_row("|error| / |error| of the command", *map(format_ratio, ratios))
     targets = ", ".join(f"{target:g}" for target in result.targets)
     table.caption = (
         f"Targets: {targets} rad, {STEPS_EACH} steps each. Intervals: 95 %; that of the ratio pairs drives "

@@ -176,6 +176,8 @@ def test_tune_writes_only_what_is_better(map_path: Path, tmp_path: Path) -> None
     (found,) = json.loads(result.output)["behaviors"]
     pid = load_map(path).behaviors["hold heading"].pid
     assert pid is not None
-    wanted = found["new" if found["better"] else "old"]
-    assert (pid.kp, pid.ki, pid.kd, pid.limit) == tuple(wanted[name] for name in ("kp", "ki", "kd", "limit"))
+    kept = found["trials"][found["kept"]]["pid"]
+    assert found["gains"] == kept
+    assert found["better"] == (found["kept"] != "map")
+    assert (pid.kp, pid.ki, pid.kd, pid.limit) == tuple(kept[name] for name in ("kp", "ki", "kd", "limit"))
     assert (path.read_text() == map_path.read_text()) != found["better"]

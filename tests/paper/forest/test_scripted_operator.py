@@ -34,13 +34,13 @@ def _drive(
     trees: Floats, steps: int, *, driven: bool = True, moved_from: int | None = None
 ) -> tuple[Floats, dict[int, str]]:
     """Places before each step, shape (S, 3), and presses by step; from one step on, it sees itself aside."""
-    operator = ScriptedOperator(KEY_MODELS, trees, DT)
+    operator = ScriptedOperator(KEY_MODELS, DT)
     place, latched = RobotMotion(0.0, 0.0, 0.0, 0.0), 0
     places, presses = [], {}
     for step in range(steps):
         places.append((place.x, place.y, place.heading))
         aside = 1.0 if moved_from is not None and step >= moved_from else 0.0
-        if driven and (name := operator.choose_key(place.x, place.y + aside, place.heading)):
+        if driven and (name := operator.choose_key(place.x, place.y + aside, place.heading, trees)):
             presses[step] = name
             latched = NAMES.index(name)
         _, place = predict_motion(list(KEY_MODELS.values()), place, np.array([[latched]]), DT)
