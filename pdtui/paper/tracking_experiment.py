@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+
 from pdtui.paper.experiment import Experiment, ExperimentReport, ExperimentRequest
 
 if TYPE_CHECKING:
@@ -25,7 +27,7 @@ def run_tracking_experiment(request: ExperimentRequest) -> ExperimentReport:
 
     check_heading_picture_paths(request.pictures, request.overwrite)
     result = compare_heading_precision(
-        request.configs, request.seeds, workers=request.workers, progress=request.progress
+        request.configs, request.seeds, workers=request.workers, progress=request.progress, **request.options
     )
     draw_heading_pictures(request.pictures, build_heading_figure(result))
     data = {**result.as_dict(), "pictures": [str(path) for path in request.pictures]}
@@ -77,6 +79,13 @@ def heading_precision_table(result: HeadingPrecisionComparison) -> Table:
     ratios = [row.ratio for row in result.rows]
     if any(ratios):
         table.add_row("|error| / |error| of the command", *map(format_ratio, ratios))
+    pushed = [row.pushed for row in result.rows if row.pushed is not None]
+    if pushed:
+        table.add_section()
+        tracking = [one.tracking for one in pushed]
+        table.add_row(f"pushed, {format_seed_range(tracking[0].seeds)}", *("" for _ in pushed))
+        add_tracking_figures(table, tracking)
+        table.add_row("|error| / |error| of the command", *(format_ratio(one.ratio) for one in pushed))
     targets = ", ".join(f"{target:g}" for target in result.targets)
     table.caption = (
         f"Targets: {targets} rad, {STEPS_EACH} steps each. Intervals: 95 %; that of the ratio pairs drives "
@@ -95,5 +104,17 @@ def _other_commands(row: HeadingControllerResult) -> str:
 
 
 EXPERIMENT = Experiment(
-    "tracking", "holding headings", run_tracking_experiment, takes_several_maps=True, draws_pictures=True
+    "tracking",
+    "holding headings",
+    run_tracking_experiment,
+    (
+        click.Option(
+            ["--pushed"],
+            is_flag=True,
+            default=None,
+            help="Run the first 10 seeds again with pushes of up to ±0.8 m/s every 1 to 3 s.",
+        ),
+    ),
+    takes_several_maps=True,
+    draws_pictures=True,
 )
