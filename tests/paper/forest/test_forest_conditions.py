@@ -188,19 +188,6 @@ def test_conditions_and_a_person_stand_in_one_table(
     assert json.loads(json.dumps(asdict(result)))["seeds"] == [1, 2]
 
 
-def test_what_the_picture_does_not_show_changes_no_key(built: ControlLoop) -> None:
-    def keys_among(*trees: tuple[float, float, float]) -> tuple[str, ...]:
-        loop = _loop(built, 505)
-        loop.robot.obstacles = np.array(trees)
-        return drive_forest_episode(loop, 150, OperatorPresser(loop, KEY_MODELS))[0].keys
-
-    near = (1.5, 0.1, 0.3)
-    assert keys_among(near)
-    assert keys_among((9.0, 0.0, 0.3)) == ()
-    for hidden in ((6.5, 0.0, 0.3), (1.5, 2.6, 0.3), (-2.6, 0.0, 0.3)):
-        assert keys_among(near, hidden) == keys_among(near)
-
-
 def test_a_placebo_presses_the_same_keys_without_looking() -> None:
     keys = ("a", "d", "space", "a", "s")
 
