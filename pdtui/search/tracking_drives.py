@@ -15,7 +15,6 @@ from pdtui.core.worker_pool import WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.robots.simulators.mujoco_disturbances import push_trunk
 from pdtui.search.step_response import StepResponse, measure_step_response
 from pdtui.stimulation.stimulation_map import PidGains
 
@@ -132,7 +131,7 @@ def drive_through_targets(template: ControlLoop, drive: TrackingDriveJob) -> Tra
 
     def advance(events: Sequence[DriveEvent] = ()) -> StepRecord:
         if loop.step in drive.pushes:
-            push_trunk(loop.robot, *drive.pushes[loop.step])
+            loop.robot.push_trunk(*drive.pushes[loop.step])
         return loop.advance(events)
 
     for _ in range(STEPS_UNTOUCHED):
