@@ -33,12 +33,12 @@ from pdtui.policies.weights.import_options import ImportOptions
 @click.option(
     "--seeds",
     type=SeedList(),
-    default="2000-2009",
+    default="2000-2019",
     show_default=True,
     help="Range of seeds; the first half is for the search, the second for choosing between what it "
-    "found and the map's gains.",
+    "found, the best proportional controller and the map's gains.",
 )
-@integer_option("--points", default=48, help="Number of gains to try first, spread over their range.")
+@integer_option("--points", default=24, help="Number of gains to try first, spread over their range.")
 @integer_option("--refinements", least=0, default=24, help="Number of gains to try near the best ones.")
 @minutes_option("--minutes")
 @click.option("--dry-run", is_flag=True, help="Tune, but do not change the map.")
@@ -59,15 +59,17 @@ def tune_command(
 ) -> None:
     """Tune the PID gains of BEHAVIORs by their step responses, and write them into MAP.
 
-    Gains are written only if they are better on seeds that the search did not see. The map's comments are
-    kept.
+    On seeds that no search saw, what it found is compared with the map's gains and with the best
+    proportional controller, which is searched in the same way. The best of the three is written. The map's
+    comments are kept.
     """
     if bool(behaviors) == every:
         raise click.UsageError("expected either a BEHAVIOR or --all")
     if force and not dry_run:
         raise MapError("--force needs --dry-run: the map would get gains tuned for another policy")
     from pdtui.evaluation.evaluation_tables import tuning_table
-    from pdtui.search.gain_tuning import TuningSettings, tune_gains
+    from pdtui.search.gain_search import TuningSettings
+    from pdtui.search.gain_tuning import tune_gains
     from pdtui.stimulation.map_library import find_map
     from pdtui.stimulation.map_writer import add_seeds, replace_gains, rewrite_map
 
@@ -77,7 +79,7 @@ def tune_command(
         results = tune_gains(
             config, behaviors, seeds, settings=TuningSettings(**settings), workers=workers, progress=advance
         )
-    better = {one.behavior: one.new for one in results if one.better}
+    better = {one.behavior: one.gains for one in results if one.better}
     if better and not dry_run:
         source = str(path)
         rewrite_map(path, lambda text: add_seeds(replace_gains(text, better, source), [seeds], source))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from rich.console import Group
 from rich.table import Table
 
+from pdtui.core.confidence_intervals import PairedRatio
 from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.evaluation.policy_evaluation import PolicyEvaluation
 from pdtui.search.gain_tuning import TunedGains
@@ -50,19 +51,29 @@ def tracking_table(result: TrackingSummary) -> Table:
 
 
 def tuning_table(results: list[TunedGains]) -> Group:
-    """Return the gains and figures of each behavior, before and after tuning."""
+    """Return the gains and figures of each behavior: those of the map, and what tuning found."""
     return Group(*(part for result in results for part in (_gains_table(result), result.verdict)))
 
 
 def _gains_table(result: TunedGains) -> Table:
-    before = result.before
-    title = f"{result.behavior}: {before.attribute}, {format_seed_range(before.seeds)}"
-    table = new_table(title, "", "in the map", "best found")
-    for name in ("kp", "ki", "kd", "limit"):
-        table.add_row(name, *(f"{getattr(pid, name):.3g}" for pid in (result.old, result.new)))
+    trials = result.trials.values()
+    tracking = [trial.tracking for trial in trials]
+    title = f"{result.behavior}: {tracking[0].attribute}, {format_seed_range(tracking[0].seeds)}"
+    names = {"map": "in the map", "proportional": "best P alone", "found": "best found"}
+    table = new_table(title, "", *(names[name] for name in result.trials))
+    for gain in ("kp", "ki", "kd", "limit"):
+        table.add_row(gain, *(f"{getattr(trial.pid, gain):.3g}" for trial in trials))
     table.add_section()
-    add_tracking_figures(table, [before, result.after])
+    add_tracking_figures(table, tracking)
+    ratios = [trial.ratio for trial in trials]
+    table.add_row(f"|error| / that of {names[result.kept]}", *map(format_ratio, ratios))
+    table.caption = "Falls count as errors in the last row; its intervals are 95 %, paired by seed."
     return table
+
+
+def format_ratio(ratio: PairedRatio | None) -> str:
+    """Return a ratio and its interval as text; nothing where there is none."""
+    return "" if ratio is None else format_mean_with_interval(ratio.value, ratio.low, ratio.high)
 
 
 def add_tracking_figures(table: Table, columns: Sequence[TrackingSummary]) -> None:

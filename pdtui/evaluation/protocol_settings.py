@@ -21,6 +21,7 @@ class RandomPurpose(IntEnum):
     START = 4
     RANDOM_UNITS = 5
     RANDOM_DIRECTION = 6
+    PLACEBO_KEYS = 7
 
 
 def purpose_generator(purpose: RandomPurpose, *key: int) -> np.random.Generator:

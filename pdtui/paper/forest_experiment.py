@@ -47,7 +47,7 @@ EXPERIMENT = Experiment(
         click.Option(
             ["--condition", "conditions"],
             multiple=True,
-            type=click.Choice(["alone", "operator", "vision"]),
+            type=click.Choice(["alone", "operator", "placebo", "vision"]),
             help="Measure only this condition; may be repeated.  [default: all]",
         ),
         click.Option(

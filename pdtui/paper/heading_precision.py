@@ -7,19 +7,21 @@ command which the policy was trained to follow, and by a PID that sets the outpu
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from scipy import stats
 
 from pdtui.core.attributes import Floats
+from pdtui.core.confidence_intervals import PairedRatio, paired_ratio
 from pdtui.core.errors import MapError
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
+from pdtui.evaluation.disturbance_conditions import find_condition, plan_pushes
 from pdtui.evaluation.target_tracking import find_pid_behaviors
 from pdtui.search.tracking_drives import (
     STEPS_EACH,
+    STEPS_UNTOUCHED,
     TrackingDriveJob,
     TrackingDriveResult,
     TrackingDriveRunner,
@@ -28,21 +30,21 @@ from pdtui.search.tracking_summary import HEADINGS, TrackingSummary, mean_errors
 from pdtui.stimulation.stimulation_map import Behavior
 
 ATTRIBUTE = "yaw"
+PUSHED_SEEDS = 10
+"""Largest number of seeds that are also run with pushes."""
 ControlInput = Literal["command", "units", "both"]
 
 
 @dataclass(frozen=True)
-class TrackingErrorRatio:
-    """Mean |error| with units over mean |error| with the command.
+class PushedHeadingResult:
+    """What one behavior does on the first seeds while the robot is pushed.
 
     Attributes:
-        value: ratio of the means over seeds.
-        low, high: 95 % interval, bootstrapped over pairs of the same seed.
+        ratio: its error over that of the behavior by command, pushed equally; None for that one.
     """
 
-    value: float
-    low: float
-    high: float
+    tracking: TrackingSummary
+    ratio: PairedRatio | None
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,7 @@ class HeadingControllerResult:
         inputs: names of the commands and units that it sets.
         other_commands: the commands that it leaves alone, and their values.
         ratio: its error over that of the map's behavior by command; None for that one, and without one.
+        pushed: the same while the robot is pushed; None if not measured.
         headings: heading per seed and control step, rad, shape (seeds, targets × 100); NaN after a fall.
     """
 
@@ -64,8 +67,9 @@ class HeadingControllerResult:
     inputs: tuple[str, ...]
     other_commands: dict[str, float]
     tracking: TrackingSummary
-    ratio: TrackingErrorRatio | None
+    ratio: PairedRatio | None
     headings: Floats
+    pushed: PushedHeadingResult | None = None
 
 
 @dataclass(frozen=True)
@@ -96,6 +100,7 @@ class HeadingPrecisionComparison:
                 "commands": row.other_commands,
                 **{name: value for name, value in asdict(row.tracking).items() if name != "default_error"},
                 "ratio": None if row.ratio is None else asdict(row.ratio),
+                "pushed": None if row.pushed is None else asdict(row.pushed),
             }
             for row in self.rows
         ]
@@ -120,50 +125,72 @@ def compare_heading_precision(
     seeds: Sequence[int],
     *,
     targets: Sequence[float] = HEADINGS,
+    pushed: bool = False,
     workers: int = 1,
     progress: StepProgress | None = None,
 ) -> HeadingPrecisionComparison:
     """Hold headings with every behavior of the maps that has a PID on the yaw angle.
 
     The targets, in rad, are held for 100 control steps each. The seeds of the configurations are not used.
+    With pushes, the first `PUSHED_SEEDS` seeds are run again under the evaluation's condition ``pushed``.
 
     Raises:
         MapError: a map has no such behavior, or the robots' control steps differ in duration.
+        RobotError: a robot cannot be pushed.
         PdtuiError: a robot, policy or map cannot be loaded.
     """
     found = [(config, find_pid_behaviors(config, ATTRIBUTE)) for config in configs]
-    total, before = len(seeds) * sum(len(behaviors) for _, behaviors in found), 0
+    again = seeds[:PUSHED_SEEDS] if pushed else ()
+    total = (len(seeds) + len(again)) * sum(len(behaviors) for _, behaviors in found)
     rows: list[HeadingControllerResult] = []
     steps: dict[str, float] = {}
+    done = 0
+
+    def tell(here: int, _: int) -> None:
+        if progress is not None:
+            progress(done + here, total)
+
     for config, behaviors in found:
-
-        def tell(done: int, _: int, before: int = before) -> None:
-            if progress is not None:
-                progress(before + done, total)
-
         with TrackingDriveRunner(config, workers) as runner:
-            steps[config.stimulation_map.source] = runner.loop.robot.control_dt
-            drives = [
-                TrackingDriveJob(ATTRIBUTE, one.name, seed, tuple(targets))
-                for one in behaviors
-                for seed in seeds
-            ]
-            rows += _rows(runner, behaviors, runner.run(drives, tell))
-        before += len(seeds) * len(behaviors)
+            dt = steps[config.stimulation_map.source] = runner.loop.robot.control_dt
+            length = STEPS_UNTOUCHED + STEPS_EACH * len(targets)
+            pushes = {seed: plan_pushes(find_condition("pushed"), seed, dt, length) for seed in again}
+            jobs = [TrackingDriveJob(ATTRIBUTE, "", seed, tuple(targets)) for seed in seeds]
+            shoved = [replace(job, pushes=pushes[job.seed]) for job in jobs if job.seed in pushes]
+            parts = []
+            for each in (jobs, shoved) if pushed else (jobs,):
+                of_all = [replace(job, behavior=one.name) for one in behaviors for job in each]
+                parts.append(_split(runner.run(of_all, tell), len(behaviors)))
+                done += len(of_all)
+            rows += _rows(runner, behaviors, *parts)
     if len(set(steps.values())) > 1:
         told = ", ".join(f"{source} has {dt:g} s" for source, dt in steps.items())
         raise MapError(f"expected robots whose control steps are equally long, found: {told}")
     return HeadingPrecisionComparison(tuple(seeds), tuple(targets), next(iter(steps.values())), tuple(rows))
 
 
+_DrivesOfBehaviors = Sequence[Sequence[TrackingDriveResult]]
+
+
+def _split(results: Sequence[TrackingDriveResult], parts: int) -> _DrivesOfBehaviors:
+    count = len(results) // parts
+    return [results[part * count :][:count] for part in range(parts)]
+
+
 def _rows(
-    runner: TrackingDriveRunner, behaviors: Sequence[Behavior], followed: Sequence[TrackingDriveResult]
+    runner: TrackingDriveRunner,
+    behaviors: Sequence[Behavior],
+    drives: _DrivesOfBehaviors,
+    pushed: _DrivesOfBehaviors | None = None,
 ) -> list[HeadingControllerResult]:
-    loop, count = runner.loop, len(followed) // len(behaviors)
-    parts = [list(followed[number * count :][:count]) for number in range(len(behaviors))]
-    command = next(
-        (p for b, p in zip(behaviors, parts, strict=True) if describe_pid_output(b) == "command"), None
-    )
+    loop, unit = runner.loop, runner.attribute(ATTRIBUTE).unit
+    ratios = _ratios(behaviors, drives)
+    shoved: list[PushedHeadingResult | None] = [None] * len(behaviors)
+    if pushed is not None:
+        shoved = [
+            PushedHeadingResult(summarise_tracking(part, unit), ratio)
+            for part, ratio in zip(pushed, _ratios(behaviors, pushed), strict=True)
+        ]
     return [
         HeadingControllerResult(
             loop.map.source,
@@ -172,30 +199,30 @@ def _rows(
             describe_pid_output(behavior),
             (*behavior.commands, *loop.map.units_of(behavior)),
             {name: value for name, value in loop.robot.commands.items() if name not in behavior.commands},
-            summarise_tracking(part, runner.attribute(ATTRIBUTE).unit),
-            None if command is None or part is command else paired_error_ratio(part, command),
-            np.array([one.values.ravel() for one in part]),
+            summarise_tracking(drives[number], unit),
+            ratios[number],
+            np.array([one.values.ravel() for one in drives[number]]),
+            shoved[number],
         )
-        for behavior, part in zip(behaviors, parts, strict=True)
+        for number, behavior in enumerate(behaviors)
+    ]
+
+
+def _ratios(behaviors: Sequence[Behavior], drives: _DrivesOfBehaviors) -> list[PairedRatio | None]:
+    """Return the ratio of each behavior's error to that of the first one by command."""
+    of_command = [
+        part for one, part in zip(behaviors, drives, strict=True) if describe_pid_output(one) == "command"
+    ]
+    return [
+        None if not of_command or part is of_command[0] else paired_error_ratio(part, of_command[0])
+        for part in drives
     ]
 
 
 def paired_error_ratio(
     units: Sequence[TrackingDriveResult], command: Sequence[TrackingDriveResult]
-) -> TrackingErrorRatio:
+) -> PairedRatio:
     """Return the ratio of mean |error| over the seeds on which both drives reached the first target."""
     above, below = mean_errors_by_seed(units), mean_errors_by_seed(command)
     both = np.isfinite(above) & np.isfinite(below)
-    above, below = above[both], below[both]
-    value = float(above.mean() / below.mean()) if len(above) else float("nan")
-    if len(above) < 2:
-        return TrackingErrorRatio(value, 0.0, float("inf"))
-    drawn = stats.bootstrap(
-        (above, below),
-        lambda a, b, axis: a.mean(axis=axis) / b.mean(axis=axis),
-        paired=True,
-        vectorized=True,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    return TrackingErrorRatio(value, float(drawn.low), float(drawn.high))
+    return paired_ratio(above[both], below[both])

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+
 from pdtui.paper.experiment import Experiment, ExperimentReport, ExperimentRequest
 
 if TYPE_CHECKING:
@@ -25,7 +27,7 @@ def run_tracking_experiment(request: ExperimentRequest) -> ExperimentReport:
 
     check_heading_picture_paths(request.pictures, request.overwrite)
     result = compare_heading_precision(
-        request.configs, request.seeds, workers=request.workers, progress=request.progress
+        request.configs, request.seeds, workers=request.workers, progress=request.progress, **request.options
     )
     draw_heading_pictures(request.pictures, build_heading_figure(result))
     data = {**result.as_dict(), "pictures": [str(path) for path in request.pictures]}
@@ -59,8 +61,8 @@ def build_heading_figure(result: HeadingPrecisionComparison) -> HeadingFigure:
 
 def heading_precision_table(result: HeadingPrecisionComparison) -> Table:
     """Return a table with one column per behavior, map by map."""
-    from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
-    from pdtui.evaluation.evaluation_tables import add_tracking_figures
+    from pdtui.core.text_tables import format_seed_range, new_table
+    from pdtui.evaluation.evaluation_tables import add_tracking_figures, format_ratio
     from pdtui.search.tracking_drives import STEPS_EACH
 
     table = new_table(
@@ -76,10 +78,14 @@ def heading_precision_table(result: HeadingPrecisionComparison) -> Table:
     add_tracking_figures(table, [row.tracking for row in result.rows])
     ratios = [row.ratio for row in result.rows]
     if any(ratios):
-        cells = [
-            "" if one is None else format_mean_with_interval(one.value, one.low, one.high) for one in ratios
-        ]
-        table.add_row("|error| / |error| of the command", *cells)
+        table.add_row("|error| / |error| of the command", *map(format_ratio, ratios))
+    pushed = [row.pushed for row in result.rows if row.pushed is not None]
+    if pushed:
+        table.add_section()
+        tracking = [one.tracking for one in pushed]
+        table.add_row(f"pushed, {format_seed_range(tracking[0].seeds)}", *("" for _ in pushed))
+        add_tracking_figures(table, tracking)
+        table.add_row("|error| / |error| of the command", *(format_ratio(one.ratio) for one in pushed))
     targets = ", ".join(f"{target:g}" for target in result.targets)
     table.caption = (
         f"Targets: {targets} rad, {STEPS_EACH} steps each. Intervals: 95 %; that of the ratio pairs drives "
@@ -98,5 +104,17 @@ def _other_commands(row: HeadingControllerResult) -> str:
 
 
 EXPERIMENT = Experiment(
-    "tracking", "holding headings", run_tracking_experiment, takes_several_maps=True, draws_pictures=True
+    "tracking",
+    "holding headings",
+    run_tracking_experiment,
+    (
+        click.Option(
+            ["--pushed"],
+            is_flag=True,
+            default=None,
+            help="Run the first 10 seeds again with pushes of up to ±0.8 m/s every 1 to 3 s.",
+        ),
+    ),
+    takes_several_maps=True,
+    draws_pictures=True,
 )

@@ -1,55 +1,58 @@
 """`pdtui tune`: choose gains and limit of a behavior of mode ``pid`` by its step responses.
 
 The search minimises the integral of the absolute error over steps of the target, a common criterion for PID
-tuning (Åström and Hägglund, "Advanced PID Control", 2006), plus a penalty for falls. Points of a Latin
-hypercube go through successive halving, which measures the better half on twice the seeds; the Nelder-Mead
-method refines the best. The result replaces the map's gains only if it is better on seeds that the search did
-not see.
+tuning (Åström and Hägglund, "Advanced PID Control", 2006), plus a penalty for falls. The steps of an angle
+are drawn anew for each seed, since the starts of a robot on flat ground hardly differ, and on every second
+seed the limit is larger, since a search otherwise ends at gains with which the robot only just does not fall.
+What it finds is compared with the map's gains and with the best proportional controller, found in the same
+way, on seeds that no search saw; the best of the three is kept.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
-from functools import partial
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
-from scipy.optimize import minimize
 
 from pdtui.core.attributes import Floats
+from pdtui.core.confidence_intervals import PairedRatio, paired_ratio
 from pdtui.core.errors import MapError
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.search.evolutionary_search import Deadline, PlanScoringStage, SharedTimeBudget, select_plans
-from pdtui.search.pid_gain_space import gains_from_point, point_from_gains, sample_gain_points
+from pdtui.search.evolutionary_search import Deadline, SharedTimeBudget
+from pdtui.search.gain_search import GainSearch, TuningSettings
 from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveResult, TrackingDriveRunner
 from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarise_tracking
 from pdtui.stimulation.seed_ranges import require_search_seeds
 from pdtui.stimulation.stimulation_map import Behavior, PidGains, StimulationMap
 
-STEPS_OF_ANGLE: tuple[float, ...] = (0.0, 0.4, 1.2, 0.3, -0.9, -0.5, 0.0, 0.9, 0.0)
-"""Targets of an angle, rad: steps of 0.3 to 1.2 in both directions."""
+ANGLE_STEPS, FARTHEST_ANGLE = (0.2, 1.2), 1.5
+"""Least and largest step of an angle's target, and its largest size, rad."""
+_TARGETS = 7
+MARGIN = 1.2
+"""Factor of the limit on every second seed of the search."""
 FALL = 2.0
 """Cost of each control step after a fall, in multiples of the targets' range."""
-_FIRST_SEEDS = 2
-"""Seeds of the first stage of successive halving."""
 Progress = Callable[..., None]
+GainsOrigin = Literal["map", "proportional", "found"]
 
 
 @dataclass(frozen=True)
-class TuningSettings:
-    """How much tuning does.
+class GainsOnTrial:
+    """One controller on seeds that no search saw.
 
     Attributes:
-        points: points of the Latin hypercube.
-        refinements: controllers that the Nelder-Mead method tries.
-        minutes: time after which the search ends with the best controller so far; None for no limit.
+        pid: the controller.
+        tracking: its figures; a drive counts until its end or a fall.
+        ratio: its mean |error|, with falls penalised, over that of the controller that is kept, paired by
+            seed; None for that one.
     """
 
-    points: int = 48
-    refinements: int = 24
-    minutes: float | None = None
+    pid: PidGains
+    tracking: TrackingSummary
+    ratio: PairedRatio | None
 
 
 @dataclass(frozen=True)
@@ -58,34 +61,49 @@ class TunedGains:
 
     Attributes:
         behavior: name of the behavior.
-        old, new: the map's controller, and the best one of the search.
-        before, after: their figures on seeds that the search did not see.
-        better: whether the new one has a lower cost there, and no more falls.
+        trials: the map's controller, the best proportional one and the best one, on the same seeds.
+        kept: which of them fell least, and had the least error among those.
         tried: number of controllers tried.
         ended_early: whether the search ran out of time.
     """
 
     behavior: str
-    old: PidGains
-    new: PidGains
-    before: TrackingSummary
-    after: TrackingSummary
-    better: bool
+    trials: dict[GainsOrigin, GainsOnTrial]
+    kept: GainsOrigin
     tried: int
     ended_early: bool
 
     @property
+    def better(self) -> bool:
+        """Whether another controller than the map's is kept."""
+        return self.kept != "map"
+
+    @property
+    def gains(self) -> PidGains:
+        """The controller that is kept."""
+        return self.trials[self.kept].pid
+
+    @property
     def verdict(self) -> str:
-        """The result in one sentence."""
+        """The result in one or two sentences."""
         early = "; the search ran out of time" if self.ended_early else ""
-        what = "better than the map's" if self.better else "no better than the map's, which remains"
-        return (
-            f"{self.tried} controllers tried; on seeds that the search did not see, the best is {what}{early}"
-        )
+        kept = {
+            "map": "none is better than the map's, which remains",
+            "proportional": "a proportional controller is the best",
+            "found": "the best found is the best",
+        }[self.kept]
+        told = f"{self.tried} controllers tried; on seeds that the search did not see, {kept}{early}"
+        paid = self.trials[self.kept].pid
+        if self.kept != "map" and paid.ki == paid.kd == 0.0:
+            return f"{told}. Integral and derivative did not pay."
+        against = self.trials["proportional"].ratio
+        if self.kept == "found" and against is not None and against.low <= 1.0 <= against.high:
+            return f"{told}. That integral and derivative pay is within the noise."
+        return told
 
     def as_dict(self) -> dict[str, Any]:
         """The form that ``--json`` prints."""
-        return asdict(self)
+        return {**asdict(self), "better": self.better, "gains": asdict(self.gains)}
 
 
 def tune_gains(
@@ -93,7 +111,7 @@ def tune_gains(
     names: Sequence[str],
     seeds: Sequence[int],
     *,
-    settings: TuningSettings = TuningSettings(),
+    settings: TuningSettings | None = None,
     workers: int = 1,
     progress: Progress | None = None,
 ) -> list[TunedGains]:
@@ -102,8 +120,8 @@ def tune_gains(
     Args:
         config: robot, map and policy, or a loop of them.
         names: names of behaviors of mode ``pid``; empty for all of the map.
-        seeds: at least 2, none for judging; half for the search, half to compare its result with the map's.
-        settings: how much to do.
+        seeds: at least 2, none for judging; half for the search, half to compare what it found.
+        settings: how much to do; None for the usual amount.
         workers: number of processes.
         progress: called with controllers tried, controllers in all, and a note.
 
@@ -114,14 +132,25 @@ def tune_gains(
     if len(seeds) < 2:
         raise MapError(f"expected at least 2 seeds, half of them to choose by, found {len(seeds)}")
     require_search_seeds(seeds, "tuning")
+    settings = settings or TuningSettings()
     budget = SharedTimeBudget(settings.minutes)
     with TrackingDriveRunner(config, workers) as runner:
         behaviors = _find_pid_behaviors(runner.loop.map, names)
         results = []
         for number, behavior in enumerate(behaviors):
             deadline = budget.share(len(behaviors) - number)
-            results.append(_GainSearch(runner, behavior, seeds, settings, deadline, progress).run())
+            results.append(_tune_behavior(runner, behavior, seeds, settings, deadline, progress))
         return results
+
+
+def draw_angle_targets(seed: int) -> tuple[float, ...]:
+    """Draw targets of an angle for one drive, rad: 0, and steps of `ANGLE_STEPS` either way."""
+    rng, targets = np.random.default_rng(seed), [0.0]
+    while len(targets) < _TARGETS:
+        target = targets[-1] + rng.choice([-1.0, 1.0]) * rng.uniform(*ANGLE_STEPS)
+        if abs(target) <= FARTHEST_ANGLE:
+            targets.append(round(float(target), 2))
+    return tuple(targets)
 
 
 def _find_pid_behaviors(stimulation_map: StimulationMap, names: Sequence[str]) -> list[Behavior]:
@@ -139,112 +168,64 @@ def _find_pid_behaviors(stimulation_map: StimulationMap, names: Sequence[str]) -
     return [of_mode[name] for name in names or of_mode]
 
 
-class _OutOfTimeError(Exception):
-    """Ends a search early."""
+def _tune_behavior(
+    runner: TrackingDriveRunner,
+    behavior: Behavior,
+    seeds: Sequence[int],
+    settings: TuningSettings,
+    deadline: Deadline,
+    progress: Progress | None,
+) -> TunedGains:
+    assert behavior.pid is not None
+    old, half = behavior.pid, len(seeds) // 2
+    attribute = runner.attribute(old.attribute)
+    if attribute.wraps:
+        targets = {seed: draw_angle_targets(seed) for seed in seeds}
+    else:
+        targets = dict.fromkeys(seeds, choose_tracking_targets(runner, behavior, seeds[: min(3, half)]))
+    spans = np.array([targets[seed] for seed in seeds[:half]])
+    fall, step = FALL * float(np.ptp(spans)), float(np.abs(np.diff(spans)).mean())
+    total = settings.points + settings.refinements
+    best = [np.inf]
 
+    def costs_of(pid: PidGains, on: Sequence[int]) -> list[float]:
+        wider = replace(pid, limit=MARGIN * pid.limit)
+        jobs = [
+            TrackingDriveJob(old.attribute, behavior.name, seed, targets[seed], wider if seed % 2 else pid)
+            for seed in on
+        ]
+        costs = [_cost(result, fall) for result in runner.run(jobs)]
+        best[0] = min(best[0], float(np.mean(costs)))
+        if progress is not None:
+            progress(search.tried + 1, 2 * total + 2, f"{behavior.name}: {best[0]:.3g} {attribute.unit}")
+        return costs
 
-class _GainSearch:
-    """The search for one behavior's controller."""
-
-    def __init__(
-        self,
-        runner: TrackingDriveRunner,
-        behavior: Behavior,
-        seeds: Sequence[int],
-        settings: TuningSettings,
-        deadline: Deadline,
-        progress: Progress | None,
-    ) -> None:
-        assert behavior.pid is not None
-        self._runner, self._behavior, self._old = runner, behavior, behavior.pid
-        self._search, self._judge = seeds[: len(seeds) // 2], seeds[len(seeds) // 2 :]
-        self._settings, self._deadline, self._progress, self._seed = settings, deadline, progress, seeds[0]
-        attribute = runner.attribute(self._old.attribute)
-        self._unit, self._targets = attribute.unit, STEPS_OF_ANGLE
-        if not attribute.wraps:
-            self._targets = choose_tracking_targets(runner, behavior, self._search[:3])
-        self._range = float(np.ptp(self._targets))
-        self._step = float(np.abs(np.diff(self._targets)).mean())
-        self._costs: dict[PidGains, list[float]] = {}
-
-    def run(self) -> TunedGains:
-        early = False
-        try:
-            self._refine(self._select())
-        except _OutOfTimeError:
-            early = True
-        new = self._best()
-        before, after = (self._drive(pid, self._judge) for pid in (self._old, new))
-        falls = [sum(one.fell for one in results) for results in (before, after)]
-        better = falls[1] <= falls[0] and sum(map(self._cost, after)) < sum(map(self._cost, before))
-        figures = [summarise_tracking(results, self._unit) for results in (before, after)]
-        return TunedGains(
-            self._behavior.name, self._old, new, figures[0], figures[1], better, len(self._costs), early
+    search = GainSearch(old, step, seeds[:half], costs_of, settings, deadline)
+    plain = [replace(old, ki=0.0, kd=0.0)] if old.kp else []
+    proportional = search.run(plain, proportional=True)
+    found = search.run([old, proportional])
+    pids: dict[GainsOrigin, PidGains] = {"map": old, "proportional": proportional, "found": found}
+    jobs = [
+        TrackingDriveJob(old.attribute, behavior.name, seed, targets[seed], pid)
+        for pid in pids.values()
+        for seed in seeds[half:]
+    ]
+    driven, count = runner.run(jobs), len(seeds) - half
+    results = {name: driven[row * count :][:count] for row, name in enumerate(pids)}
+    costs = {name: np.array([_cost(one, fall) for one in each]) for name, each in results.items()}
+    kept = min(pids, key=lambda name: (sum(one.fell for one in results[name]), float(costs[name].mean())))
+    trials = {
+        name: GainsOnTrial(
+            pid,
+            summarise_tracking(results[name], attribute.unit),
+            None if pid == pids[kept] else paired_ratio(costs[name], costs[kept]),
         )
+        for name, pid in pids.items()
+    }
+    return TunedGains(behavior.name, trials, kept, search.tried, search.ended_early)
 
-    def _best(self) -> PidGains:
-        """Return the best of the controllers that were measured on the most seeds."""
-        most = max(map(len, self._costs.values()))
-        measured = {pid: np.mean(costs) for pid, costs in self._costs.items() if len(costs) == most}
-        return min(measured, key=measured.__getitem__)
 
-    def _select(self) -> PidGains:
-        """Return the best of the hypercube and the map's own; each stage keeps the better half."""
-        points = sample_gain_points(self._settings.points, self._seed)
-        drawn = (gains_from_point(point, self._old, self._step) for point in points)
-        candidates = list(dict.fromkeys([self._old, *drawn]))
-        ((_, best),) = select_plans(candidates, self._halving_stages(len(candidates)))
-        return best
-
-    def _halving_stages(self, left: int) -> Iterator[PlanScoringStage[PidGains]]:
-        count = min(_FIRST_SEEDS, len(self._search))
-        while count < len(self._search):
-            left = max(2, left // 2)
-            yield PlanScoringStage(partial(self._score, count=count), left)
-            count = min(2 * count, len(self._search))
-        yield PlanScoringStage(partial(self._score, count=count), 1)
-
-    def _score(self, candidates: Sequence[PidGains], count: int) -> list[float]:
-        return [-self._measure(pid, count) for pid in candidates]
-
-    def _refine(self, best: PidGains) -> None:
-        """Refine the best point in logarithms by the Nelder-Mead method, within the parts that it has."""
-        start = point_from_gains(best, self._old, self._step)
-        if start is None or not self._settings.refinements:
-            return
-        parts = np.isfinite(start)
-
-        def cost(values: Floats) -> float:
-            point = start.copy()
-            point[parts] = values
-            return self._measure(gains_from_point(point, self._old, self._step), len(self._search))
-
-        simplex = np.vstack([start[parts], start[parts] + 0.5 * np.eye(int(parts.sum()))])
-        minimize(
-            cost,
-            start[parts],
-            method="Nelder-Mead",
-            options={"maxfev": self._settings.refinements, "initial_simplex": simplex},
-        )
-
-    def _measure(self, pid: PidGains, count: int) -> float:
-        """Return the cost of a controller on the first `count` seeds of the search."""
-        known = self._costs.get(pid, [])
-        if len(known) < count:
-            if self._costs and self._deadline():
-                raise _OutOfTimeError
-            new = self._drive(pid, self._search[len(known) : count])
-            self._costs[pid] = known + [self._cost(result) for result in new]
-            if self._progress is not None:
-                note = f"{self._behavior.name}: best {np.mean(self._costs[self._best()]):.3g} {self._unit}"
-                self._progress(len(self._costs), self._settings.points + self._settings.refinements + 1, note)
-        return float(np.mean(self._costs[pid][:count]))
-
-    def _drive(self, pid: PidGains, seeds: Sequence[int]) -> list[TrackingDriveResult]:
-        drive = partial(TrackingDriveJob, pid.attribute, self._behavior.name, targets=self._targets, pid=pid)
-        return self._runner.run([drive(seed=seed) for seed in seeds])
-
-    def _cost(self, result: TrackingDriveResult) -> float:
-        """Return the mean |error|, where steps after a fall count as `FALL` times the targets' range."""
-        errors = np.abs(result.errors)
-        return float(np.where(np.isfinite(errors), errors, FALL * self._range).mean())
+def _cost(result: TrackingDriveResult, fall: float) -> float:
+    """Return the mean |error|, where each step after a fall counts as `fall`."""
+    errors: Floats = np.abs(result.errors)
+    return float(np.where(np.isfinite(errors), errors, fall).mean())

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle, wrap_angles
 from pdtui.core.closable import Closable
 from pdtui.core.drive_events import DriveEvent
+from pdtui.core.step_record import StepRecord
 from pdtui.core.worker_pool import WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
@@ -33,6 +34,7 @@ class TrackingDriveJob:
         seed: seed of the reset.
         targets: targets, in the attribute's unit.
         pid: gains to use instead of the map's; None for the map's.
+        pushes: changes of vx and vy of the trunk, m/s, by the control step before which they come.
     """
 
     attribute: str
@@ -40,6 +42,7 @@ class TrackingDriveJob:
     seed: int
     targets: tuple[float, ...]
     pid: PidGains | None = None
+    pushes: Mapping[int, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -125,15 +128,21 @@ def drive_through_targets(template: ControlLoop, drive: TrackingDriveJob) -> Tra
     loop = ControlLoop(template.robot, template.policy, stimulation_map, drive.seed)
     column = template.robot.attribute_index(drive.attribute)
     path = np.full(1 + len(drive.targets) * STEPS_EACH, np.nan)
+
+    def advance(events: Sequence[DriveEvent] = ()) -> StepRecord:
+        if loop.step in drive.pushes:
+            loop.robot.push_trunk(*drive.pushes[loop.step])
+        return loop.advance(events)
+
     for _ in range(STEPS_UNTOUCHED):
-        record = loop.advance()
+        record = advance()
         if record.ended:
             break
     fell = record.fell
     if not record.ended:
         path[0] = loop.attributes[column]
         for number in range(len(path) - 1):
-            record = loop.advance(_events(loop.step, drive, number))
+            record = advance(_events(loop.step, drive, number))
             path[number + 1] = record.attributes[column]
             fell = record.fell
             if record.ended:

@@ -40,7 +40,8 @@ class TrackingSummary:
         behavior: name of the behavior of mode ``pid``.
         attribute, unit: the attribute that it holds.
         seeds: seeds of the drives.
-        targets: errors at each target, in the order in which the targets were set.
+        targets: errors at each target, in the order in which the targets were set; none if these differ
+            between seeds.
         error, low, high: mean |error| over seeds with its 95 % interval.
         settled: mean |error| over the last 25 steps of each target.
         responses: rise time and overshoot over all steps of the target and all seeds.
@@ -65,8 +66,9 @@ class TrackingSummary:
 def summarise_tracking(
     results: Sequence[TrackingDriveResult], unit: str, default_error: float | None = None
 ) -> TrackingSummary:
-    """Summarise drives of one behavior, one per seed, all to the same targets."""
+    """Summarise drives of one behavior, one per seed."""
     drive = results[0].drive
+    common = drive.targets if len({one.drive.targets for one in results}) == 1 else ()
     table = np.abs(np.array([one.errors for one in results]))
     means = mean_errors_by_seed(results)
     low, high = confidence_interval(means[np.isfinite(means)])
@@ -79,7 +81,7 @@ def summarise_tracking(
             TargetErrorSummary(
                 target, mean_of_finite(table[:, row]), mean_of_finite(table[:, row, -SETTLED:])
             )
-            for row, target in enumerate(drive.targets)
+            for row, target in enumerate(common)
         ),
         mean_of_finite(means),
         low,

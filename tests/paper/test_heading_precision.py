@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import shutil
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from rich.console import Console
 
 from pdtui.cli import main
 from pdtui.core.errors import MapError
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.paper.heading_precision import compare_heading_precision, paired_error_ratio
+from pdtui.paper.tracking_experiment import heading_precision_table
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.policies.weights.policy_loading import load_any_network
 from pdtui.search.tracking_drives import (
@@ -22,6 +25,7 @@ from pdtui.search.tracking_drives import (
     TrackingDriveResult,
     TrackingDriveRunner,
 )
+from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map
 from tests.real_viewer import RealViewer, is_blank
 from tests.turning_robot import turning_loop
@@ -82,6 +86,26 @@ def test_a_unit_steers_the_authors_policy_as_its_command_does(tmp_path: Path) ->
         assert row.tracking.error == pytest.approx(
             np.abs(row.headings[0] - np.repeat([0.0, 0.4], STEPS_EACH)).mean()
         )
+
+
+def test_pushes_disturb_both_controllers() -> None:
+    config = DriveConfig("anymal", load_map(find_map("anymal")), 0)
+    result = compare_heading_precision([config], [5000], targets=(0.0, 0.4), pushed=True)
+    for row in result.rows:
+        assert row.pushed is not None
+        assert row.pushed.tracking.seeds == (5000,)
+        # Without a push it would be the same drive, to the last bit.
+        assert row.pushed.tracking.error != row.tracking.error
+    units, command = (row.pushed for row in result.rows)
+    assert units is not None
+    assert command is not None
+    assert units.ratio is not None
+    assert units.ratio.value == pytest.approx(units.tracking.error / command.tracking.error)
+    console = Console(width=160, record=True, file=StringIO())
+    console.print(heading_precision_table(result))
+    assert "pushed, seed 5000" in console.export_text()
+    assert result.as_dict()["rows"][0]["pushed"]["tracking"]["error"] == units.tracking.error
+    assert compare_heading_precision([config], [5000], targets=(0.0,)).rows[0].pushed is None
 
 
 def test_a_drive_counts_until_its_fall() -> None:
@@ -176,6 +200,8 @@ def test_tune_writes_only_what_is_better(map_path: Path, tmp_path: Path) -> None
     (found,) = json.loads(result.output)["behaviors"]
     pid = load_map(path).behaviors["hold heading"].pid
     assert pid is not None
-    wanted = found["new" if found["better"] else "old"]
-    assert (pid.kp, pid.ki, pid.kd, pid.limit) == tuple(wanted[name] for name in ("kp", "ki", "kd", "limit"))
+    kept = found["trials"][found["kept"]]["pid"]
+    assert found["gains"] == kept
+    assert found["better"] == (found["kept"] != "map")
+    assert (pid.kp, pid.ki, pid.kd, pid.limit) == tuple(kept[name] for name in ("kp", "ki", "kd", "limit"))
     assert (path.read_text() == map_path.read_text()) != found["better"]

@@ -1,15 +1,15 @@
-"""How far a robot gets through a forest alone, with an operator, and with vision.
+"""How far a robot gets through a forest alone, with an operator, with a placebo, and with vision.
 
 The paper's task transfer (section 4): a policy that senses only its own body is driven through trees that it
-cannot sense. All conditions run in the same forests for the same time.
+cannot sense. All conditions run in the same forests for the same time. The placebo presses the operator's
+keys without looking, which shows what pressing them does by itself.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 from pdtui.core.errors import PdtuiError, PolicyError, SessionError
 from pdtui.core.worker_pool import StepProgress, WorkerPool
@@ -20,24 +20,29 @@ from pdtui.paper.forest.forest_episode import (
     FOREST,
     ROUGH,
     ForestEpisodeScore,
-    build_operator,
     drive_forest_episode,
     drive_with_random_keys,
     read_forest_episode,
     record_forest_episode,
 )
-from pdtui.paper.forest.forest_results import ForestExperimentResult, summarise_condition
+from pdtui.paper.forest.forest_results import (
+    ForestCondition,
+    ForestExperimentResult,
+    compare_conditions,
+    summarise_condition,
+)
 from pdtui.paper.forest.key_motion_fit import fit_key_motion_models
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
+from pdtui.paper.forest.key_pressers import KeyPresser, OperatorPresser, PlaceboPresser
 from pdtui.paper.forest.scripted_operator import operator_keys
 from pdtui.policies.weights.weights_file import find_weights_file
 from pdtui.robots import require_robot_name, robot_file_stem
 from pdtui.stimulation.stimulation_map import StimulationMap
 
-ForestCondition = Literal["alone", "operator", "vision"]
 CONDITIONS: dict[ForestCondition, str] = {
     "alone": "state alone",
     "operator": "state with an operator",
+    "placebo": "state with a placebo",
     "vision": "state + vision",
 }
 PERSON = "state with a person"
@@ -67,7 +72,8 @@ def evaluate_forest(
     Args:
         config: robot, map and policy; its seed and start are not used.
         seeds: seeds of the forests; consecutive seeds form a repeat.
-        conditions: conditions to measure; vision is left out if its robot or policy does not exist.
+        conditions: conditions to measure; a placebo needs the operator's drives, so the operator is measured,
+            too. Vision is left out if its robot or policy does not exist.
         sessions: a person's drives, each a repeat of one episode.
         record: folder for the operator's drives, each a session and a keystroke file.
         tried: seeds and control steps of the drives to which the key models are fitted.
@@ -78,6 +84,8 @@ def evaluate_forest(
     """
     if conditions and (not seeds or len(seeds) % repeats):
         raise PdtuiError(f"{len(seeds)} seeds cannot be divided into {repeats} equal repeats")
+    wanted = {*conditions, *(["operator"] if "placebo" in conditions else [])}
+    conditions = [one for one in CONDITIONS if one in wanted]
     config = replace(config, seed=0, start=FOREST)
     loop = build_control_loop(config)
     name, dt, policy = config.robot, loop.robot.control_dt, loop.policy.name
@@ -105,9 +113,12 @@ def evaluate_forest(
         if drives:
             key_models = fit_key_motion_models(drives, keys, dt)
         for condition, its_config in configs.items():
-            with_it = key_models if condition == "operator" else {}
-            folder = record if with_it else None
-            jobs = [(its_config, seed, steps, with_it, folder) for seed in seeds]
+            jobs = [_EpisodeJob(its_config, seed, steps) for seed in seeds]
+            if condition == "operator":
+                jobs = [replace(job, key_models=key_models, folder=record) for job in jobs]
+            elif condition == "placebo":
+                operated = zip(jobs, runs["operator"], strict=True)
+                jobs = [replace(job, placebo_of=run) for job, run in operated]
             runs[condition] = pool.map(_run_episode, jobs, tell)
             done += len(jobs)
     measured = [
@@ -126,6 +137,7 @@ def evaluate_forest(
         steps,
         steps * dt,
         tuple(measured),
+        compare_conditions(runs, CONDITIONS),
         left_out,
         key_models,
         fit_seeds,
@@ -133,7 +145,22 @@ def evaluate_forest(
     )
 
 
-_Episode = tuple[DriveConfig, int, int, dict[str, KeyMotionModel], Path | None]
+@dataclass(frozen=True)
+class _EpisodeJob:
+    """One episode to run.
+
+    Attributes:
+        key_models: what the operator knows of its keys; None for no operator.
+        folder: folder for the operator's drive; None to record none.
+        placebo_of: the operator's run whose keys a placebo presses; None for no placebo.
+    """
+
+    config: DriveConfig
+    seed: int
+    steps: int
+    key_models: dict[str, KeyMotionModel] | None = None
+    folder: Path | None = None
+    placebo_of: ForestEpisodeScore | None = None
 
 
 class _LoopCache:
@@ -154,14 +181,17 @@ def _observe_keys(loops: _LoopCache, job: tuple[DriveConfig, int, int]) -> Obser
     return drive_with_random_keys(loops.loop(config, seed), steps)
 
 
-def _run_episode(loops: _LoopCache, job: _Episode) -> ForestEpisodeScore:
-    config, seed, steps, key_models, folder = job
-    loop = loops.loop(config, seed)
-    operator = build_operator(loop, key_models) if key_models else None
-    if operator is None or folder is None:
-        return drive_forest_episode(loop, steps, operator)[0]
-    path = folder / f"{robot_file_stem(config.robot)}-forest-seed{seed}.rrd"
-    return record_forest_episode(loop, steps, operator, path, config.activations)
+def _run_episode(loops: _LoopCache, job: _EpisodeJob) -> ForestEpisodeScore:
+    loop = loops.loop(job.config, job.seed)
+    presser: KeyPresser | None = None
+    if job.key_models is not None:
+        presser = OperatorPresser(loop, job.key_models)
+    elif job.placebo_of is not None:
+        presser = PlaceboPresser(job.placebo_of.keys, job.placebo_of.steps, job.seed)
+    if presser is None or job.folder is None:
+        return drive_forest_episode(loop, job.steps, presser)[0]
+    path = job.folder / f"{robot_file_stem(job.config.robot)}-forest-seed{job.seed}.rrd"
+    return record_forest_episode(loop, job.steps, presser, path, job.config.activations)
 
 
 def _configs(

@@ -14,8 +14,9 @@ from pdtui.core.errors import SessionError
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import events_of_pressed_keys, run_episode
 from pdtui.driving.keystrokes import format_keystrokes
-from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
-from pdtui.paper.forest.scripted_operator import DEFAULT, ScriptedOperator, operator_keys
+from pdtui.paper.forest.key_motion_model import ObservedDrive
+from pdtui.paper.forest.key_pressers import KeyPresser
+from pdtui.paper.forest.scripted_operator import operator_keys
 from pdtui.robots.legged.terrain import AHEAD
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_schema import ActivationsKept
@@ -35,6 +36,7 @@ class ForestEpisodeScore:
         distance: distance along x, m.
         collisions: number of trees that the robot ran into.
         crossed: whether it ended at the far end of the forest.
+        keys: the keys pressed, in their order.
         pressed_steps: number of control steps before which a key was pressed.
     """
 
@@ -45,30 +47,27 @@ class ForestEpisodeScore:
     fell: bool
     crossed: bool
     steps: int
-    presses: int
+    keys: tuple[str, ...]
     pressed_steps: int
+
+    @property
+    def presses(self) -> int:
+        """Number of key presses."""
+        return len(self.keys)
 
 
 def drive_forest_episode(
-    loop: ControlLoop,
-    steps: int,
-    operator: ScriptedOperator | None = None,
-    recorder: SessionRecorder | None = None,
+    loop: ControlLoop, steps: int, presser: KeyPresser | None = None, recorder: SessionRecorder | None = None
 ) -> tuple[ForestEpisodeScore, tuple[DriveEvent, ...]]:
     """Drive one episode, up to a fall, the far end of the forest, or the last step; return score and events.
 
-    The drive is before its first step. Without an operator no key is pressed; the caller closes the recorder.
+    The drive is before its first step. Without a presser no key is pressed; the caller closes the recorder.
     """
     column = loop.robot.attribute_index("distance")
-    yaw = loop.robot.attribute_index("yaw")
-    keys = operator_keys(loop.map) if operator is not None else {}
 
-    def press(_: int) -> list[DriveEvent]:
-        if operator is None:
-            return []
-        x, y = loop.robot.read_poses()[0, :2].tolist()
-        name = operator.choose_key(x, y, float(loop.attributes[yaw]))
-        return events_of_pressed_keys([keys[name]] if name else [], loop)
+    def press(step: int) -> list[DriveEvent]:
+        key = presser.press(step) if presser is not None else ""
+        return events_of_pressed_keys([key] if key else [], loop)
 
     rewards, costs, distances = [], [], []
     events: list[DriveEvent] = []
@@ -85,7 +84,7 @@ def drive_forest_episode(
 
 
 def record_forest_episode(
-    loop: ControlLoop, steps: int, operator: ScriptedOperator, path: Path, activations: ActivationsKept
+    loop: ControlLoop, steps: int, presser: KeyPresser, path: Path, activations: ActivationsKept
 ) -> ForestEpisodeScore:
     """Run `drive_forest_episode` and record it like a person's drive, with a keystroke file beside it.
 
@@ -93,7 +92,7 @@ def record_forest_episode(
         SessionError: the session already exists, or cannot be written.
     """
     with SessionRecorder(path, replace(loop.info, activations=activations)) as recorder:
-        run, events = drive_forest_episode(loop, steps, operator, recorder)
+        run, events = drive_forest_episode(loop, steps, presser, recorder)
     write_file(path.with_suffix(".keys"), format_keystrokes(events), SessionError)
     return run
 
@@ -142,7 +141,7 @@ def _score(
     events: Sequence[DriveEvent],
     fell: bool,
 ) -> ForestEpisodeScore:
-    pressed = [event.step for event in events if event.key]
+    pressed = [event for event in events if event.key]
     return ForestEpisodeScore(
         seed,
         float(np.sum(rewards)),
@@ -151,8 +150,8 @@ def _score(
         fell,
         not fell and distances[-1] >= AHEAD,
         len(rewards),
-        len(pressed),
-        len(set(pressed)),
+        tuple(event.key for event in pressed),
+        len({event.step for event in pressed}),
     )
 
 
@@ -179,14 +178,3 @@ def drive_with_random_keys(loop: ControlLoop, steps: int) -> ObservedDrive:
         if record.ended:
             return ObservedDrive(np.array(places), np.array(choices), record.fell)
     return ObservedDrive(np.array(places), np.array(choices), False)
-
-
-def build_operator(loop: ControlLoop, key_models: dict[str, KeyMotionModel]) -> ScriptedOperator:
-    """Return an operator that sees the forest of this drive."""
-    dt = loop.robot.control_dt
-    periods = {
-        name: max(1, round(loop.map.behaviors[name].period / dt))  # type: ignore[operator]
-        for name in key_models
-        if name != DEFAULT and loop.map.behaviors[name].period is not None
-    }
-    return ScriptedOperator(key_models, loop.robot.obstacles, dt, periods)

@@ -25,27 +25,30 @@ _HIT, _TOUCHING, _PRESS, _AWRY, _FALL = 8.0, 4.0, 0.25, 0.6, 6.0
 """Costs in m of progress: a hit, contact all the time, a press, 1 rad of heading at the end, a fall."""
 _FOREST = 8.0
 """Half the width of the forest, m."""
-_AHEAD, _ASIDE = 12.0, 5.0
-"""Farthest trees that count, ahead and to either side, m."""
+_BEHIND = 1.0
+"""Distance behind the robot from which a tree no longer counts, m."""
 
 
 class KeyPlanner:
-    """Chooses the key to latch; index 0 is the default key. Trees are x, y and radius in m, shape (N, 3)."""
+    """Chooses the key to latch; index 0 is the default key."""
 
-    def __init__(self, key_models: Sequence[KeyMotionModel], trees: Floats) -> None:
-        self._key_models, self._trees = tuple(key_models), trees
+    def __init__(self, key_models: Sequence[KeyMotionModel]) -> None:
+        self._key_models = tuple(key_models)
         self._schedules = _schedules(len(self._key_models))
         self._presses = (np.diff(self._schedules, axis=1) != 0).sum(axis=1)
 
-    def choose(self, place: RobotMotion, latched: int) -> int:
-        """Return the index of the key to latch; the latched one unless another is worth a press."""
-        scores = self._scores(place, latched)
+    def choose(self, place: RobotMotion, trees: Floats, latched: int) -> int:
+        """Return the index of the key to latch; the latched one unless another is worth a press.
+
+        The trees in sight are x, y and radius in m, shape (N, 3).
+        """
+        scores = self._scores(place, trees, latched)
         return int(self._schedules[int(np.argmax(scores)), 0])
 
-    def _scores(self, place: RobotMotion, latched: int) -> Floats:
+    def _scores(self, place: RobotMotion, trees: Floats, latched: int) -> Floats:
         """Return the expected progress in m minus the costs of hits, presses and a wrong final heading."""
         places, _ = predict_motion(self._key_models, place, self._schedules, _STEP)
-        touching, untouched = self._touch_probabilities(places)
+        touching, untouched = self._touch_probabilities(places, trees)
         falls = np.array([model.falls for model in self._key_models])
         starts = self._schedules[:, 0]
         pressed = starts != latched
@@ -62,14 +65,13 @@ class KeyPlanner:
         )
         return scores
 
-    def _touch_probabilities(self, places: Floats) -> tuple[Floats, Floats]:
+    @staticmethod
+    def _touch_probabilities(places: Floats, trees: Floats) -> tuple[Floats, Floats]:
         """Return the probabilities of touching a tree at each time, and of no touch up to it, shapes (C, T).
 
         The prediction error is assumed to be logistic, which is nearly normal and cheaper.
         """
-        x, y = places[0, 0, :2]
-        dx, dy = self._trees[:, 0] - x, self._trees[:, 1] - y
-        near = self._trees[(dx > -1.0) & (dx < _AHEAD) & (np.abs(dy) < _ASIDE)]
+        near = trees[trees[:, 0] > places[0, 0, 0] - _BEHIND]
         cos, sin = np.cos(places[:, :, 2]), np.sin(places[:, :, 2])
         unsure = (_UNSURE + _UNSURER * _STEP * np.arange(1, _STEPS + 1)) / 1.7
         touching, untouched = np.zeros(cos.shape), np.ones(cos.shape)

@@ -1,4 +1,4 @@
-"""A program that operates the keys: it sees the trees, reacts late, and presses no faster than a person."""
+"""A program that operates the keys: it sees what a person sees, reacts late, and presses no faster."""
 
 from __future__ import annotations
 
@@ -68,34 +68,32 @@ class ScriptedOperator:
 
     Args:
         key_models: model of each key by name, the default key first.
-        trees: x, y and radius of the trees, m, shape (N, 3).
         dt: duration of a control step, s.
         periods: control steps after which a behavior ends by itself, by name.
     """
 
     def __init__(
-        self,
-        key_models: Mapping[str, KeyMotionModel],
-        trees: Floats,
-        dt: float,
-        periods: Mapping[str, int] | None = None,
+        self, key_models: Mapping[str, KeyMotionModel], dt: float, periods: Mapping[str, int] | None = None
     ) -> None:
         self._names, self._key_models = tuple(key_models), tuple(key_models.values())
-        self._planner, self._recovery = KeyPlanner(self._key_models, trees), StuckAtTreeSteering(trees, dt)
+        self._planner, self._recovery = KeyPlanner(self._key_models), StuckAtTreeSteering(dt)
         self._dt, self._periods = dt, dict(periods or {})
         self._delay = math.ceil(REACTION_TIME / dt - 1e-9)
         self._second = math.ceil(1.0 / dt - 1e-9)
         self._seen: list[tuple[float, float, float]] = []
+        self._trees: list[Floats] = []
         self._latched: list[int] = []
         self._pressed: list[int] = []
 
-    def choose_key(self, x: float, y: float, heading: float) -> str:
-        """Observe where the robot is, and decide which key to press before the next control step.
+    def choose_key(self, x: float, y: float, heading: float, trees: Floats) -> str:
+        """Observe where the robot is and which trees are in sight, and decide which key to press next.
 
-        It is named by its behavior: ``default`` for the default key, an empty string for no key.
+        Trees are x, y and radius in m, shape (N, 3). The key is named by its behavior: ``default`` for the
+        default key, an empty string for no key.
         """
         step = len(self._seen)
         self._seen.append((x, y, heading))
+        self._trees.append(trees)
         now = self._still_latched(step)
         choice = self._decide(step, now)
         self._latched.append(choice)
@@ -111,13 +109,13 @@ class ScriptedOperator:
         presses = self._pressed[-PRESSES_PER_SECOND:]
         if len(presses) == PRESSES_PER_SECOND and step - presses[0] < self._second:
             return now
-        place = self._predict_now(old)
+        place, trees = self._predict_now(old), self._trees[old]
         lately = self._latched[max(0, old - round(STUCK_TIME / self._dt)) : old]
         halted = self._names.index("stop") in lately
-        turn = self._recovery.choose_turn(np.array(self._seen[: old + 1]), place.heading, halted)
+        turn = self._recovery.choose_turn(np.array(self._seen[: old + 1]), trees, place.heading, halted)
         if turn:
             return self._names.index("left" if turn > 0 else "right")
-        return self._planner.choose(place, now)
+        return self._planner.choose(place, trees, now)
 
     def _predict_now(self, old: int) -> RobotMotion:
         """Predict the motion now, from the motion at step `old` and the keys since then."""
@@ -141,25 +139,26 @@ class StuckAtTreeSteering:
     a while the other direction is tried.
     """
 
-    def __init__(self, trees: Floats, dt: float) -> None:
-        self._trees, self._dt = trees, dt
+    def __init__(self, dt: float) -> None:
+        self._dt = dt
         self._watched = round(STUCK_TIME / dt)
         self._side, self._since = 0, 0.0
 
-    def choose_turn(self, seen: Floats, heading: float, halted: bool) -> int:
+    def choose_turn(self, seen: Floats, trees: Floats, heading: float, halted: bool) -> int:
         """Return which way to turn now: 1 left, −1 right, 0 if the robot is not stuck.
 
-        The places seen so far are x, y and heading, shape (S, 3); the heading is the one predicted for now,
-        in rad; the robot is halted if a key latched lately made it stand still.
+        The places seen so far are x, y and heading, shape (S, 3), and the trees in sight x, y and radius,
+        shape (N, 3); the heading is the one predicted for now, in rad; the robot is halted if a key latched
+        lately made it stand still.
         """
         x, y, saw = seen[-1].tolist()
         time = len(seen) * self._dt
-        away = np.hypot(self._trees[:, 0] - x, self._trees[:, 1] - y) - self._trees[:, 2]
+        away = np.hypot(trees[:, 0] - x, trees[:, 1] - y) - trees[:, 2]
         nearest = int(np.argmin(away)) if len(away) else -1
         if nearest < 0 or away[nearest] > _NEAR:
             self._side = 0
             return 0
-        to_tree = math.atan2(self._trees[nearest, 1] - y, self._trees[nearest, 0] - x)
+        to_tree = math.atan2(trees[nearest, 1] - y, trees[nearest, 0] - x)
         if self._side:
             if abs(wrap_angle(to_tree - heading)) > _CLEAR_TURNED:
                 self._side = 0

@@ -12,6 +12,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.robot_links_and_state import NO_OBSTACLES
 from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.pictures.perspective_camera import PerspectiveCamera, round_length_down
+from pdtui.pictures.view_ahead import AHEAD, ViewAhead, heading_on_ground, measure_stretch
 from pdtui.robots.geometry import capsule_ends, compute_link_poses, root_body_row, rotate_vectors
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import ScreenRow, format_number
@@ -27,12 +28,6 @@ _INKS = (
     *STYLES.depth,
 )
 _FARTHEST = 0.55  # least magnification of the ground grid that is drawn
-_AHEAD, _ASIDE = 16.0, 8.0
-"""Length and width of the area seen from above with obstacles, in extents of the robot."""
-_FORWARD = 0.27
-"""Distance from the robot to the middle of that picture, as a share of the picture's size."""
-_EASING = 0.12
-"""Share of a turn that the picture follows per frame, so that a swaying gait does not shake it."""
 _ARROW = 0.5
 """Least size of the heading arrow, in extents of the camera."""
 _BOX_EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1]
@@ -49,8 +44,10 @@ class RobotView(SnapshotWidget):
 
     _extent = 0.0
     _obstacles: Floats = NO_OBSTACLES
-    _ahead: Floats | None = None
     _looked = False
+
+    def on_mount(self) -> None:
+        self._view_ahead = ViewAhead()
 
     def watch_view(self) -> None:
         self.border_title = f"robot · {self.view}"
@@ -62,10 +59,8 @@ class RobotView(SnapshotWidget):
             if len(snapshot.obstacles) and not self._looked:
                 self._looked, self.view = True, "above"
         if self.facts is not None and len(self._obstacles) and len(snapshot.poses):
-            ahead = _heading(snapshot.poses[root_body_row(self.facts.links)])
-            if self._ahead is None or snapshot.restarted:
-                self._ahead = ahead
-            self._ahead = self._ahead + _EASING * (ahead - self._ahead)
+            root = snapshot.poses[root_body_row(self.facts.links)]
+            self._view_ahead.follow(root, restarted=snapshot.restarted)
 
     def paint(self, width: int, height: int) -> list[Strip]:
         if self.facts is None:
@@ -106,15 +101,12 @@ class RobotView(SnapshotWidget):
     def _camera(self, canvas: BrailleCanvas, root: Floats, ends: Floats) -> PerspectiveCamera:
         """Return a camera far enough away for the widest stretch that the robot has shown so far."""
         assert self.facts is not None
-        radii = np.array([min(link.size) for link in self.facts.links])
-        stretch = np.linalg.norm(ends - root[:3], axis=-1).max(axis=-1) + radii
-        self._extent = max(self._extent, float(stretch.max()))
+        self._extent = max(self._extent, measure_stretch(self.facts.links, root, ends))
         extent, centre = self._extent, (canvas.width / 2, canvas.height / 2)
-        if self.view == "above" and len(self._obstacles) and self._ahead is not None:
-            zoom = min(canvas.width / _AHEAD, canvas.height / _ASIDE) / extent
-            seen = np.array([canvas.width, canvas.height]) / zoom
-            x, y = root[:2] + _FORWARD * seen * self._ahead
-            return PerspectiveCamera((float(x), float(y), 0.0), 90.0, _AHEAD / 2 * extent, zoom, centre)
+        if self.view == "above" and len(self._obstacles):
+            area = self._view_ahead.frame(root[:2], extent, canvas.width, canvas.height)
+            x, y = area.middle.tolist()
+            return PerspectiveCamera((x, y, 0.0), 90.0, AHEAD / 2 * extent, area.zoom, centre)
         if self.view == "above":
             zoom = min(canvas.width, canvas.height) / (2.5 * extent)
             middle = (float(root[0]), float(root[1]), 0.0)
@@ -150,7 +142,7 @@ class RobotView(SnapshotWidget):
 
     def _draw_heading(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
         """Draw the direction of the robot's own x axis as an arrow on the ground."""
-        x, y = _heading(root)
+        x, y = heading_on_ground(root)
         if not (x or y):
             return
         ahead, left = np.array([x, y, 0.0]), np.array([-y, x, 0.0])
@@ -196,10 +188,3 @@ class RobotView(SnapshotWidget):
         if before.all():
             edges = np.array(_BOX_EDGES)
             canvas.draw_segments(dots[edges[:, 0]], dots[edges[:, 1]], ink)
-
-
-def _heading(root: Floats) -> Floats:
-    """Return the ground direction of a pose's x axis, shape (2,); zeros if it points up or down."""
-    ahead: Floats = rotate_vectors(root[3:], np.array([1.0, 0.0, 0.0]))[:2]
-    length = float(np.linalg.norm(ahead))
-    return ahead / length if length > 1e-6 else np.zeros(2)

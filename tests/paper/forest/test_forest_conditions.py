@@ -19,14 +19,16 @@ from pdtui.driving.headless_drive import drive_headless
 from pdtui.driving.keystrokes import read_keystrokes
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.session_replay import replay_session
-from pdtui.paper.forest.forest_conditions import PERSON, REPEATS, evaluate_forest
+from pdtui.paper.forest.forest_conditions import CONDITIONS, PERSON, REPEATS, evaluate_forest
 from pdtui.paper.forest.forest_episode import (
-    build_operator,
+    ForestEpisodeScore,
     drive_forest_episode,
     read_forest_episode,
     record_forest_episode,
 )
+from pdtui.paper.forest.forest_results import compare_conditions
 from pdtui.paper.forest.key_motion_model import KeyMotionModel
+from pdtui.paper.forest.key_pressers import OperatorPresser, PlaceboPresser
 from pdtui.paper.forest.scripted_operator import DEFAULT
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import hash_file, save_network
@@ -104,7 +106,7 @@ def recorded(built: ControlLoop, tmp_path_factory: pytest.TempPathFactory) -> Pa
     """A drive of the operator, of 120 steps."""
     path = tmp_path_factory.mktemp("drives") / "driven.rrd"
     loop = _loop(built, 505)
-    record_forest_episode(loop, 120, build_operator(loop, KEY_MODELS), path, "all")
+    record_forest_episode(loop, 120, OperatorPresser(loop, KEY_MODELS), path, "all")
     return path
 
 
@@ -120,12 +122,12 @@ def test_the_operators_drive_is_saved_like_a_persons(
     drive_headless(loop, presses, 120, SessionRecorder(again, loop.info))
     np.testing.assert_array_equal(read_session(again).digests, session.digests)
     with pytest.raises(SessionError, match=r"driven\.rrd: already exists"):
-        record_forest_episode(loop, 10, build_operator(loop, KEY_MODELS), recorded, "all")
+        record_forest_episode(loop, 10, OperatorPresser(loop, KEY_MODELS), recorded, "all")
 
 
 def test_a_recorded_drive_scores_what_it_did(recorded: Path, built: ControlLoop) -> None:
     loop = _loop(built, 505)
-    driven, events = drive_forest_episode(loop, 120, build_operator(loop, KEY_MODELS))
+    driven, events = drive_forest_episode(loop, 120, OperatorPresser(loop, KEY_MODELS))
     assert read_forest_episode(recorded, "a1", 1000) == (driven, "stands")
     assert driven.presses == len(events) == driven.pressed_steps > 0
     assert (driven.seed, driven.steps, driven.fell, driven.crossed) == (505, 120, False, False)
@@ -159,8 +161,22 @@ def test_conditions_and_a_person_stand_in_one_table(
     result = evaluate_forest(
         config, [1, 2], repeats=2, steps=40, sessions=[recorded], record=folder, tried=QUICK, workers=1
     )
-    alone, operated, person = result.conditions[0], result.conditions[1], result.conditions[-1]
-    assert (alone.condition, operated.condition) == ("state alone", "state with an operator")
+    alone, operated, placebo = result.conditions[:3]
+    person = result.conditions[-1]
+    assert [row.condition for row in result.conditions[:3]] == list(CONDITIONS.values())[:3]
+    for driven, blind in zip(operated.runs, placebo.runs, strict=True):
+        assert (blind.seed, blind.presses) == (driven.seed, driven.presses)
+        assert sorted(blind.keys) == sorted(driven.keys)
+    assert alone.falls == 0
+    assert alone.fall_share == pytest.approx((0.0, 0.842), abs=1e-3)
+    operated_over_alone = result.ratios[0]
+    assert (operated_over_alone.condition, operated_over_alone.baseline) == (
+        operated.condition,
+        alone.condition,
+    )
+    assert operated_over_alone.distance.value == pytest.approx(
+        operated.distance.mean / alone.distance.mean, nan_ok=True
+    )
     assert (alone.presses.mean, alone.episodes, [run.seed for run in alone.runs]) == (0.0, 2, [1, 2])
     rewards = [run.reward for run in alone.runs]
     assert (alone.reward.mean, alone.reward.std) == pytest.approx((np.mean(rewards), np.std(rewards, ddof=1)))
@@ -171,6 +187,44 @@ def test_conditions_and_a_person_stand_in_one_table(
     ]
     assert list(result.keys) == list(KEY_MODELS)
     assert json.loads(json.dumps(asdict(result)))["seeds"] == [1, 2]
+
+
+def test_a_placebo_presses_the_same_keys_without_looking() -> None:
+    keys = ("a", "d", "space", "a", "s")
+
+    def pressed(seed: int) -> list[tuple[int, str]]:
+        placebo = PlaceboPresser(keys, 50, seed)
+        return [(step, key) for step in range(200) if (key := placebo.press(step))]
+
+    first = pressed(3)
+    assert first == pressed(3)
+    assert first != pressed(4)
+    for stretch in range(4):
+        here = [key for step, key in first if step // 50 == stretch]
+        assert sorted(here) == sorted(keys)
+    assert len({tuple(key for step, key in first if step // 50 == stretch) for stretch in range(4)}) > 1
+    assert not any(PlaceboPresser((), 50, 3).press(step) for step in range(100))
+
+
+def test_ratios_pair_the_same_forests() -> None:
+    def runs(distances: list[float], collisions: list[float]) -> list[ForestEpisodeScore]:
+        return [
+            ForestEpisodeScore(seed, 0.0, far, hits, False, False, 10, (), 0)
+            for seed, (far, hits) in enumerate(zip(distances, collisions, strict=True))
+        ]
+
+    far, hits = np.linspace(5.0, 50.0, 12), np.linspace(1.0, 4.0, 12)
+    ratios = compare_conditions(
+        {"alone": runs([*far], [*hits]), "operator": runs([*(2.0 * far)], [*(0.5 * hits)])}, CONDITIONS
+    )
+    assert [(one.condition, one.baseline) for one in ratios] == [("state with an operator", "state alone")]
+    for found, value in (
+        (ratios[0].distance, 2.0),
+        (ratios[0].collisions, 0.5),
+        (ratios[0].collisions_per_metre, 0.25),
+    ):
+        # Unpaired, the spread of the forests would make it wide.
+        assert (found.value, found.low, found.high) == pytest.approx((value, value, value))
 
 
 def test_a_killed_worker_ends_the_experiment(config: DriveConfig) -> None:
@@ -201,7 +255,7 @@ def test_the_command_scores_sessions_alone(recorded: Path, a1_map: Path, map_pat
     scored = _run(*line, "--session", recorded, "--json")
     assert scored.exit_code == 0, scored.output
     (row,) = json.loads(scored.stdout)["conditions"]
-    assert row["runs"] == [asdict(read_forest_episode(recorded, "a1", 1000)[0])]
+    assert row["runs"] == json.loads(json.dumps([asdict(read_forest_episode(recorded, "a1", 1000)[0])]))
     table = _run(*line, "--session", recorded, "--session", recorded, "--steps", 60)
     assert "state with a person" in table.stdout
     missing = _run("evaluate", "a1", "--map", a1_map, "--steps", 60)

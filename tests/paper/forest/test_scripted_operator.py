@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import MapError
+from pdtui.core.robot_links_and_state import Link
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, RobotMotion, predict_motion
+from pdtui.paper.forest.operator_sight import STEPS_PER_FRAME, OperatorSight
 from pdtui.paper.forest.scripted_operator import (
     DEFAULT,
     PRESSES_PER_SECOND,
@@ -17,10 +20,12 @@ from pdtui.paper.forest.scripted_operator import (
     ScriptedOperator,
     operator_keys,
 )
+from pdtui.pictures.view_ahead import AHEAD
 from pdtui.robots.legged.terrain import scatter_trees
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 DT = 0.016
+BODY = Link("body", 0, "sphere", (0.4,), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 KEY_MODELS = {
     DEFAULT: KeyMotionModel(0.0, 1.4, 0.1, 2.5, 0.8, 0.0, 0.2, 0.0),
     "left": KeyMotionModel(0.7, 1.0, 0.1, 2.0, 0.8, 0.0, 0.2, 0.0),
@@ -31,20 +36,27 @@ NAMES = list(KEY_MODELS)
 
 
 def _drive(
-    trees: Floats, steps: int, *, driven: bool = True, moved_from: int | None = None
+    trees: Floats, steps: int, *, driven: bool = True, moved_from: int | None = None, sees_all: bool = True
 ) -> tuple[Floats, dict[int, str]]:
     """Places before each step, shape (S, 3), and presses by step; from one step on, it sees itself aside."""
-    operator = ScriptedOperator(KEY_MODELS, trees, DT)
+    sight, seen = OperatorSight([BODY], trees), trees if sees_all else trees[:0]
+    operator = ScriptedOperator(KEY_MODELS, DT)
     place, latched = RobotMotion(0.0, 0.0, 0.0, 0.0), 0
     places, presses = [], {}
     for step in range(steps):
         places.append((place.x, place.y, place.heading))
         aside = 1.0 if moved_from is not None and step >= moved_from else 0.0
-        if driven and (name := operator.choose_key(place.x, place.y + aside, place.heading)):
+        if not sees_all and step % STEPS_PER_FRAME == 0:
+            seen = sight.look(np.array([[place.x, place.y, 0.3, *_turned(place.heading)]]))
+        if driven and (name := operator.choose_key(place.x, place.y + aside, place.heading, seen)):
             presses[step] = name
             latched = NAMES.index(name)
         _, place = predict_motion(list(KEY_MODELS.values()), place, np.array([[latched]]), DT)
     return np.array(places), presses
+
+
+def _turned(heading: float) -> tuple[float, float, float, float]:
+    return math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
 
 
 def _clearance(places: Floats, trees: Floats) -> float:
@@ -90,6 +102,21 @@ def test_what_it_sees_moves_it_no_sooner_than_its_reaction_time() -> None:
         assert (first - moved_from) * DT >= REACTION_TIME
         changed.append(first)
     assert min(changed) < 220  # it does react
+
+
+def test_a_tree_that_the_picture_does_not_show_changes_no_key() -> None:
+    tree, beside = [6.0, 0.05, 0.3], [[6.5, 2.2, 0.3], [6.5, -2.2, 0.3]]
+    alone, among = np.array([tree]), np.array([tree, *beside])
+    assert _drive(alone, 120)[1] != _drive(among, 120)[1], "with a wider view they would matter"
+    assert _drive(alone, 120, sees_all=False)[1] == _drive(among, 120, sees_all=False)[1]
+
+
+def test_it_does_not_press_before_a_tree_comes_into_the_picture() -> None:
+    trees = np.array([[6.0, 0.05, 0.3]])
+    places, presses = _drive(trees, 120, sees_all=False)
+    saw = min(presses) - math.ceil(REACTION_TIME / DT)
+    assert 6.0 - 0.3 - places[saw, 0] < (0.5 + 0.27) * AHEAD * BODY.size[0] + 1e-9
+    assert min(_drive(trees, 120)[1]) < min(presses), "with a wider view it would press sooner"
 
 
 def test_it_says_which_behaviors_a_map_lacks(small_map: StimulationMap) -> None:
