@@ -18,7 +18,7 @@ from pdtui.stimulation.map_library import find_map, shipped_folder
 from pdtui.stimulation.map_reader import load_map
 
 LEAST = {
-    "a1": {"left": 18, "right": 18, "stop": 12, "forward": 18},
+    "a1": {"left": 18, "right": 17, "forward": 18},
     "walker": {"slow down": 6},
     "bipedal_walker": {"jump": 12, "front flip": 10, "stand up": 10},
 }
@@ -53,7 +53,7 @@ def test_a_sample_driven_on_the_screen_replays_bit_for_bit(path: Path) -> None:
 @pytest.mark.parametrize(
     ("robot", "layers", "behaviors"),
     [
-        ("a1", (256,) * 4, {"left", "right", "stop", "forward"}),
+        ("a1", (256,) * 4, {"bend left", "bend right", "slow to a patter", "forward"}),
         ("anymal", (128, 64, 32), {"left", "right", "hold heading", "hold heading by command"}),
         ("ant", (256, 256), {"stop", "drift left", "drift right", "turn left", "spin right"}),
         ("walker", (256, 256), {"risky brake"}),

@@ -10,7 +10,7 @@ from pdtui.driving.control_loop import ControlLoop
 from pdtui.evaluation.protocol_settings import RandomPurpose, purpose_generator
 from pdtui.paper.forest.key_motion_model import KeyMotionModel
 from pdtui.paper.forest.operator_sight import STEPS_PER_FRAME, OperatorSight
-from pdtui.paper.forest.scripted_operator import DEFAULT, ScriptedOperator, operator_keys
+from pdtui.paper.forest.scripted_operator import ScriptedOperator, operator_behaviors, operator_keys
 
 
 class KeyPresser(Protocol):
@@ -26,9 +26,9 @@ class OperatorPresser:
     def __init__(self, loop: ControlLoop, key_models: Mapping[str, KeyMotionModel]) -> None:
         dt = loop.robot.control_dt
         periods = {
-            name: max(1, round(loop.map.behaviors[name].period / dt))  # type: ignore[operator]
-            for name in key_models
-            if name != DEFAULT and loop.map.behaviors[name].period is not None
+            task: max(1, round(one.period / dt))
+            for task, one in operator_behaviors(loop.map).items()
+            if task in key_models and one.period is not None
         }
         self._loop, self._keys = loop, operator_keys(loop.map)
         self._operator = ScriptedOperator(key_models, dt, periods)

@@ -17,15 +17,15 @@ from pdtui.paper.forest.key_motion_model import (
     predict_motion,
 )
 from pdtui.paper.forest.key_planner import KeyPlanner
-from pdtui.stimulation.stimulation_map import StimulationMap
+from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 REACTION_TIME = 0.3
 """Age of what it sees when it acts, at least, s."""
 PRESSES_PER_SECOND = 3
 """Largest number of key presses in any second."""
 DEFAULT = "default"
-NEEDED_BEHAVIORS = ("left", "right", "stop")
-"""Behaviors that it needs; it also uses ``forward`` if the map has it."""
+NEEDED_TASKS = ("left", "right", "stop")
+"""Tasks for which it needs behaviors, whatever their names; it also uses one for ``forward``."""
 _STEPS_PER_DECISION = 5
 STUCK_TIME = 0.5
 """Time without progress after which the robot counts as stuck, s."""
@@ -42,21 +42,29 @@ _PATIENCE = 1.6
 
 
 def operator_keys(stimulation_map: StimulationMap) -> dict[str, str]:
-    """Return the keys that the operator may press by behavior, the default key first.
+    """Return the keys that the operator may press by task, the default key first.
 
     Raises:
-        MapError: the map lacks a behavior that it needs.
+        MapError: the map lacks a behavior for a task.
     """
-    behaviors = stimulation_map.behaviors
-    missing = [name for name in NEEDED_BEHAVIORS if name not in behaviors]
+    behaviors = operator_behaviors(stimulation_map)
+    return {DEFAULT: stimulation_map.default_key} | {task: one.key for task, one in behaviors.items()}
+
+
+def operator_behaviors(stimulation_map: StimulationMap) -> dict[str, Behavior]:
+    """Return the behaviors that the operator uses by task; one without a task counts by its name.
+
+    Raises:
+        MapError: the map lacks a behavior for a task.
+    """
+    by_task = {one.task or one.name: one for one in stimulation_map.behaviors.values()}
+    missing = [task for task in NEEDED_TASKS if task not in by_task]
     if missing:
-        known = ", ".join(behaviors) or "none"
         raise MapError(
-            f"{stimulation_map.source}: the operator needs the behaviors {', '.join(NEEDED_BEHAVIORS)}; "
-            f"missing: {', '.join(missing)}; the map has {known}"
+            f"{stimulation_map.source}: the operator needs a behavior for each of {', '.join(NEEDED_TASKS)}; "
+            f"missing: {', '.join(missing)}; the map has {', '.join(by_task) or 'none'}"
         )
-    names = [*NEEDED_BEHAVIORS, *(["forward"] if "forward" in behaviors else [])]
-    return {DEFAULT: stimulation_map.default_key} | {name: behaviors[name].key for name in names}
+    return {task: by_task[task] for task in (*NEEDED_TASKS, "forward") if task in by_task}
 
 
 class ScriptedOperator:

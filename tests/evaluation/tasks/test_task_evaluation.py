@@ -172,7 +172,7 @@ def _config_of_one(robot: str, behavior: str) -> DriveConfig:
     [
         ("bipedal_walker", "rise from split"),
         pytest.param("walker", "risky brake", marks=pytest.mark.slow),
-        pytest.param("a1", "left", marks=[pytest.mark.slow, NEEDS_BULLET]),
+        pytest.param("a1", "bend left", marks=[pytest.mark.slow, NEEDS_BULLET]),
     ],
 )
 def test_tasks_of_shipped_robots_are_disturbed_in_every_way(robot: str, behavior: str) -> None:
@@ -189,7 +189,7 @@ def test_tasks_of_shipped_robots_are_disturbed_in_every_way(robot: str, behavior
 
 @NEEDS_BULLET
 def test_a_task_of_the_a1_is_planned_in_every_world_and_runs_there() -> None:
-    plan = plan_evaluation(_config_of_one("a1", "left"), [100], REAL)
+    plan = plan_evaluation(_config_of_one("a1", "bend left"), [100], REAL)
     usual = [run for run in list_task_runs(plan) if run.pressed and run.kind == "units"]
     assert [run.condition for run in usual] == [one.name for one in CONDITIONS]
     measured = {"": [InterventionMeasurement(None, np.zeros(93))]}
