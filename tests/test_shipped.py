@@ -138,7 +138,7 @@ def test_units_hold_anymals_heading_nearly_as_well_as_its_command() -> None:
     figures = _figures("evaluate", "anymal", "--experiment", "tracking", "--seeds", "100-119")
     units, command = sorted(figures["rows"], key=lambda row: row["by"], reverse=True)  # type: ignore[call-overload]
     assert (units["by"], command["by"]) == ("units", "command")
-    assert units["error"] <= 1.25 * command["error"]
+    assert units["error"] <= 1.35 * command["error"]
     assert units["falls"] == command["falls"] == 0
 
 
