@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
+from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict, find_longest_run
 
 _STEP = 0.02  # control step, s
 # Control steps of each task.
@@ -31,8 +31,7 @@ def _walks(trace: TaskRunTrace, usual: float, steps: int) -> tuple[bool, float]:
 def _count_airborne(trace: TaskRunTrace) -> int:
     """Return the longest stretch of control steps in which no foot touches the ground."""
     in_air = (trace["foot 1 contact"] == 0.0) & (trace["foot 2 contact"] == 0.0)
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], in_air, [False])).astype(np.int8)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
+    return find_longest_run(in_air)
 
 
 def judge_jump(trace: TaskRunTrace) -> TaskVerdict:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import MapError
@@ -107,6 +108,12 @@ class Task:
     start: str = ""
     period: int | None = None
     follows: str = ""
+
+
+def find_longest_run(flags: NDArray[np.bool_]) -> int:
+    """Return the length of the longest run of true flags."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def find_task(name: str, tasks: Sequence[Task], owner: str) -> Task:

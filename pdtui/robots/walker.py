@@ -18,7 +18,7 @@ from pdtui.robots.simulators.mujoco_robot import (
     read_motor_gears,
     silence_warnings,
 )
-from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
+from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict, find_longest_run
 
 _FEET = {"right": "foot_geom", "left": "foot_left_geom"}
 # Longest time that a foot may be off the ground in training, s.
@@ -52,7 +52,7 @@ def judge_hop(trace: TaskRunTrace) -> TaskVerdict:
     window = slice(_HOP_FROM, end)
     off = [trace[f"{side} foot clearance"][window] > 0.0 for side in ("right", "left")]
     speed = trace.mean("vx", window)
-    stretch = max(_longest_run(foot) for foot in off) / _HOP_STEPS
+    stretch = max(find_longest_run(foot) for foot in off) / _HOP_STEPS
     up = trace.stays_up(end)
     done = up and stretch >= _HOP_SHARE and speed > _HOP_SPEED
     score = stretch / _HOP_SHARE
@@ -66,11 +66,6 @@ def judge_hop(trace: TaskRunTrace) -> TaskVerdict:
         "vx (m/s)": speed,
     }
     return TaskVerdict(done, score, figures)
-
-
-def _longest_run(flags: NDArray[np.bool_]) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 WALKER_TASKS = (
