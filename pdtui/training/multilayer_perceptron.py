@@ -29,11 +29,20 @@ def init_mlp_parameters(key: jax.Array, widths: tuple[int, ...], layer_norm: boo
     return layers
 
 
-def apply_tanh_mlp(params: MlpParameters, x: Any, tanh: Callable[[Any], Any] = jnp.tanh) -> Any:
-    """Apply the hidden layers with tanh and the last layer without.
+def relu(x: Any) -> Any:
+    """Rectify an array of NumPy or JAX."""
+    return x * (x > 0)
 
-    On parameters in NumPy, give NumPy's tanh.
-    """
+
+ACTIVATIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
+    "tanh": (jnp.tanh, np.tanh),
+    "relu": (relu, relu),
+}
+"""Activation functions of hidden layers by name, for arrays of JAX and of NumPy."""
+
+
+def apply_mlp(params: MlpParameters, x: Any, activation: Callable[[Any], Any]) -> Any:
+    """Apply the hidden layers with an activation function and the last layer without."""
     for layer in params[:-1]:
-        x = tanh(x @ layer["w"] + layer["b"])
+        x = activation(x @ layer["w"] + layer["b"])
     return x @ params[-1]["w"] + params[-1]["b"]

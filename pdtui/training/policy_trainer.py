@@ -19,7 +19,7 @@ from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import save_network
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot, is_fall
-from pdtui.training.multilayer_perceptron import MlpParameters, apply_tanh_mlp
+from pdtui.training.multilayer_perceptron import ACTIVATIONS, MlpParameters, apply_mlp
 from pdtui.training.robot_batch import RobotBatch
 from pdtui.training.training_checkpoint import load_checkpoint, save_checkpoint
 from pdtui.training.training_config import TrainingConfig
@@ -47,14 +47,27 @@ class ActorScore:
         return self.mean_return - self.std_return
 
 
-def score_actor(make: Callable[[], Robot], actor: Actor, seeds: range, steps: int) -> ActorScore:
-    """Run one episode per seed with an actor, all at once."""
-    robots = [make() for _ in seeds]
+def score_actor(robots: Sequence[Robot], actor: Actor, seeds: range, steps: int) -> ActorScore:
+    """Run one episode per seed with an actor, one on every robot at a time."""
+    groups = [seeds[first : first + len(robots)] for first in range(0, len(seeds), len(robots))]
+    runs = [_run_episodes(robots[: len(group)], actor, group, steps) for group in groups]
+    returns, speeds, fallen = (np.concatenate(column) for column in zip(*runs, strict=True))
+    return ActorScore(
+        len(seeds), float(returns.mean()), float(returns.std()), float(speeds.mean()), int(fallen.sum())
+    )
+
+
+def _run_episodes(
+    robots: Sequence[Robot], actor: Actor, seeds: range, steps: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Return return, mean speed and whether the robot fell for the episode of each seed."""
     observations = np.array([robot.reset(seed=s)[0] for robot, s in zip(robots, seeds, strict=True)])
     speed_column = robots[0].attribute_index("speed")
     returns, speeds, lengths = np.zeros(len(robots)), np.zeros(len(robots)), np.zeros(len(robots))
     fallen, over = np.zeros(len(robots), bool), np.zeros(len(robots), bool)
     for _ in range(steps):
+        if over.all():
+            break
         actions = actor(observations.astype(np.float32))
         for index in np.flatnonzero(~over):
             robot = robots[index]
@@ -69,16 +82,17 @@ def score_actor(make: Callable[[], Robot], actor: Actor, seeds: range, steps: in
             lengths[index] += 1
             fallen[index] = is_fall(terminated, info)
             over[index] = terminated or truncated or info.get("finished", False)
-    mean_speed = float(np.mean(speeds / np.maximum(lengths, 1)))
-    return ActorScore(len(robots), float(returns.mean()), float(returns.std()), mean_speed, int(fallen.sum()))
+    return returns, speeds / np.maximum(lengths, 1), fallen
 
 
-def make_numpy_actor(params: MlpParameters, rng: np.random.Generator | None) -> Actor:
+def make_numpy_actor(
+    params: MlpParameters, rng: np.random.Generator | None, activation: str = "tanh"
+) -> Actor:
     """Return a squashed Gaussian actor in NumPy: its mean actions, or samples where a generator is given."""
-    params = jax.tree.map(np.asarray, params)
+    params, activate = jax.tree.map(np.asarray, params), ACTIVATIONS[activation][1]
 
     def act(observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        mean, log_std = np.split(apply_tanh_mlp(params, observation, np.tanh), 2, axis=-1)
+        mean, log_std = np.split(apply_mlp(params, observation, activate), 2, axis=-1)
         if rng is not None:
             noise = rng.standard_normal(mean.shape, np.float32)
             mean = mean + np.exp(np.clip(log_std, -5.0, 2.0)) * noise
@@ -124,6 +138,7 @@ class PolicyTrainer(ABC, Generic[Config]):
         self.rng = np.random.default_rng(seed)
         self.steps = 0
         self.best: dict[str, Any] | None = None
+        self._evaluated: list[Robot] = []
         self.checkpoint, self.best_weights = (folder / f"{n}.safetensors" for n in ("checkpoint", "best"))
         folder.mkdir(parents=True, exist_ok=True)
         self.build()
@@ -186,11 +201,14 @@ class PolicyTrainer(ABC, Generic[Config]):
     def _score(self, actor: Actor, first_seed: int) -> ActorScore:
         seeds = range(first_seed, first_seed + self.config.evaluate_episodes)
         steps = self.config.evaluate_steps
-        return score_actor(self.make, lambda seen: self.to_robot(actor(seen)), seeds, steps)
+        if not self._evaluated:
+            count = min(self.config.evaluate_robots, self.config.evaluate_episodes)
+            self._evaluated = [self.make() for _ in range(count)]
+        return score_actor(self._evaluated, lambda seen: self.to_robot(actor(seen)), seeds, steps)
 
     def _evaluate(self) -> ActorScore:
         params = self.averaged_actor()
-        actor = make_numpy_actor(params, None)
+        actor = make_numpy_actor(params, None, self.config.activation)
         score, best = self._score(actor, SELECTION_SEEDS), self._best_score()
         line = {"steps": self.steps, **asdict(score)}
         with (self.folder / "log.jsonl").open("a") as log:
@@ -205,7 +223,7 @@ class PolicyTrainer(ABC, Generic[Config]):
             robot=self.robot,
             observations=self.observations,
             layers=self.config.layers,
-            activation="tanh",
+            activation=self.config.activation,
             actions=self.actions,
             head="squashed_gaussian",
             action_low=tuple(self._low.tolist()),

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from pdtui.training.multilayer_perceptron import MlpParameters, apply_tanh_mlp, init_mlp_parameters
+from pdtui.training.multilayer_perceptron import ACTIVATIONS, MlpParameters, apply_mlp, init_mlp_parameters
 from pdtui.training.training_config import PpoConfig
 
 _EPSILON = 1e-8
@@ -64,9 +64,13 @@ class _Sample(NamedTuple):
     value_goal: jax.Array
 
 
-def normalise_observations(state: PpoState, observation: jax.Array) -> jax.Array:
+def normalise_observations(state: PpoState, observation: jax.Array, least_deviation: float) -> jax.Array:
     """Return observations normalised by the running mean and deviation."""
-    return (observation - state.mean) / jnp.sqrt(state.variance + _EPSILON)
+    return (observation - state.mean) / _deviation(state, least_deviation)
+
+
+def _deviation(state: PpoState, least: float) -> jax.Array:
+    return jnp.sqrt(jnp.maximum(state.variance, least**2) + _EPSILON)
 
 
 def _log_prob(mean: jax.Array, log_std: jax.Array, action: jax.Array) -> jax.Array:
@@ -78,6 +82,7 @@ class PpoLearner:
 
     def __init__(self, config: PpoConfig, observations: int, actions: int) -> None:
         self.config, self.observations, self.actions = config, observations, actions
+        self._activate, self._activate_in_numpy = ACTIVATIONS[config.activation]
         self._tx = optax.chain(optax.clip_by_global_norm(1.0), optax.scale_by_adam())
         self.update = jax.jit(self._update)
 
@@ -97,7 +102,7 @@ class PpoLearner:
     def folded_actor(self, state: PpoState) -> MlpParameters:
         """Return the averaged actor on raw observations, with log deviations as constant outputs."""
         first, *middle, last = state.average
-        weight = first["w"] / jnp.sqrt(state.variance + _EPSILON)[:, None]
+        weight = first["w"] / _deviation(state, self.config.least_deviation)[:, None]
         head_weight = jnp.concatenate([last["w"], jnp.zeros_like(last["w"])], axis=1)
         head = {"w": head_weight, "b": jnp.concatenate([last["b"], state.log_std])}
         return [{"w": weight, "b": first["b"] - state.mean @ weight}, *middle, head]
@@ -133,9 +138,10 @@ class PpoLearner:
 
     def _samples(self, state: PpoState, rollout: PpoRollout) -> _Sample:
         config = self.config
-        observation = normalise_observations(state, rollout.observation)
-        value = apply_tanh_mlp(state.critic, observation)[..., 0]
-        future = apply_tanh_mlp(state.critic, normalise_observations(state, rollout.following))[..., 0]
+        observation = normalise_observations(state, rollout.observation, config.least_deviation)
+        value = apply_mlp(state.critic, observation, self._activate)[..., 0]
+        following = normalise_observations(state, rollout.following, config.least_deviation)
+        future = apply_mlp(state.critic, following, self._activate)[..., 0]
         delta = rollout.reward * config.reward_scale + config.discount * rollout.discount * future - value
 
         def backwards(later: jax.Array, now: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
@@ -146,7 +152,7 @@ class PpoLearner:
         _, advantage = jax.lax.scan(
             backwards, jnp.zeros(delta.shape[1]), (delta, rollout.restarted), reverse=True
         )
-        mean = apply_tanh_mlp(state.actor, observation)
+        mean = apply_mlp(state.actor, observation, self._activate)
 
         scaled = (advantage - advantage.mean()) / (advantage.std() + _EPSILON)
         log_prob = _log_prob(mean, state.log_std, rollout.action)
@@ -158,11 +164,11 @@ class PpoLearner:
 
         def loss(parameters: tuple[MlpParameters, jax.Array, MlpParameters]) -> tuple[jax.Array, jax.Array]:
             actor, log_std, critic = parameters
-            mean = apply_tanh_mlp(actor, batch.observation)
+            mean = apply_mlp(actor, batch.observation, self._activate)
             ratio = jnp.exp(_log_prob(mean, log_std, batch.action) - batch.log_prob)
             clipped = jnp.clip(ratio, 1 - config.clip, 1 + config.clip)
             surrogate = jnp.minimum(ratio * batch.advantage, clipped * batch.advantage).mean()
-            value = apply_tanh_mlp(critic, batch.observation)[..., 0]
+            value = apply_mlp(critic, batch.observation, self._activate)[..., 0]
             error = ((value - batch.value_goal) ** 2).mean()
             log_ratio = jnp.log(ratio)
             divergence = (ratio - 1.0 - log_ratio).mean()
@@ -191,10 +197,10 @@ class PpoLearner:
             divergence,
         )
 
-
-def sample_actions(state: PpoState, observation: Any, rng: np.random.Generator) -> Any:
-    """Draw actions before tanh, in NumPy."""
-    x = (observation - np.asarray(state.mean)) / np.sqrt(np.asarray(state.variance) + _EPSILON)
-    mean = apply_tanh_mlp(jax.tree.map(np.asarray, state.actor), x, np.tanh)
-    noise = rng.standard_normal(mean.shape, np.float32)
-    return (mean + np.exp(np.asarray(state.log_std)) * noise).astype(np.float32)
+    def sample_actions(self, state: PpoState, observation: Any, rng: np.random.Generator) -> Any:
+        """Draw actions before tanh, in NumPy, with a state of NumPy's arrays."""
+        deviation = np.sqrt(np.maximum(state.variance, self.config.least_deviation**2) + _EPSILON)
+        x = (observation - np.asarray(state.mean)) / deviation
+        mean = apply_mlp(state.actor, x, self._activate_in_numpy)
+        noise = rng.standard_normal(mean.shape, np.float32)
+        return (mean + np.exp(np.asarray(state.log_std)) * noise).astype(np.float32)

@@ -19,7 +19,7 @@ from pdtui.policies.weights.policy_network import PolicyNetwork
 from pdtui.policies.weights.weights_file import find_weights_file, load_network
 from pdtui.training.multilayer_perceptron import MlpParameters
 from pdtui.training.policy_trainer import PolicyTrainer, make_numpy_actor
-from pdtui.training.ppo_learner import PpoLearner, PpoRollout, PpoState, sample_actions
+from pdtui.training.ppo_learner import PpoLearner, PpoRollout, PpoState
 from pdtui.training.robot_batch import RemoteRobotBatch, RobotBatch, TransitionBatch
 from pdtui.training.training_config import PpoConfig
 
@@ -61,7 +61,7 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
 
     def _warm_start(self, weights: Path) -> None:
         actor = network_to_actor(load_network(weights))
-        act, inputs = make_numpy_actor(actor, None), actor[0]["w"].shape[0]
+        act, inputs = make_numpy_actor(actor, None, self.config.activation), actor[0]["w"].shape[0]
         seen = []
         for _ in range(_WARM_START_STEPS):
             observations = self._observations()
@@ -71,7 +71,7 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
 
     def _collect(self, state: PpoState) -> PpoRollout:
         observation = self._observations()
-        action = sample_actions(state, observation, self.rng)
+        action = self.learner.sample_actions(state, observation, self.rng)
         rows = TransitionBatch(*map(np.concatenate, zip(*self._step(np.tanh(action)), strict=True)))
         restarted = np.concatenate([batch.restarted for batch in self.batches]).astype(np.float32)
         return PpoRollout(observation, action, rows.reward, rows.discount, rows.following, restarted)

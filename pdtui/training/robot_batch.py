@@ -14,7 +14,7 @@ from pdtui.core.errors import SimulationDiverged, TrainingError, WorkerError
 from pdtui.core.robot_links_and_state import RobotState
 from pdtui.core.worker_pool import WorkerProcess
 from pdtui.robots import make_robot
-from pdtui.robots.robot import Robot
+from pdtui.robots.robot import Robot, StepResult
 
 
 class TransitionBatch(NamedTuple):
@@ -63,9 +63,10 @@ class RobotBatch:
         """Step every robot once and return the transitions, leading axis (robots,)."""
         before = self.observations.copy()
         after, reward, discount = before.copy(), np.zeros(len(before)), np.ones(len(before))
+        self.begin_steps(actions)
         for index, robot in enumerate(self.robots):
             try:
-                observation, gained, terminated, truncated, info = robot.step(actions[index])
+                observation, gained, terminated, truncated, info = self.finish_step(index, actions[index])
             except SimulationDiverged:
                 observation, gained, info = before[index].astype(np.float64), 0.0, {}
                 terminated, truncated = True, False
@@ -77,6 +78,13 @@ class RobotBatch:
                 observation, self.ages[index] = robot.reset()[0], 0
             self.observations[index] = observation
         return TransitionBatch(before, actions, reward.astype(np.float32), discount.astype(np.float32), after)
+
+    def begin_steps(self, actions: NDArray[np.float32]) -> None:
+        """Begin the step of every robot, where robots can step at the same time."""
+
+    def finish_step(self, index: int, action: NDArray[np.float32]) -> StepResult:
+        """Return the result of a robot's step."""
+        return self.robots[index].step(action)
 
     def state(self) -> RobotBatchState:
         """Return what `restore` needs."""

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from pdtui.training.multilayer_perceptron import MlpParameters, apply_tanh_mlp, init_mlp_parameters
+from pdtui.training.multilayer_perceptron import MlpParameters, apply_mlp, init_mlp_parameters
 from pdtui.training.robot_batch import TransitionBatch
 from pdtui.training.training_config import SacConfig
 
@@ -35,7 +35,7 @@ class SacState(NamedTuple):
 
 def run_actor(params: MlpParameters, observation: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Return mean and log standard deviation before squashing, each (..., actions)."""
-    mean, log_std = jnp.split(apply_tanh_mlp(params, observation), 2, axis=-1)
+    mean, log_std = jnp.split(apply_mlp(params, observation, jnp.tanh), 2, axis=-1)
     return mean, jnp.clip(log_std, -5.0, 2.0)
 
 

@@ -14,6 +14,7 @@ class TrainingConfig:
         worlds: Number of robots that are stepped together.
         chunk: Control steps of every robot between two updates.
         layers: Widths of the hidden layers.
+        activation: Activation function of the policy's hidden layers: ``tanh`` or ``relu``.
         learning_rate: Learning rate of Adam at the start.
         discount: Discount factor per control step.
         average_rate: Rate per update of the moving average of the actor, which is what a run saves: it walks
@@ -21,18 +22,21 @@ class TrainingConfig:
         evaluate_every: Control steps between two evaluations.
         evaluate_episodes: Episodes of an evaluation.
         evaluate_steps: Control steps of an evaluated episode.
+        evaluate_robots: Robots on which these episodes run at a time.
     """
 
     total_steps: int
     worlds: int
     chunk: int
     layers: tuple[int, ...] = (256, 256)
+    activation: str = "tanh"
     learning_rate: float = 3e-4
     discount: float = 0.99
     average_rate: float = 0.002
     evaluate_every: int = 200_000
     evaluate_episodes: int = 32
     evaluate_steps: int = 1000
+    evaluate_robots: int = 32
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,8 @@ class PpoConfig(TrainingConfig):
         entropy: Weight of the entropy bonus.
         log_std: Initial log standard deviation of the actions.
         reward_scale: Factor on rewards, which brings the values to the order of 1.
+        least_deviation: Least deviation by which an observed number is divided. Numbers that hardly change
+            in training may change a lot elsewhere.
     """
 
     total_steps: int = 2_000_000
@@ -66,6 +72,7 @@ class PpoConfig(TrainingConfig):
     entropy: float = 0.001
     log_std: float = -0.5
     reward_scale: float = 0.02
+    least_deviation: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -142,7 +142,7 @@ def test_training_starts_over_and_scores_falls(robot: Sprinter) -> None:
     assert [restarted for _, restarted in rows] == [False] * (LAST - 1) + [True, False]
     assert rows[LAST - 1][0].discount == (1.0 if robot.end == "out of time" else 0.0)
     score = score_actor(
-        lambda: Sprinter(robot.end), lambda seen: np.zeros((len(seen), 1), np.float32), range(2), 50
+        [Sprinter(robot.end)], lambda seen: np.zeros((len(seen), 1), np.float32), range(2), 50
     )
     assert (score.mean_return, score.falls) == (LAST, 2 if robot.end == "fell" else 0)
 

@@ -10,7 +10,7 @@ import torch
 from pdtui.core.errors import TrainingError
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.training.policy_trainer import actor_to_network, make_numpy_actor
-from pdtui.training.ppo_learner import PpoLearner, sample_actions
+from pdtui.training.ppo_learner import PpoLearner
 from pdtui.training.ppo_trainer import network_to_actor, warm_start_policy
 from pdtui.training.training_config import PpoConfig
 
@@ -28,7 +28,7 @@ def test_it_acts_the_same_whatever_the_new_inputs_are() -> None:
     mean = np.tanh(network(torch.from_numpy(seen[:, :3])).detach().numpy()[:, :2])
     assert np.abs(make_numpy_actor(learner.folded_actor(state), None)(seen) - mean).max() < 1e-4
     still = state._replace(log_std=jnp.full(2, -30.0))
-    assert np.abs(np.tanh(sample_actions(still, seen, np.random.default_rng(0))) - mean).max() < 1e-4
+    assert np.abs(np.tanh(learner.sample_actions(still, seen, np.random.default_rng(0))) - mean).max() < 1e-4
     spec = NetworkSpec("x", 5, (8, 6), "tanh", 2, "squashed_gaussian", (-1.0, -1.0), (1.0, 1.0))
     saved = actor_to_network(learner.folded_actor(state), spec)
     assert np.abs(np.tanh(saved(torch.from_numpy(seen)).detach().numpy()[:, :2]) - mean).max() < 1e-4

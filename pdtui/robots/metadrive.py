@@ -1,0 +1,159 @@
+"""A car on MetaDrive's roads: the extra ``driving``, for Python before 3.12."""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.errors import RobotError
+from pdtui.core.robot_links_and_state import Link, RobotState
+from pdtui.core.worker_pool import WorkerProcess
+from pdtui.robots.environments.action_log import ActionLog
+from pdtui.robots.road.metadrive_repairs import OBSERVATIONS
+from pdtui.robots.road.road_scenes import SCENE_STARTS
+from pdtui.robots.road.road_world import CarState, RoadWorld
+from pdtui.robots.robot import ResetResult, Robot, StepResult, TrainingRecipe
+
+_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+# Width of the road plus one lane, by which MetaDrive divides distances to its edges, and of a lane, m.
+_ROAD_WIDTH, _LANE_WIDTH = 14.0, 3.5
+_TOP_SPEED = 80.0 / 3.6  # m/s
+
+
+class MetaDrive(Robot):
+    """A car of MetaDrive 0.4.3 on generated roads of three lanes; a control step is 0.1 s.
+
+    The observation (275) is MetaDrive's, repaired: the car's own state (9), the next two checkpoints of its
+    route (10), the four nearest cars (16) and 240 lidar rays of 50 m. All numbers lie in [0, 1]. The action
+    (2) is steering, positive to the left, and throttle, negative to brake.
+
+    The reward is the progress along the road in m plus a tenth of the speed's share of 80 km/h, 10 on
+    arrival, and −5 off the road and at every step in contact with a car or an obstacle. A contact also costs
+    1 at each step with a car, and once with each obstacle; leaving the road costs 1 and ends the episode.
+
+    Args:
+        scenes: Scenes in which episodes start unless `reset` says otherwise; see `starts`.
+        crashes_end: Whether a crash ends the episode.
+    """
+
+    name = "metadrive"
+    title = "car (MetaDrive)"
+    starts = SCENE_STARTS
+    episode_steps = 1000
+    control_dt = 0.1
+    training_recipe = TrainingRecipe(
+        options={"scenes": "training", "crashes_end": True},
+        robot_batch="pdtui.training.metadrive_batch:MetaDriveBatch",
+        settings={
+            "worlds": 6,
+            "chunk": 340,
+            "minibatch": 256,
+            "epochs": 8,
+            "total_steps": 1_200_000,
+            "evaluate_every": 100_000,
+            "evaluate_episodes": 20,
+            "evaluate_robots": 2,
+            "reward_scale": 0.1,
+            "least_deviation": 0.1,
+            "average_rate": 0.01,
+        },
+    )
+    attributes = (
+        Attribute("speed", "m/s", 3.6 / 81.0),
+        Attribute("lane offset", "m", 1.0 / _LANE_WIDTH),
+        Attribute("left distance", "m", 1.0 / _ROAD_WIDTH),
+        Attribute("right distance", "m", 1.0 / _ROAD_WIDTH),
+        Attribute("heading", "rad", 0.5),
+        Attribute("yaw rate", "rad/s"),
+        Attribute("steering", "", 0.5),
+        Attribute("throttle", "", 0.5),
+        Attribute("gap ahead", "m", 1.0 / 50.0),
+        Attribute("route", ""),
+    )
+    links = (
+        Link("body", 0, "box", (2.25, 0.93, 0.35), (0.0, 0.0, 0.0), _UPRIGHT),
+        Link("cabin", 0, "box", (1.1, 0.8, 0.3), (-0.3, 0.0, 0.65), _UPRIGHT),
+    )
+
+    def __init__(self, scenes: str = "quiet", crashes_end: bool = False) -> None:
+        if importlib.util.find_spec("metadrive") is None:
+            raise RobotError("robot 'metadrive' needs Python before 3.12 and: pip install 'pdtui[driving]'")
+        self._scenes, self._crashes_end = self.check_start(scenes), crashes_end
+        self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (OBSERVATIONS,), np.float32)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self._process = WorkerProcess("the roads", RoadWorld, crashes_end)
+        self._actions = ActionLog(2)
+        self._seed, self._start = 0, self._scenes
+        self.keeps_engine = False
+        """Whether a reset keeps the engine, which is faster, and then repeats itself only nearly."""
+
+    def make_alike(self) -> MetaDrive:
+        """Return another car with the same options, whose resets keep the engine."""
+        car = MetaDrive(self._scenes, self._crashes_end)
+        car.keeps_engine = True
+        return car
+
+    def close(self) -> None:
+        self._process.close()
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> ResetResult:
+        super().reset(seed=seed)
+        drawn = int(self.np_random.integers(2**31)) if seed is None else seed
+        start = self.check_start(str((options or {}).get("start", ""))) or self._scenes
+        self._begin(start, drawn, exactly=not self.keeps_engine)
+        return self.observe(), {}
+
+    def step(self, action: NDArray[np.float32]) -> StepResult:
+        self.send_action(action)
+        return self.receive_step()
+
+    def send_action(self, action: NDArray[np.float32]) -> None:
+        """Begin a step, so that several cars can drive at once."""
+        action = np.asarray(action, np.float32)
+        self._actions.append(action)
+        self._process.send(RoadWorld.step, action)
+
+    def receive_step(self) -> StepResult:
+        """Return what `step` returns, for the action that was sent."""
+        self._state: CarState = self._process.receive()
+        outcome = self._state.outcome
+        info: dict[str, Any] = {"cost": self._state.cost}
+        if outcome:
+            info |= {"reason": outcome, "outcome": outcome, "finished": outcome == "arrived"}
+        timed_out = outcome == "out of time"
+        terminated = bool(outcome) and not timed_out
+        return self.observe(), self._state.reward, terminated, timed_out, info
+
+    def observe(self) -> Floats:
+        return self._state.observation.astype(np.float64)
+
+    def read_attributes(self) -> Floats:
+        return self._state.motion
+
+    def read_poses(self) -> Floats:
+        return self._state.pose[None]
+
+    def digest(self) -> int:
+        return self._state.digest
+
+    def snapshot(self) -> RobotState:
+        mark = np.array([self._seed, self.starts.index(self._start)], np.int64).view(np.float64)
+        return RobotState(self.name, self._actions.so_far(), (mark,), self.np_random.bit_generator.state)
+
+    def restore(self, snapshot: RobotState) -> None:
+        self._check_snapshot(snapshot)
+        seed, start = (int(value) for value in snapshot.extras[0].view(np.int64))
+        self._begin(self.starts[start], seed, exactly=not self.keeps_engine)
+        for action in snapshot.state.astype(np.float32):
+            self.step(action)
+        self.np_random.bit_generator.state = snapshot.rng
+
+    def _begin(self, start: str, seed: int, exactly: bool) -> None:
+        self._seed, self._start, self._actions = seed, start, ActionLog(2)
+        self._process.send(RoadWorld.reset, start, seed, exactly)
+        self._state = self._process.receive()

@@ -1,0 +1,201 @@
+"""MetaDrive in a process of its own: one engine a process, in its main thread, and no assets."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from hashlib import blake2b
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.attributes import Floats
+from pdtui.robots.road.metadrive_repairs import (
+    LIDAR_RANGE,
+    LIDAR_RAYS,
+    OTHER_CARS,
+    blocks_without_ramps,
+    repair_observation,
+)
+from pdtui.robots.road.road_scenes import SceneKind, find_scene
+
+MAX_STEPS = 1000
+_WORDS = (
+    ("arrive_dest", "arrived"),
+    ("out_of_road", "left the road"),
+    ("crash_vehicle", "crashed"),
+    ("crash_object", "crashed"),
+    ("crash_building", "crashed"),
+    ("crash_human", "crashed"),
+    ("max_step", "out of time"),
+)
+
+
+@dataclass(frozen=True)
+class CarState:
+    """What is known of the car after a control step.
+
+    Attributes:
+        observation: What the policy observes, shape (275,).
+        reward, cost: Reward and cost of the step.
+        outcome: How the episode ended; empty if it goes on.
+        motion: Speed (m/s), offset from the middle of the lane to the left (m), distances to the left and the
+            right edge of the road (m), heading relative to the lane's (rad), yaw rate (rad/s), steering and
+            throttle in [−1, 1], distance to what is next in the lane (m) and the driven share of the route.
+        pose: Position (m) and quaternion w x y z, shape (7,).
+        digest: 63-bit digest of all that moves.
+    """
+
+    observation: NDArray[np.float32]
+    reward: float
+    cost: float
+    outcome: str
+    motion: Floats
+    pose: Floats
+    digest: int
+
+
+class RoadWorld:
+    """The engine, the car and the traffic.
+
+    Args:
+        crashes_end: Whether a crash ends the episode.
+    """
+
+    def __init__(self, crashes_end: bool) -> None:
+        os.environ["PYGAME_HIDE_SUPPORT_PROMPT"] = "1"
+        from metadrive.engine.base_engine import BaseEngine
+
+        # A headless engine needs none of the textures, which MetaDrive would download.
+        BaseEngine.try_pull_asset = staticmethod(lambda: None)
+        self._crashes_end = crashes_end
+        self._env: Any = None
+        self._kind: SceneKind | None = None
+
+    def reset(self, start: str, seed: int, exactly: bool) -> CarState:
+        """Begin an episode.
+
+        Args:
+            start: Kind of scene, or one test scene.
+            seed: Chooses one of the kind's scenes.
+            exactly: Whether the episode must repeat itself to the last bit, which takes a new engine.
+
+        Raises:
+            RobotError: There is no such start.
+        """
+        kind, scene = find_scene(start, seed)
+        if exactly or self._env is None or kind != self._kind:
+            self.close()
+            self._env, self._kind = self._make(kind), kind
+        observed, _ = self._env.reset(seed=scene)
+        self._cost = 0.0
+        return self._state(observed, 0.0, {})
+
+    def step(self, action: NDArray[np.float32]) -> CarState:
+        """Drive for a tenth of a second.
+
+        Args:
+            action: Steering to the left and throttle, each in [−1, 1]; a negative throttle brakes.
+        """
+        observed, reward, terminated, truncated, info = self._env.step(action.tolist())
+        return self._state(
+            observed, float(reward), info if terminated or truncated else {"cost": info["cost"]}
+        )
+
+    def close(self) -> None:
+        """End the engine."""
+        if self._env is not None:
+            self._env.close()
+            self._env = None
+
+    def _make(self, kind: SceneKind) -> Any:
+        from metadrive.envs.safe_metadrive_env import SafeMetaDriveEnv
+
+        lidar = {
+            "num_lasers": LIDAR_RAYS,
+            "distance": LIDAR_RANGE,
+            "num_others": OTHER_CARS,
+            "gaussian_noise": 0.0,
+            "dropout_prob": 0.0,
+        }
+        return SafeMetaDriveEnv(
+            {
+                "start_seed": kind.first,
+                "num_scenarios": kind.count,
+                "accident_prob": kind.accident_probability,
+                "traffic_density": kind.traffic_density,
+                "map": kind.blocks,
+                "block_dist_config": blocks_without_ramps(),
+                "horizon": MAX_STEPS,
+                "out_of_route_done": True,
+                "crash_vehicle_done": self._crashes_end,
+                "crash_object_done": self._crashes_end,
+                "vehicle_config": {"lidar": lidar},
+                "log_level": 50,
+            }
+        )
+
+    def _state(self, observed: NDArray[np.float32], reward: float, info: dict[str, Any]) -> CarState:
+        car = self._env.agent
+        outcome = next((word for key, word in _WORDS if info.get(key)), "")
+        return CarState(
+            repair_observation(observed),
+            reward,
+            float(info.get("cost", 0.0)),
+            outcome,
+            self._motion(car),
+            _pose(car),
+            self._digest(),
+        )
+
+    def _motion(self, car: Any) -> Floats:
+        lane = car.lane
+        along, beside = lane.local_coordinates(car.position)
+        heading = (car.heading_theta - lane.heading_theta_at(along) + math.pi) % (2.0 * math.pi) - math.pi
+        turned = car.heading_theta - math.atan2(car.last_heading_dir[1], car.last_heading_dir[0])
+        turned = (turned + math.pi) % (2.0 * math.pi) - math.pi
+        steering, throttle = car.last_current_action[-1]
+        return np.array(
+            [
+                car.speed,
+                beside,
+                car.dist_to_left_side,
+                car.dist_to_right_side,
+                heading,
+                turned / 0.1,
+                steering,
+                throttle,
+                self._gap_ahead(car),
+                car.navigation.route_completion,
+            ],
+            np.float64,
+        )
+
+    def _gap_ahead(self, car: Any) -> float:
+        """Return the distance to what is next in front within a car's width, at most the lidar's range, m."""
+        gap = LIDAR_RANGE
+        for thing in self._env.engine.get_sensor("lidar").get_surrounding_objects(car, int(LIDAR_RANGE)):
+            ahead, beside = car.convert_to_local_coordinates(thing.position, car.position)
+            reach = 0.5 * (float(getattr(thing, "LENGTH", 0.4)) + car.LENGTH)
+            width = 0.5 * (float(getattr(thing, "WIDTH", 0.4)) + car.WIDTH)
+            if ahead > 0.0 and abs(beside) < width:
+                gap = min(gap, max(ahead - reach, 0.0))
+        return gap
+
+    def _digest(self) -> int:
+        digest = blake2b(digest_size=8)
+        for thing in sorted(self._env.engine.get_objects().values(), key=_place):
+            place, velocity = thing.origin.getPos(), thing.body.getLinearVelocity()
+            digest.update(np.array([*place, *velocity, thing.heading_theta], np.float64).tobytes())
+        return int.from_bytes(digest.digest(), "little") >> 1
+
+
+def _place(thing: Any) -> tuple[float, ...]:
+    return tuple(thing.origin.getPos())
+
+
+def _pose(car: Any) -> Floats:
+    w, x, y, z = car.origin.getQuat()
+    return np.array([*car.origin.getPos(), w, x, y, z], np.float64)
