@@ -124,6 +124,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             prober, robot, settings, seed, SharedTimeBudget(config.budget_minutes, began), stage, known
         )
         behaviors, controllers = searches.run(screen, refined, starts.searches)
+        tasks = searches.search_tasks(refined.units)
         return Dissection(
             robot=config.robot if isinstance(config.robot, str) else robot.name,
             policy=network.name if isinstance(config.policy, Policy) else str(config.policy),
@@ -145,6 +146,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             attribute_movers=movers,
             behaviors=behaviors,
             controllers=controllers,
+            tasks=tasks,
             rollouts=pool.rollouts,
             control_steps=pool.control_steps,
             minutes=(time.monotonic() - began) / 60,

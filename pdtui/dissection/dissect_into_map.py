@@ -16,7 +16,7 @@ from pdtui.dissection.dissect import dissect
 from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.dissection.dissection_tables import render_dissection
+from pdtui.dissection.dissection_text import render_dissection
 from pdtui.dissection.draft_map import draft_map
 from pdtui.stimulation.map_reader import parse_map
 

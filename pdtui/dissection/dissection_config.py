@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -15,13 +16,14 @@ from pdtui.robots.robot import Robot
 from pdtui.search.behavior_search import BehaviorSearchSettings
 from pdtui.search.controller_search import ControllerSearchSettings
 from pdtui.search.imprint_candidates import ImprintSettings
+from pdtui.search.task_search import TaskSearchSettings
 from pdtui.stimulation.seed_ranges import FIRST_SEARCH_SEED, require_search_seeds
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 StageProgress = Callable[[str, int, int], None]
 
 SEEDS_PER_DISSECTION = 2000
-"""Number of seeds from a dissection's first on, outside of which it uses none."""
+"""Number of seeds from a dissection's first on that it uses, besides those of searches for tasks."""
 
 
 Part = TypeVar("Part", "DissectionSettings", BehaviorSearchSettings, ControllerSearchSettings)
@@ -50,7 +52,7 @@ class DissectionSettings:
             choose among the finalists on, and are judged on.
         walk_steps: Control steps between a reset and a start.
         imprints: Settings of the imprints that the searches begin from.
-        behavior_search, controller_search: Settings of the searches.
+        behavior_search, controller_search, task_search: Settings of the searches.
     """
 
     steps: int = 1000
@@ -76,6 +78,7 @@ class DissectionSettings:
     imprints: ImprintSettings = field(default_factory=ImprintSettings)
     behavior_search: BehaviorSearchSettings = field(default_factory=BehaviorSearchSettings)
     controller_search: ControllerSearchSettings = field(default_factory=ControllerSearchSettings)
+    task_search: TaskSearchSettings = field(default_factory=partial(TaskSearchSettings, restarts=2))
 
     @property
     def longest_rollout(self) -> int:
@@ -120,6 +123,10 @@ QUICK_DISSECTION = DissectionSettings(
         quick_starts=1, quick_steps=60, full_starts=3, full_steps=120, finalists=2, final_steps=160,
     ),
     controller_search=ControllerSearchSettings(units=1, pairs=1, finalists=2, steps=60, final_steps=160),
+    task_search=TaskSearchSettings(
+        values=(-4.0, 4.0), elite=4, children=8, promoted=4, quick_seeds=1, full_seeds=3, max_units=(3,),
+        generations=3, finalists=2, selection_seeds=6, restarts=0,
+    ),
 )  # fmt: skip
 """A first look that takes about a minute: fewer outputs per unit, fewer starts, and hardly any search."""
 

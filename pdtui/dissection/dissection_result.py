@@ -17,6 +17,7 @@ from pdtui.probing.measured_effects import UnitEffects
 from pdtui.robots.robot_goals import RobotGoals
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
+from pdtui.search.task_search import TaskSearchResult
 from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching import UnitDiscrepancies
 from pdtui.spectra.matching_presets import MatchingPreset
@@ -51,6 +52,7 @@ class Dissection:
         attribute_movers: What moves each attribute up and down.
         behaviors: Best stimulation for each behavior goal.
         controllers: Best controllers of attributes.
+        tasks: Best stimulation for each task that the robot's goals name.
         rollouts, control_steps, minutes: What the dissection took.
         import_options: Answers to what the weights file does not state.
         shortened: A sentence on roll-outs that were shortened because the policy falls; empty if none was.
@@ -76,6 +78,7 @@ class Dissection:
     attribute_movers: tuple[AttributeMover, ...]
     behaviors: tuple[BehaviorSearchResult, ...]
     controllers: tuple[ControllerSearchResult, ...]
+    tasks: tuple[TaskSearchResult, ...]
     rollouts: int
     control_steps: int
     minutes: float

@@ -21,12 +21,16 @@ from pdtui.search.evolutionary_search import SharedTimeBudget
 from pdtui.search.goal_scores import STANDING, reachable_goals
 from pdtui.search.imprint_candidates import build_imprint_candidates
 from pdtui.search.shared_candidates import SharedCandidates, sample_random_candidates
+from pdtui.search.task_search import TaskSearch, TaskSearchResult
 from pdtui.spectra.episode_monitor import monitor_episodes
 
 _IMPRINT_SEEDS = 1000
 """Offset of the imprints' seeds from the first seed of a dissection; no other stage uses them."""
 _CONTROLLER_SHARES = 2
 """Shares of the time that the behaviors leave to the controllers."""
+_TASK_SEEDS = 10_000
+"""Offset of the seeds of searches for tasks from the first seed of a dissection."""
+_SEEDS_PER_TASK = 2000
 _BEHAVIOR_SHARES = 2
 """Shares of a behavior: the search ends after one, and choosing its rival takes about as long."""
 
@@ -60,6 +64,25 @@ class DissectionSearches:
         shared = self.probe_shared_candidates(starts)
         behaviors = self._search_behaviors(goals, (screen, refined), shared, starts)
         return behaviors, self._search_controllers(controller_goals, refined, shared, starts)
+
+    def search_tasks(self, units: Sequence[int]) -> tuple[TaskSearchResult, ...]:
+        """Search for what does the tasks that the robot's goals name.
+
+        Args:
+            units: flat indices of the units that the searches try alone.
+        """
+        results, names = [], self.robot.goals.tasks
+        for number, name in enumerate(names):
+            search = TaskSearch(
+                self.prober.pool,
+                self.robot.find_task(name),
+                self.seed + _TASK_SEEDS + number * _SEEDS_PER_TASK,
+                self.settings.task_search,
+                units=units,
+            )
+            deadline = self.budget.share(len(names) - number)
+            results.append(search.run(deadline, self.stage(f"search: {name}")))
+        return tuple(results)
 
     def probe_shared_candidates(self, starts: SearchStartStates) -> SharedCandidates:
         """Probe random sets and imprints, once for all searches."""

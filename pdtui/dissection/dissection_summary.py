@@ -8,10 +8,13 @@ from typing import Any
 from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.dissection_result import Dissection
+from pdtui.dissection.search_task_into_map import draft_task_behavior
 from pdtui.probing.matching_hits import TOP_MATCHES, measure_matching_hits
 from pdtui.probing.primitive_confirmation import EffectVerdict, PrimitiveConfirmation
+from pdtui.robots.task import average_figures
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
+from pdtui.search.task_search import TaskSearchResult
 from pdtui.spectra.matching_presets import list_preset_values
 
 
@@ -41,10 +44,24 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
         "steered": [_mover(dissection, one) for one in dissection.attribute_movers],
         "side_effects": _side_effects(dissection),
         "behaviors": [_behavior(found, layers) for found in dissection.behaviors],
+        "tasks": [_task(found, dissection) for found in dissection.tasks],
         "holds": [_controller(found, layers) for found in dissection.controllers],
         "rollouts": dissection.rollouts,
         "control_steps": dissection.control_steps,
         "minutes": round(dissection.minutes, 2),
+    }
+
+
+def _task(found: TaskSearchResult, dissection: Dissection) -> dict[str, Any]:
+    behavior = draft_task_behavior(found, dissection.layers, dissection.dt)
+    return {
+        "name": behavior.name,
+        "units": dict(behavior.magnitudes),
+        "period": behavior.period,
+        "walks": len(found.verdicts),
+        "done": found.done,
+        "by_itself": found.done_without,
+        "figures": average_figures(found.verdicts),
     }
 
 

@@ -1,32 +1,18 @@
-"""Tables and remarks that tell what a dissection found."""
+"""Tables that tell what a dissection found."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from rich.console import Group, RenderableType
 from rich.table import Table
-from rich.text import Text
 
 from pdtui.core.text_tables import new_table
-from pdtui.core.units import MAX_LISTED, describe_units
-from pdtui.dissection.dissection_findings import describe_findings
-from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.probing.matching_hits import TOP_MATCHES
+from pdtui.core.units import describe_units
+from pdtui.probing.matching_hits import TOPLISTED_MATCHES
 
-_MATCHES = 3
-
-
-def render_dissection(dissection: Dissection) -> RenderableType:
-    """Return what `pdtui dissect` prints: the tables, the remarks, and the findings in plain words."""
-    summary = summarise_dissection(dissection)
-    parts: list[RenderableType] = [*dissection_tables(summary)]
-    parts += [Text(line) for line in dissection_remarks(summary)]
-    for heading, lines in describe_findings(summary).items():
-        parts += [Text(f"\n{heading}", style="bold"), *(Text(f"- {line}") for line in lines)]
-    return Group(*parts)
+LISTED_MATCHES = 3
+"""Units that a table lists for each attribute."""
 
 
 def dissection_tables(summary: dict[str, Any]) -> list[Table]:
@@ -40,6 +26,8 @@ def dissection_tables(summary: dict[str, Any]) -> list[Table]:
     ]
     if summary["behaviors"]:
         tables.append(_behavior_table(summary))
+    if summary["tasks"]:
+        tables.append(_task_table(summary))
     if summary["holds"]:
         tables.append(_controller_table(summary))
     return tables
@@ -49,7 +37,7 @@ def _matching_table(summary: dict[str, Any]) -> Table:
     title = f"Matching ({' '.join([summary['preset'], *summary['settings_changed']])}): nearest units"
     table = new_table(title, "attribute", "Hz", "unit", "discrepancy", "level share", "ρ", "circular ρ")
     for attribute in summary["attributes"]:
-        for number, one in enumerate(attribute["matches"][:_MATCHES]):
+        for number, one in enumerate(attribute["matches"][:LISTED_MATCHES]):
             label = attribute["name"] if number == 0 else ""
             frequency = f"{attribute['frequency']:.2f}" if number == 0 else ""
             circular = _show(one["rho_circular"], "+.2f") + (" !" if one["rho_disagree"] else "")
@@ -99,7 +87,7 @@ def _range_table(summary: dict[str, Any]) -> Table:
 
 
 def _agreement_table(summary: dict[str, Any]) -> Table:
-    hits = "hits: first / " + " / ".join(f"best {count}" for count in TOP_MATCHES) + " / random"
+    hits = "hits: first / " + " / ".join(f"best {count}" for count in TOPLISTED_MATCHES) + " / random"
     return _table(
         "Matching against probing",
         summary["attributes"],
@@ -109,7 +97,7 @@ def _agreement_table(summary: dict[str, Any]) -> Table:
             hits: lambda one: " / ".join(
                 [
                     _yes(one["hits"]["first"]),
-                    *(_show(one["hits"][f"best_{count}"], ".0%") for count in TOP_MATCHES),
+                    *(_show(one["hits"][f"best_{count}"], ".0%") for count in TOPLISTED_MATCHES),
                     _show(one["hits"]["random"], ".0%"),
                 ]
             ),
@@ -163,6 +151,21 @@ def _behavior_table(summary: dict[str, Any]) -> Table:
     )
 
 
+def _task_table(summary: dict[str, Any]) -> Table:
+    return _table(
+        "Tasks, on held-out walks",
+        summary["tasks"],
+        {
+            "task": lambda one: one["name"],
+            "units": lambda one: describe_units(one["units"]),
+            "seconds": lambda one: "" if one["period"] is None else f"{one['period']:g}",
+            "done": lambda one: f"{one['done']} of {one['walks']}",
+            "without": lambda one: f"{one['by_itself']} of {one['walks']}",
+            "means": lambda one: ", ".join(f"{name} {value:.2f}" for name, value in one["figures"].items()),
+        },
+    )
+
+
 def _controller_table(summary: dict[str, Any]) -> Table:
     return _table(
         "Controllers, on held-out starts",
@@ -187,36 +190,6 @@ def _table(title: str, rows: Sequence[Any], cells: Mapping[str, Callable[[Any], 
     for row in rows:
         table.add_row(*(cell(row) for cell in cells.values()))
     return table
-
-
-def dissection_remarks(summary: dict[str, Any]) -> list[str]:
-    """Return what the tables of a summary do not say, one sentence or two per line."""
-    attributes = summary["attributes"]
-    hits = sum(attribute["hits"]["first"] for attribute in attributes)
-    confirmed = sum(bool(one["first_match"] and one["first_match"]["confirmed"]) for one in attributes)
-    lines = [
-        f"The first match is a hit for {hits} of {len(attributes)} attributes, and probing confirms it for "
-        f"{confirmed}. The dissection took {summary['rollouts']} roll-outs and {summary['minutes']:.1f} min."
-    ]
-    if summary["shortened"]:
-        lines.append(summary["shortened"])
-    unwrapped = [attribute["name"] for attribute in attributes if attribute["unwrapped"]]
-    if unwrapped:
-        lines.append(f"Unwrapped before the transform: {', '.join(unwrapped)}.")
-    lines += [f"{one['name']}: {one['flaw']}." for one in attributes if one["flaw"]]
-    by_flaw: dict[str, list[str]] = {}
-    for unit, flaw in summary["unit_flaws"].items():
-        by_flaw.setdefault(flaw, []).append(unit)
-    for flaw, units in by_flaw.items():
-        more = ", …" if len(units) > MAX_LISTED else ""
-        lines.append(f"† {len(units)} of the units: {flaw} ({', '.join(units[:MAX_LISTED])}{more}).")
-    if summary["judged"]["ranges"]["out_of_range"]["judged"]:
-        lines.append("‡ The unit never puts out such a value by itself.")
-    if any(match["rho_disagree"] for one in attributes for match in one["matches"][:_MATCHES]):
-        lines.append("! The plain and the circular mean of the phase disagree. Trust the circular one.")
-    for seed, steps in summary["too_short"]:
-        lines.append(f"Left out: the episode of seed {seed}, whose {steps} steps are less than one window.")
-    return lines
 
 
 def _probed_unit(one: dict[str, Any] | None) -> str:

@@ -11,14 +11,20 @@ from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.core.units import Stimulation, describe_units, format_unit
 from pdtui.dissection.dissection_config import SEEDS_PER_DISSECTION
 from pdtui.dissection.dissection_result import Dissection
+from pdtui.dissection.search_task_into_map import draft_task_behavior
 from pdtui.robots.robot_goals import HoldBehaviorGoal
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
+from pdtui.search.task_search import TaskSearchResult
 from pdtui.stimulation.map_writer import compose_map
+from pdtui.stimulation.seed_ranges import merge_seed_ranges
 from pdtui.stimulation.stimulation_map import Behavior, MotorPrimitive, PidGains, StimulationMap
 
 _MIN_RHO = 0.1
 """Below, ``v = c ρ`` would need a huge magnitude c: such a behavior names the unit instead."""
+
+_LEAST_DONE = 0.5
+"""Share of the held-out walks on which a task must be done for its behavior to enter the map."""
 
 
 def draft_map(dissection: Dissection) -> str:
@@ -33,6 +39,11 @@ def draft_map(dissection: Dissection) -> str:
     names = {one.unit: one for one in primitives if abs(one.rho) >= _MIN_RHO}
     behaviors = [_draft_behavior(found, dissection, names) for found in dissection.behaviors if found.reached]
     behaviors += [_draft_controller(found, dissection) for found in dissection.controllers if found.holds]
+    behaviors += [
+        draft_task_behavior(found, dissection.layers, dissection.dt)
+        for found in dissection.tasks
+        if _does_task(found)
+    ]
     behaviors += _draft_movers(dissection, {one.key for one in behaviors})
     stimulation_map = StimulationMap(
         dissection.robot,
@@ -43,7 +54,12 @@ def draft_map(dissection: Dissection) -> str:
         {one.name: one for one in behaviors},
         source=f"dissection of {dissection.policy}",
         import_options=dissection.import_options,
-        seeds=(range(dissection.seed, dissection.seed + SEEDS_PER_DISSECTION),),
+        seeds=merge_seed_ranges(
+            [
+                range(dissection.seed, dissection.seed + SEEDS_PER_DISSECTION),
+                *(seeds for found in dissection.tasks for seeds in found.seeds),
+            ]
+        ),
     )
     return compose_map(stimulation_map, _comments(dissection, {one.attribute for one in primitives}))
 
@@ -72,6 +88,12 @@ def _comments(dissection: Dissection, confirmed: set[str]) -> list[str]:
                     f"{behavior.rival_gain:.2g} beside {behavior.gain.effect:.2g} (p {behavior.rival_p:.2g})."
                 )
             lines.append(line)
+    for task in dissection.tasks:
+        if not _does_task(task):
+            lines.append(
+                f"Not found: {task.task.name}. The best stimulation did it on {task.done} of "
+                f"{len(task.verdicts)} held-out walks, and none on {task.done_without}."
+            )
     for controller in dissection.controllers:
         if not controller.holds:
             lines.append(
@@ -80,6 +102,10 @@ def _comments(dissection: Dissection, confirmed: set[str]) -> list[str]:
                 f"{controller.falls:.0%}."
             )
     return lines
+
+
+def _does_task(found: TaskSearchResult) -> bool:
+    return found.done > found.done_without and found.done >= _LEAST_DONE * len(found.verdicts)
 
 
 def _draft_primitives(dissection: Dissection) -> list[MotorPrimitive]:

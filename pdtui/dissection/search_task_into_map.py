@@ -47,8 +47,8 @@ class WrittenBehavior:
             "period": self.seconds,
             "held_out": {
                 "walks": len(verdicts),
-                "done": sum(verdict.success for verdict in verdicts),
-                "by_itself": sum(verdict.success for verdict in self.result.untouched),
+                "done": self.result.done,
+                "by_itself": self.result.done_without,
                 "figures": average_figures(verdicts),
             },
             "rollouts": self.result.rollouts,
@@ -102,18 +102,24 @@ def search_task_into_map(
         new_map = StimulationMap(
             robot, policy, pool.policy.sha256, "space", {}, {}, import_options=import_options
         )
-    units = result.plan.stimulation.by_address(layers)
-    seconds = None if result.plan.steps is None else round(result.plan.steps * dt, 6)
-    behavior = Behavior(goal.name, goal.key, goal.says, units, period=seconds, task=goal.name)
+    behavior = draft_task_behavior(result, layers, dt)
 
     def change(text: str) -> str:
-        return add_seeds(add_behavior(text, behavior, str(output)), search.seeds, str(output))
+        return add_seeds(add_behavior(text, behavior, str(output)), result.seeds, str(output))
 
     if known is None:
         write_file(output, change(compose_map(new_map)), MapError)
     else:
         rewrite_map(output, change)
-    return WrittenBehavior(result, units, seconds, output)
+    return WrittenBehavior(result, dict(behavior.magnitudes), behavior.period, output)
+
+
+def draft_task_behavior(result: TaskSearchResult, layers: tuple[int, ...], dt: float) -> Behavior:
+    """Return the behavior that does a task, for control steps of `dt` s."""
+    task, steps = result.task, result.plan.steps
+    period = None if steps is None else round(steps * dt, 6)
+    units = result.plan.stimulation.by_address(layers)
+    return Behavior(task.name, task.key, task.says, units, period=period, task=task.name)
 
 
 def _known_plans(

@@ -20,7 +20,8 @@ from pdtui.core.errors import PictureError
 from pdtui.dissection.dissection_findings import describe_findings
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.dissection.dissection_tables import dissection_remarks, dissection_tables
+from pdtui.dissection.dissection_tables import dissection_tables
+from pdtui.dissection.dissection_text import dissection_remarks
 from pdtui.pictures.dissection_attribute_plots import draw_attribute_page
 from pdtui.pictures.dissection_chart_data import (
     compute_effect_curves,

@@ -31,6 +31,7 @@ _Chunk = tuple[Sequence[RolloutJob], dict[int, StartState], int, int]
 
 def _build_pair(robot: str, policy: str, import_options: ImportOptions) -> _Pair:
     world = make_robot(robot)
+    world.allow_near_restores()
     return world, _load(policy, world, import_options)
 
 
@@ -75,6 +76,8 @@ class RolloutPool(Closable):
             self.policy = policy if isinstance(policy, Policy) else _load(policy, self.robot, import_options)
             check_policy_fit(self.policy, self.robot, self.robot.name)
             self._resources = stack.pop_all()
+        if isinstance(robot, str):
+            self.robot.allow_near_restores()
         named = isinstance(robot, str) and not isinstance(policy, Policy)
         self._pool = WorkerPool(
             f"roll-outs of {self.robot.name}",

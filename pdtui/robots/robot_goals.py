@@ -59,12 +59,15 @@ class RobotGoals:
     Attributes:
         behaviors: Behaviors, in the order in which they are searched for.
         holds: Behaviors that hold an attribute, in the order in which they are searched for.
+        tasks: Names of those of the robot's tasks that a dissection looks for, too: what a robot does by
+            pulses rather than by behaviors that last.
         primitives: Names of the motor primitives, by the attribute that each of them steers. A robot with
             none of these attributes gets a primitive for every attribute that can be moved.
     """
 
     behaviors: tuple[BehaviorGoal, ...] = ()
     holds: tuple[HoldBehaviorGoal, ...] = ()
+    tasks: tuple[str, ...] = ()
     primitives: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
 

@@ -77,6 +77,7 @@ class TaskSearchResult:
         verdicts: verdicts with the stimulation on held-out walks.
         untouched: verdicts without it on the same walks.
         rollouts: number of roll-outs of the search.
+        seeds: seeds on which something was chosen.
     """
 
     task: Task
@@ -85,6 +86,17 @@ class TaskSearchResult:
     verdicts: tuple[TaskVerdict, ...]
     untouched: tuple[TaskVerdict, ...]
     rollouts: int
+    seeds: tuple[range, ...]
+
+    @property
+    def done(self) -> int:
+        """On how many held-out walks the task was done."""
+        return sum(verdict.success for verdict in self.verdicts)
+
+    @property
+    def done_without(self) -> int:
+        """On how many of these walks it was done without the stimulation."""
+        return sum(verdict.success for verdict in self.untouched)
 
 
 class TaskSearch:
@@ -99,6 +111,7 @@ class TaskSearch:
         seed: first seed of the walks, and seed of every random choice.
         settings: how much to do.
         known: plans to begin with besides the best single units.
+        units: flat indices of the units that are tried alone; None for those that the settings say.
 
     Raises:
         SeedError: a seed is reserved for judging.
@@ -111,8 +124,10 @@ class TaskSearch:
         seed: int,
         settings: TaskSearchSettings,
         known: Sequence[StimulationWithDuration] = (),
+        units: Sequence[int] | None = None,
     ) -> None:
         self._pool, self._task, self._seed, self._settings, self._known = pool, task, seed, settings, known
+        self._units = units
         self._rng, self._rollouts = np.random.default_rng(seed), 0
         require_search_seeds([seed], f"the search for '{task.name}'")
 
@@ -136,7 +151,9 @@ class TaskSearch:
         search_score, best = self._search_again_and_again(problem, deadline, progress)
         plans, seeds = [best, StimulationWithDuration()], JUDGING_SEEDS[-settings.held_out_seeds :]
         verdicts, untouched = map(tuple, self._judge(plans, seeds))
-        return TaskSearchResult(self._task, best, search_score, verdicts, untouched, self._rollouts)
+        return TaskSearchResult(
+            self._task, best, search_score, verdicts, untouched, self._rollouts, self.seeds
+        )
 
     def _search_again_and_again(
         self,
@@ -180,9 +197,10 @@ class TaskSearch:
         """Return the best single units, and weights by which to draw units."""
         settings, units = self._settings, self._pool.policy.units
         period = None if self._task.period is None else self._task.period // 2
-        tried = np.arange(units)
-        if settings.screen_units is not None and settings.screen_units < units:
-            tried = np.sort(self._rng.choice(units, settings.screen_units, replace=False))
+        tried = np.arange(units) if self._units is None else np.array(self._units)
+        limit = settings.screen_units if self._units is None else None
+        if limit is not None and limit < units:
+            tried = np.sort(self._rng.choice(units, limit, replace=False))
         plans = [
             StimulationWithDuration(Stimulation.of({unit: value}), period)
             for unit in tried.tolist()

@@ -17,7 +17,7 @@ from pdtui.core.units import Stimulation
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_searches import DissectionSearches
 from pdtui.dissection.dissection_summary import summarise_dissection
-from pdtui.dissection.dissection_tables import render_dissection
+from pdtui.dissection.dissection_text import render_dissection
 from pdtui.dissection.draft_map import draft_map
 from pdtui.policies.weights.weights_file import hash_file
 from pdtui.probing.effect_probe import EffectProbe

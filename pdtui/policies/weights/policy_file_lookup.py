@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,28 @@ from pdtui.core.errors import PolicyError
 
 POLICY_FOLDERS_VARIABLE = "PDTUI_POLICY_FOLDERS"
 """Environment variable: further folders whose files maps and sessions may name, separated as in PATH."""
+
+
+PACKAGE_POLICIES = {"metadrive:expert": "examples/ppo_expert/expert_weights.npz"}
+"""Policies that come with another package: its name, a colon and a name of ours, and the file in it."""
+
+
+def find_package_policy(name: str) -> Path | None:
+    """Return the path of a policy in `PACKAGE_POLICIES`, None for another name.
+
+    Raises:
+        PolicyError: The package is not installed here, or its version has no such file.
+    """
+    if name not in PACKAGE_POLICIES:
+        return None
+    package = name.partition(":")[0]
+    spec = importlib.util.find_spec(package)
+    if spec is None or spec.origin is None:
+        raise PolicyError(f"policy '{name}' comes with the package '{package}', which is not installed")
+    path = Path(spec.origin).parent / PACKAGE_POLICIES[name]
+    if not is_file(path):
+        raise PolicyError(f"policy '{name}': expected the file {path}, found none")
+    return path
 
 
 def find_file_beside(name: str, folders: Sequence[Path]) -> Path | None:

@@ -36,6 +36,9 @@ from pdtui.policies.weights.weights_file import (
     save_network,
 )
 
+PACKAGE_POLICY_OPTIONS = {"metadrive:expert": ImportOptions(activation="tanh", squash="clip")}
+"""Answers to what the policies of other packages leave open; see `PACKAGE_POLICIES`."""
+
 
 def load_policy(
     name: str | Path,
@@ -64,6 +67,8 @@ def load_policy(
             the world, or needs an option.
     """
     path = find_weights_file(str(name), folders)
+    if import_options == NO_OPTIONS:
+        import_options = PACKAGE_POLICY_OPTIONS.get(str(name), NO_OPTIONS)
     found = found or read_policy_of_another_program(path)
     if found is not None and found.form == "torchscript":
         return load_torchscript_policy(path, found, spaces, import_options)

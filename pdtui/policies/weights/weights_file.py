@@ -16,7 +16,7 @@ from safetensors.torch import save
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PolicyError
 from pdtui.core.untrusted_file import WEIGHTS_BUDGET, open_regular_file
-from pdtui.policies.weights.policy_file_lookup import find_file_beside, is_file
+from pdtui.policies.weights.policy_file_lookup import find_file_beside, find_package_policy, is_file
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork, check_tensor_shapes
 
 WEIGHTS = Path(__file__).parent / "shipped"
@@ -28,13 +28,16 @@ _MAX_HEADER = 1 << 20
 def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
     """Return the path of a weights file: as given, in one of the folders, or a shipped one by its name.
 
-    If there is none, a `PolicyError` lists the shipped policies.
+    A name such as ``metadrive:expert`` is that of a policy that comes with another package. If there is none,
+    a `PolicyError` lists the shipped policies.
     """
     own = find_file_beside(name, folders)
     if own is not None:
         return own
     if is_file(shipped := WEIGHTS / f"{name}.safetensors"):
         return shipped
+    if (packaged := find_package_policy(name)) is not None:
+        return packaged
     known = ", ".join(sorted(path.stem for path in WEIGHTS.glob("*.safetensors"))) or "none"
     raise PolicyError(f"no policy '{name}': neither a file nor a shipped policy; shipped policies: {known}")
 

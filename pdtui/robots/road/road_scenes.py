@@ -21,6 +21,7 @@ class SceneKind:
         accident_probability: Probability of an accident or a construction site on a block of the road.
         traffic_density: Cars on 10 m of a lane.
         blocks: Blocks of the road: their number, or their letters in MetaDrive's notation.
+        middle_lane: Whether the car starts in the middle of three lanes; otherwise in a random one.
     """
 
     first: int
@@ -28,13 +29,14 @@ class SceneKind:
     accident_probability: float
     traffic_density: float
     blocks: int | str = 3
+    middle_lane: bool = False
 
 
 SCENE_KINDS = {
     "quiet": SceneKind(10_000, 10_000, 0.0, 0.05),
     "training": SceneKind(0, 50, 0.0, 0.05),
     "traffic": SceneKind(30_000, 10_000, 0.8, 0.1),
-    "straight": SceneKind(50_000, 10_000, 0.0, 0.0, "SSSSSS"),
+    "straight": SceneKind(50_000, 10_000, 0.0, 0.0, "SSSSSSSS", middle_lane=True),
     "test": SceneKind(_FIRST_TEST_SCENE, TEST_SCENES, 0.8, 0.1),
 }
 """Kinds of scenes by name. ``test`` are those of the paper's experiment; ``training`` are the only ones that

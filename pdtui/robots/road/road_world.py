@@ -111,8 +111,11 @@ class RoadWorld:
             self._env = None
 
     def _make(self, kind: SceneKind) -> Any:
+        from metadrive.component.pgblock.first_block import FirstPGBlock
+        from metadrive.constants import DEFAULT_AGENT
         from metadrive.envs.safe_metadrive_env import SafeMetaDriveEnv
 
+        lane = (FirstPGBlock.NODE_1, FirstPGBlock.NODE_2, int(kind.middle_lane))
         lidar = {
             "num_lasers": LIDAR_RAYS,
             "distance": LIDAR_RANGE,
@@ -133,6 +136,8 @@ class RoadWorld:
                 "crash_vehicle_done": self._crashes_end,
                 "crash_object_done": self._crashes_end,
                 "vehicle_config": {"lidar": lidar},
+                "random_spawn_lane_index": not kind.middle_lane,
+                "agent_configs": {DEFAULT_AGENT: {"use_special_color": True, "spawn_lane_index": lane}},
                 "log_level": 50,
             }
         )
@@ -160,7 +165,7 @@ class RoadWorld:
         return np.array(
             [
                 car.speed,
-                beside,
+                -beside,
                 car.dist_to_left_side,
                 car.dist_to_right_side,
                 heading,
