@@ -10,6 +10,15 @@ import click
 from pdtui.cli.shared_options import FILE_PATH, integer_option, progress_bar
 
 
+def _parse_layers(text: str | None) -> tuple[int, ...] | None:
+    if text is None:
+        return None
+    widths = text.split(",")
+    if not all(width.isdecimal() and 0 < int(width) <= 4096 for width in widths):
+        raise click.BadParameter(f"expected widths from 1 to 4096 such as 256,256, found '{text}'")
+    return tuple(map(int, widths))
+
+
 @click.command()
 @click.argument("robot")
 @integer_option("--seed", least=0, most=2**31 - 1, default=0, help="Seed of every random choice.")
@@ -28,6 +37,22 @@ from pdtui.cli.shared_options import FILE_PATH, integer_option, progress_bar
     type=click.FloatRange(0, min_open=True),
     metavar="RATE",
     help="Learning rate at the start; default: that of the robot's recipe.",
+)
+@click.option(
+    "--layers",
+    metavar="WIDTHS",
+    callback=lambda _, __, text: _parse_layers(text),
+    help="Widths of the hidden layers, such as 256,256; default: those of the robot's recipe.",
+)
+@click.option(
+    "--activation",
+    type=click.Choice(["tanh", "relu"]),
+    help="Activation function of the hidden layers, for PPO; default: tanh.",
+)
+@click.option(
+    "--initial-policy",
+    metavar="FILE",
+    help="Weights file or shipped policy that PPO starts from. One with other layers is imitated first.",
 )
 @click.option(
     "--forward",

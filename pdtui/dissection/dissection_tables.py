@@ -9,7 +9,7 @@ from rich.table import Table
 
 from pdtui.core.text_tables import new_table
 from pdtui.core.units import describe_units
-from pdtui.probing.matching_hits import TOPLISTED_MATCHES
+from pdtui.probing.matching_hits import TOP_MATCHES
 
 LISTED_MATCHES = 3
 """Units that a table lists for each attribute."""
@@ -87,7 +87,7 @@ def _range_table(summary: dict[str, Any]) -> Table:
 
 
 def _agreement_table(summary: dict[str, Any]) -> Table:
-    hits = "hits: first / " + " / ".join(f"best {count}" for count in TOPLISTED_MATCHES) + " / random"
+    hits = "hits: first / " + " / ".join(f"best {count}" for count in TOP_MATCHES) + " / random"
     return _table(
         "Matching against probing",
         summary["attributes"],
@@ -97,7 +97,7 @@ def _agreement_table(summary: dict[str, Any]) -> Table:
             hits: lambda one: " / ".join(
                 [
                     _yes(one["hits"]["first"]),
-                    *(_show(one["hits"][f"best_{count}"], ".0%") for count in TOPLISTED_MATCHES),
+                    *(_show(one["hits"][f"best_{count}"], ".0%") for count in TOP_MATCHES),
                     _show(one["hits"]["random"], ".0%"),
                 ]
             ),

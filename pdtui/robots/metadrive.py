@@ -57,10 +57,14 @@ class MetaDrive(Robot):
             "worlds": 6,
             "chunk": 340,
             "minibatch": 256,
-            "epochs": 8,
-            "total_steps": 1_200_000,
-            "evaluate_every": 100_000,
+            "epochs": 6,
+            "total_steps": 160_000,
+            "evaluate_every": 40_000,
             "evaluate_episodes": 20,
+            "imitates": True,
+            "critic_iterations": 6,
+            "log_std": -1.5,
+            "divergence": 0.006,
             "evaluate_robots": 2,
             "reward_scale": 0.1,
             "least_deviation": 0.1,
@@ -135,6 +139,15 @@ class MetaDrive(Robot):
         timed_out = outcome == "out of time"
         terminated = bool(outcome) and not timed_out
         return self.observe(), self._state.reward, terminated, timed_out, info
+
+    def ask_rules(self) -> None:
+        """Ask MetaDrive's rule-based driver, so that several cars can be asked at once."""
+        self._process.send(RoadWorld.suggest_action)
+
+    def receive_suggestion(self) -> NDArray[np.float32]:
+        """Return what the rule-based driver would do now: steering and throttle."""
+        suggested: NDArray[np.float32] = self._process.receive()
+        return suggested
 
     def observe(self) -> Floats:
         return self._state.observation.astype(np.float64)

@@ -28,6 +28,11 @@ class MetaDriveBatch(RobotBatch):
         for car, action in zip(self.robots, actions, strict=True):
             cast(MetaDrive, car).send_action(action)
 
+    def suggest_actions(self) -> NDArray[np.float32]:
+        for car in self.robots:
+            cast(MetaDrive, car).ask_rules()
+        return np.array([cast(MetaDrive, car).receive_suggestion() for car in self.robots])
+
     def finish_step(self, index: int, action: NDArray[np.float32]) -> StepResult:
         del action
         return cast(MetaDrive, self.robots[index]).receive_step()

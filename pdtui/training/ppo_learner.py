@@ -82,7 +82,7 @@ class PpoLearner:
 
     def __init__(self, config: PpoConfig, observations: int, actions: int) -> None:
         self.config, self.observations, self.actions = config, observations, actions
-        self._activate, self._activate_in_numpy = ACTIVATIONS[config.activation]
+        self.activate, self._activate_in_numpy = ACTIVATIONS[config.activation]
         self._tx = optax.chain(optax.clip_by_global_norm(1.0), optax.scale_by_adam())
         self.update = jax.jit(self._update)
 
@@ -139,9 +139,9 @@ class PpoLearner:
     def _samples(self, state: PpoState, rollout: PpoRollout) -> _Sample:
         config = self.config
         observation = normalise_observations(state, rollout.observation, config.least_deviation)
-        value = apply_mlp(state.critic, observation, self._activate)[..., 0]
+        value = apply_mlp(state.critic, observation, self.activate)[..., 0]
         following = normalise_observations(state, rollout.following, config.least_deviation)
-        future = apply_mlp(state.critic, following, self._activate)[..., 0]
+        future = apply_mlp(state.critic, following, self.activate)[..., 0]
         delta = rollout.reward * config.reward_scale + config.discount * rollout.discount * future - value
 
         def backwards(later: jax.Array, now: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
@@ -152,7 +152,7 @@ class PpoLearner:
         _, advantage = jax.lax.scan(
             backwards, jnp.zeros(delta.shape[1]), (delta, rollout.restarted), reverse=True
         )
-        mean = apply_mlp(state.actor, observation, self._activate)
+        mean = apply_mlp(state.actor, observation, self.activate)
 
         scaled = (advantage - advantage.mean()) / (advantage.std() + _EPSILON)
         log_prob = _log_prob(mean, state.log_std, rollout.action)
@@ -164,11 +164,11 @@ class PpoLearner:
 
         def loss(parameters: tuple[MlpParameters, jax.Array, MlpParameters]) -> tuple[jax.Array, jax.Array]:
             actor, log_std, critic = parameters
-            mean = apply_mlp(actor, batch.observation, self._activate)
+            mean = apply_mlp(actor, batch.observation, self.activate)
             ratio = jnp.exp(_log_prob(mean, log_std, batch.action) - batch.log_prob)
             clipped = jnp.clip(ratio, 1 - config.clip, 1 + config.clip)
             surrogate = jnp.minimum(ratio * batch.advantage, clipped * batch.advantage).mean()
-            value = apply_mlp(critic, batch.observation, self._activate)[..., 0]
+            value = apply_mlp(critic, batch.observation, self.activate)[..., 0]
             error = ((value - batch.value_goal) ** 2).mean()
             log_ratio = jnp.log(ratio)
             divergence = (ratio - 1.0 - log_ratio).mean()
@@ -177,13 +177,17 @@ class PpoLearner:
         parameters = (state.actor, state.log_std, state.critic)
         gradient, divergence = jax.grad(loss, has_aux=True)(parameters)
         changes, optimiser = self._tx.update(gradient, state.optimiser)
-        changes = jax.tree.map(lambda change: -state.rate * change, changes)
+        learns = state.iterations >= config.critic_iterations
+        moved, spread, valued = jax.tree.map(lambda change: -state.rate * change, changes)
+        moved, spread = jax.tree.map(lambda change: jnp.where(learns, change, 0.0), (moved, spread))
+        changes = (moved, spread, valued)
         actor, log_std, critic = optax.apply_updates(parameters, changes)
         share = state.iterations * config.worlds * config.chunk / config.total_steps
         late = jnp.clip(2.0 * share - 1.0, 0.0, 1.0)
         aim = config.divergence * (1.0 - (1.0 - config.final_divergence) * late)
         rate = jnp.where(divergence > 2.0 * aim, state.rate / _RATE_FACTOR, state.rate)
         rate = jnp.where(divergence < 0.5 * aim, rate * _RATE_FACTOR, rate)
+        rate = jnp.where(learns, rate, state.rate)
         average = jax.tree.map(lambda old, new: old + config.average_rate * (new - old), state.average, actor)
         return (
             state._replace(

@@ -6,8 +6,8 @@ MuJoCo releases Python's lock while it steps. For a simulator that does not, eac
 from __future__ import annotations
 
 import pkgutil
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +18,7 @@ from pdtui.core.errors import TrainingError
 from pdtui.policies.weights.policy_network import PolicyNetwork
 from pdtui.policies.weights.weights_file import find_weights_file, load_network
 from pdtui.training.multilayer_perceptron import MlpParameters
+from pdtui.training.policy_imitation import fit_actor
 from pdtui.training.policy_trainer import PolicyTrainer, make_numpy_actor
 from pdtui.training.ppo_learner import PpoLearner, PpoRollout, PpoState
 from pdtui.training.robot_batch import RemoteRobotBatch, RobotBatch, TransitionBatch
@@ -26,6 +27,8 @@ from pdtui.training.training_config import PpoConfig
 THREADS = 2
 # Control steps of the initial policy from which the observations are normalised.
 _WARM_START_STEPS = 200
+# Rounds of imitation, control steps of every robot in each, and the deviation of the noise on the actions.
+_IMITATION_ROUNDS, _IMITATION_STEPS, _IMITATION_NOISE = 3, 800, 0.08
 # A smaller deviation than this would blow up inputs that hardly change.
 _MIN_DEVIATION = 0.01
 
@@ -46,8 +49,8 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
         self.learner = PpoLearner(self.config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self._threads = ThreadPoolExecutor(THREADS)
-        if recipe.initial_policy and not self.checkpoint.exists():
-            self._warm_start(find_weights_file(recipe.initial_policy))
+        if not self.checkpoint.exists():
+            self._begin(self.config.initial_policy or recipe.initial_policy)
 
     def advance(self) -> int:
         on_host: PpoState = jax.tree.map(np.asarray, self.state)
@@ -59,8 +62,23 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
     def averaged_actor(self) -> MlpParameters:
         return self.learner.folded_actor(self.state)
 
-    def _warm_start(self, weights: Path) -> None:
-        actor = network_to_actor(load_network(weights))
+    def _begin(self, initial: str) -> None:
+        """Start from another policy, or from what a rule-based driver does, or untrained."""
+        if not initial:
+            if self.config.imitates:
+                self._imitate(lambda _: np.concatenate([one.suggest_actions() for one in self.batches]))
+            return
+        network = load_network(find_weights_file(initial))
+        same = network.spec.layers == self.config.layers
+        if same and network.spec.activation == self.config.activation:
+            self._warm_start(network)
+        else:
+            actor = network_to_actor(network)
+            act, inputs = make_numpy_actor(actor, None, network.spec.activation), actor[0]["w"].shape[0]
+            self._imitate(lambda seen: act(seen[:, :inputs]))
+
+    def _warm_start(self, network: PolicyNetwork) -> None:
+        actor = network_to_actor(network)
         act, inputs = make_numpy_actor(actor, None, self.config.activation), actor[0]["w"].shape[0]
         seen = []
         for _ in range(_WARM_START_STEPS):
@@ -68,6 +86,30 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
             seen.append(observations)
             self._step(act(observations[:, :inputs]))
         self.state = warm_start_policy(self.learner, self.state, actor, np.concatenate(seen))
+
+    def _imitate(self, demonstrate: Callable[[NDArray[np.float32]], NDArray[np.float32]]) -> None:
+        """Learn to act as somebody does, in several rounds.
+
+        After the first round the learner acts itself, so that it is told what to do where it goes astray
+        (Ross et al., "A Reduction of Imitation Learning and Structured Prediction to No-Regret Online
+        Learning", 2011).
+
+        Args:
+            demonstrate: Returns the actions to take, given observations.
+        """
+        untrained = self.state
+        seen: list[NDArray[np.float32]] = []
+        actions: list[NDArray[np.float32]] = []
+        for number in range(_IMITATION_ROUNDS):
+            act = make_numpy_actor(self.averaged_actor(), None, self.config.activation)
+            for _ in range(_IMITATION_STEPS):
+                seen.append(self._observations())
+                actions.append(demonstrate(seen[-1]))
+                noise = self.rng.normal(0.0, _IMITATION_NOISE, actions[-1].shape).astype(np.float32)
+                taken = act(seen[-1]) if number else actions[-1]
+                self._step(np.clip(taken + noise, -1.0, 1.0))
+            rows = np.concatenate(seen), np.concatenate(actions)
+            self.state, _ = fit_actor(self.learner, untrained, *rows, self.rng)
 
     def _collect(self, state: PpoState) -> PpoRollout:
         observation = self._observations()

@@ -86,6 +86,14 @@ class RobotBatch:
         """Return the result of a robot's step."""
         return self.robots[index].step(action)
 
+    def suggest_actions(self) -> NDArray[np.float32]:
+        """Return what a rule-based driver of each robot would do now, shape (robots, actions).
+
+        Raises:
+            TrainingError: The robot has none.
+        """
+        raise TrainingError(f"{self.robots[0].name}: expected a robot with a rule-based driver to imitate")
+
     def state(self) -> RobotBatchState:
         """Return what `restore` needs."""
         return RobotBatchState([robot.snapshot() for robot in self.robots], list(self.ages))

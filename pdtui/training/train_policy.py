@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from pdtui.core.errors import TrainingError
 from pdtui.robots import list_robot_names, make_robot
@@ -20,12 +21,16 @@ def train_policy(
     forward: str | None,
     folder: Path,
     progress: Callable[..., None] | None,
+    *,
+    layers: tuple[int, ...] | None = None,
+    activation: str | None = None,
+    initial_policy: str | None = None,
 ) -> Path:
     """Train a policy in a folder, or continue there, and return the path of the best weights.
 
     Raises:
         TrainingError: The extra ``train`` is not installed, the robot is an environment of Gymnasium or has
-            no choice of a forward reward, or the folder holds another run.
+            no choice of a forward reward, the algorithm has no such choice, or the folder holds another run.
     """
     if robot not in list_robot_names():
         raise TrainingError(
@@ -43,7 +48,10 @@ def train_policy(
         raise TrainingError(f"training needs the extra: pip install 'pdtui[train]' ({error})") from error
     options = dict(recipe.options) | ({"forward": forward} if forward else {})
     defaults = PpoConfig() if algorithm == "ppo" else SacConfig()
-    given = {"total_steps": steps, "learning_rate": learning_rate}
+    choices: dict[str, Any] = {"layers": layers, "activation": activation, "initial_policy": initial_policy}
+    if algorithm == "sac" and (activation not in (None, "tanh") or initial_policy):
+        raise TrainingError("--activation and --initial-policy are for PPO; SAC trains a tanh network anew")
+    given = {"total_steps": steps, "learning_rate": learning_rate, **choices}
     changes = {name: value for name, value in recipe.settings.items() if hasattr(defaults, name)}
     changes |= {name: value for name, value in given.items() if value is not None}
     config = replace(defaults, **changes)
@@ -51,6 +59,9 @@ def train_policy(
         f"pdtui train {robot} --algorithm {algorithm} --seed {seed} --steps {config.total_steps} "
         f"--learning-rate {config.learning_rate:g}" + (f" --forward {forward}" if forward else "")
     )
+    command += f" --layers {','.join(map(str, layers))}" if layers else ""
+    command += f" --activation {activation}" if activation else ""
+    command += f" --initial-policy {Path(initial_policy).stem}" if initial_policy else ""
 
     def report(taken: int, _: ActorScore | None, best: ActorScore | None) -> None:
         if progress is not None:

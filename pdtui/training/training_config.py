@@ -54,6 +54,11 @@ class PpoConfig(TrainingConfig):
         gae: λ of the generalised advantage estimation.
         entropy: Weight of the entropy bonus.
         log_std: Initial log standard deviation of the actions.
+        initial_policy: Weights file or name of the shipped policy that the run starts from, instead of the
+            recipe's. One with other layers is imitated first.
+        imitates: Whether the policy first learns to act as the robot's rule-based driver does.
+        critic_iterations: Iterations at the start in which only the critic learns, so that an untrained one
+            does not spoil a policy that can act already.
         reward_scale: Factor on rewards, which brings the values to the order of 1.
         least_deviation: Least deviation by which an observed number is divided. Numbers that hardly change
             in training may change a lot elsewhere.
@@ -71,6 +76,9 @@ class PpoConfig(TrainingConfig):
     gae: float = 0.95
     entropy: float = 0.001
     log_std: float = -0.5
+    initial_policy: str = ""
+    imitates: bool = False
+    critic_iterations: int = 0
     reward_scale: float = 0.02
     least_deviation: float = 0.0
 

@@ -22,6 +22,8 @@ from pdtui.robots.road.metadrive_repairs import (
 from pdtui.robots.road.road_scenes import SceneKind, find_scene
 
 MAX_STEPS = 1000
+# Speed that the rule-based driver aims at, km/h.
+_RULES_SPEED = 35.0
 _WORDS = (
     ("arrive_dest", "arrived"),
     ("out_of_road", "left the road"),
@@ -71,6 +73,7 @@ class RoadWorld:
         # A headless engine needs none of the textures, which MetaDrive would download.
         BaseEngine.try_pull_asset = staticmethod(lambda: None)
         self._crashes_end = crashes_end
+        self._rules: Any = None
         self._env: Any = None
         self._kind: SceneKind | None = None
 
@@ -90,6 +93,7 @@ class RoadWorld:
             self.close()
             self._env, self._kind = self._make(kind), kind
         observed, _ = self._env.reset(seed=scene)
+        self._rules = None
         self._cost = 0.0
         return self._state(observed, 0.0, {})
 
@@ -103,6 +107,15 @@ class RoadWorld:
         return self._state(
             observed, float(reward), info if terminated or truncated else {"cost": info["cost"]}
         )
+
+    def suggest_action(self) -> NDArray[np.float32]:
+        """Return what MetaDrive's rule-based driver, which keeps lane and distance, would do now."""
+        from metadrive.policy.idm_policy import IDMPolicy
+
+        if self._rules is None:
+            self._rules = IDMPolicy(self._env.agent, random_seed=0)
+            self._rules.NORMAL_SPEED = _RULES_SPEED
+        return np.clip(np.array(self._rules.act(), np.float32), -1.0, 1.0)
 
     def close(self) -> None:
         """End the engine."""
