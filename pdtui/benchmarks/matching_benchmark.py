@@ -123,7 +123,7 @@ def match_by_loop(
     total = np.zeros((len(attributes), episodes[0].activations.shape[1]))
     for episode in episodes:
         targets = [
-            spectrogram(episode.attributes[:, column] * attribute.scale)
+            spectrogram(attribute.as_observed(episode.attributes[:, column]))
             for column, attribute in enumerate(attributes)
         ]
         for unit in range(total.shape[1]):

@@ -135,9 +135,10 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
         recorder = SessionRecorder(path, info, viewer=viewer, existing=existing, sync=config.sync)
     with catch_ending_signals() as ended:
         summary = drive_headless(loop, presses, steps, recorder, ended)
+    takeover = " or a takeover" if loop.robot.manual_controls else ""
     click.echo(
         f"{summary.steps} steps, {summary.seconds:g} s simulated; falls {summary.falls}, "
-        f"steps with a key {summary.involvement}"
+        f"steps with a key{takeover} {summary.involvement}"
     )
     means = ", ".join(f"{name} {value:.3g}" for name, value in list(summary.mean.items())[:8])
     click.echo(make_printable(f"mean {means}"))

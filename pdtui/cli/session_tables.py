@@ -16,6 +16,7 @@ from pdtui.core.printable_text import make_printable
 from pdtui.core.text_tables import new_facts_table, new_table
 
 if TYPE_CHECKING:
+    from pdtui.sessions.episode_statistics import EpisodeStatistics
     from pdtui.sessions.session_comparison import SessionComparison
     from pdtui.sessions.session_header import SessionHeader
     from pdtui.sessions.session_summary import SessionSummary
@@ -75,7 +76,8 @@ def session_details(session: SessionHeader, summary: SessionSummary) -> Any:
     figures = [
         ("length", f"{summary.steps} steps, {summary.seconds:g} s"),
         ("episodes", f"{summary.episodes}, of which {summary.falls} ended on their own"),
-        ("human involvement", _keyed(summary.involvement, summary.steps)),
+        ("human involvement", _involvement(summary, summary)),
+        *([("taken over", f"{summary.taken_over} steps")] if summary.taken_over else []),
         ("stimulated", f"{summary.stimulated} steps"),
         ("return", f"{summary.total_reward:.2f}"),
         ("collisions" if info.obstacles else "cost", f"{summary.total_cost:.{0 if info.obstacles else 2}f}"),
@@ -93,8 +95,9 @@ def session_details(session: SessionHeader, summary: SessionSummary) -> Any:
     return Group(parts[0], *(one for part in parts[1:] for one in ("", part)))
 
 
-def _keyed(involvement: int, steps: int) -> str:
-    return f"{involvement} steps with a key press ({100.0 * involvement / max(1, steps):.1f} %)"
+def _involvement(part: SessionSummary | EpisodeStatistics, whole: SessionSummary) -> str:
+    what = "with a key press or a takeover" if whole.taken_over else "with a key press"
+    return f"{part.involvement} steps {what} ({100.0 * part.involvement / max(1, part.steps):.1f} %)"
 
 
 def _episodes(summary: SessionSummary) -> list[Table]:
@@ -109,7 +112,7 @@ def _episodes(summary: SessionSummary) -> list[Table]:
     table = new_table("", "episode", "steps", *columns, "human involvement")
     for tally in tallies:
         cells = [_figure(tally.distance, ".2f", " m")] * far + [_figure(tally.collisions, "g")] * hits
-        table.add_row(str(tally.episode), str(tally.steps), *cells, _keyed(tally.involvement, tally.steps))
+        table.add_row(str(tally.episode), str(tally.steps), *cells, _involvement(tally, summary))
     return [table]
 
 

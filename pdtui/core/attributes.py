@@ -21,9 +21,9 @@ class Attribute:
     Attributes:
         name: Short name, as maps and screens use it.
         unit: Physical unit of the values that `Robot.read_attributes` returns.
-        scale: Factor that dissection applies before it compares spectra. It brings the attribute to the scale
-            at which the policy observes (or, for a torque, commands) it. The paper's discrepancy compares
-            magnitudes, so this factor decides which unit matches.
+        scale, offset: Dissection compares spectra of ``value * scale + offset``, the attribute as the policy
+            observes (or, for a torque, commands) it. The paper's discrepancy compares magnitudes, so both
+            decide which unit matches: the scale at every frequency, the offset at the lowest.
         wraps: Whether the value is an angle that jumps at ±π.
     """
 
@@ -31,6 +31,13 @@ class Attribute:
     unit: str
     scale: float = 1.0
     wraps: bool = False
+    offset: float = 0.0
+
+    def as_observed(self, values: Floats) -> Floats:
+        """Return values in the attribute's unit, in any shape, as the policy observes them."""
+        scaled: Floats = values * self.scale
+        # Adding 0 would turn −0 into 0.
+        return scaled + self.offset if self.offset else scaled
 
 
 def attribute_column(name: str, attributes: Sequence[Attribute], owner: str) -> int:

@@ -14,11 +14,14 @@ class DriveEvent:
 
     Attributes:
         step: the control step before which the event applies; the first step is 0.
-        kind: ``behavior`` latches `name`; ``default`` clears all behaviors; ``target`` sets the target of
-            `name` to `value`; ``factor`` sets the magnitudes of `name` to `value` times the map's; ``reset``
-            starts the next episode; ``rewind`` restores the state before step `value`.
-        name: name of the behavior.
-        value: target, factor or step.
+        kind: ``behavior`` latches `name`; ``default`` clears all behaviors and ends a takeover;
+            ``target`` sets the target of `name` to `value`; ``factor`` sets the magnitudes of `name` to
+            `value` times the map's; ``takeover`` takes over all manual controls, at 0; ``control`` sets the
+            control `name` to `value`, and takes it over if it was not; ``hand back`` hands all controls back
+            to the policy; ``reset`` starts the next episode; ``rewind`` restores the state before step
+            `value`.
+        name: name of the behavior or of the control.
+        value: target, factor, value of the control, or step.
         key: the key that the operator pressed; empty if the event has another cause.
     """
 

@@ -9,14 +9,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-EventKind = Literal["behavior", "default", "target", "factor", "reset", "rewind"]
+EventKind = Literal[
+    "behavior", "default", "target", "factor", "takeover", "control", "hand back", "reset", "rewind"
+]
 
 
 EVENT_WORDINGS: dict[EventKind, str] = {
     "behavior": "behavior '{name}' latched",
-    "default": "all behaviors cleared",
+    "default": "everything cleared; the policy acts alone",
     "target": "target of '{name}' set to {value:.4g}",
     "factor": "magnitudes of '{name}' set to {value:.4g} times the map's",
+    "takeover": "the operator took over",
+    "control": "{name} set to {value:.4g} by the operator",
+    "hand back": "handed back to the policy",
     "reset": "next episode started",
     "rewind": "rewound to step {value:.0f}",
 }
@@ -55,20 +60,29 @@ KEY_TABLE = (
     ReservedKey("target_down", "down", "lowers the target", "target", -1),
     ReservedKey("target_left", "left", "turns the target left", "target", 1),
     ReservedKey("target_right", "right", "turns the target right", "target", -1),
+    # Not a letter: maps that `pdtui dissect` has drafted may use any that was free then.
     ReservedKey(
-        "stronger", "plus", "strengthens the latched behavior", "factor", 1, hint="stronger", hint_rank=6
-    ),
-    ReservedKey("weaker", "minus", "weakens the latched behavior", "factor", -1, hint="weaker", hint_rank=7),
-    ReservedKey("reset", "r", "starts the next episode", "reset", hint="reset", hint_rank=4),
-    ReservedKey("rewind", "backspace", "rewinds by three seconds", "rewind", hint="rewind", hint_rank=5),
-    ReservedKey("pause", "p", "pauses or resumes", action="pace('pause')", hint="pause", hint_rank=2),
-    ReservedKey("step", "n", "runs a single control step", action="pace('step')", hint="step", hint_rank=8),
-    ReservedKey("slower", "comma", "halves the speed", action="pace('slower')", hint="slower", hint_rank=9),
-    ReservedKey(
-        "faster", "full_stop", "doubles the speed", action="pace('faster')", hint="faster", hint_rank=10
+        "takeover",
+        "enter",
+        "takes over from the policy, or hands back",
+        "takeover",
+        hint="take over",
+        hint_rank=2,
     ),
     ReservedKey(
-        "view", "v", "switches between side view and top view", action="toggle_view", hint="view", hint_rank=3
+        "stronger", "plus", "strengthens the latched behavior", "factor", 1, hint="stronger", hint_rank=7
+    ),
+    ReservedKey("weaker", "minus", "weakens the latched behavior", "factor", -1, hint="weaker", hint_rank=8),
+    ReservedKey("reset", "r", "starts the next episode", "reset", hint="reset", hint_rank=5),
+    ReservedKey("rewind", "backspace", "rewinds by three seconds", "rewind", hint="rewind", hint_rank=6),
+    ReservedKey("pause", "p", "pauses or resumes", action="pace('pause')", hint="pause", hint_rank=3),
+    ReservedKey("step", "n", "runs a single control step", action="pace('step')", hint="step", hint_rank=9),
+    ReservedKey("slower", "comma", "halves the speed", action="pace('slower')", hint="slower", hint_rank=10),
+    ReservedKey(
+        "faster", "full_stop", "doubles the speed", action="pace('faster')", hint="faster", hint_rank=11
+    ),
+    ReservedKey(
+        "view", "v", "switches between side view and top view", action="toggle_view", hint="view", hint_rank=4
     ),
     ReservedKey("help", "question_mark", "shows all keys", action="help", hint="help", hint_rank=0),
     ReservedKey("quit", "q", "ends the drive and quits", action="leave", hint="quit", hint_rank=1),

@@ -1,4 +1,4 @@
-"""Plain data about robots: their shapes, their whole states and the commands that their policies follow."""
+"""Plain data about robots: shapes, whole states, commands for the policy and controls for the operator."""
 
 from __future__ import annotations
 
@@ -25,6 +25,29 @@ class CommandRange:
     attribute: str
     low: float
     high: float
+
+
+@dataclass(frozen=True)
+class ManualControl:
+    """A component of the robot's action that an operator can take over from the policy.
+
+    Attributes:
+        name: name on the screen and in events, such as ``steering`` or ``throttle``.
+        action: index of the component in the action.
+        arrows: arrow keys that change it: ``sideways``, left towards 1 and right towards −1, so that a
+            steering of 1 is full left; or ``lengthways``, up towards 1 and down towards −1, so that a
+            negative throttle brakes.
+        step: change by one key press; the value itself is always from −1 to 1.
+        return_rate: how fast the value goes back to 0 by itself, 1/s; 0 for a control that stays where it is.
+        scale: component of the action per value; negative where the simulator's sign is the other one.
+    """
+
+    name: str
+    action: int
+    arrows: Literal["sideways", "lengthways"]
+    step: float = 0.1
+    return_rate: float = 0.0
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)

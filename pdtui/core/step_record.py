@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,31 @@ class ActiveBehavior:
     magnitude: float | None = None
 
 
+class ReplacedAction(NamedTuple):
+    """A component of the action that the operator has taken over.
+
+    Attributes:
+        component: its index in the action.
+        natural: the policy's value, which did not act.
+    """
+
+    component: int
+    natural: float
+
+
+Involvement = TypeVar("Involvement", bool, NDArray[np.bool_])
+
+
+def involves_operator(keyed: Involvement, taken_over: Involvement) -> Involvement:
+    """Return whether control steps count as human involvement, the paper's measure: one step each.
+
+    Args:
+        keyed: whether the operator pressed a key before the step.
+        taken_over: whether the operator set a component of the step's action.
+    """
+    return keyed | taken_over
+
+
 class StepRecord(NamedTuple):
     """One control step, after it was simulated.
 
@@ -44,7 +69,7 @@ class StepRecord(NamedTuple):
         behaviors: behaviors that were active in this step.
         stimulation: stimulated units and the values that overwrote their outputs.
         natural: the outputs that those units would have had, in the same order.
-        action: action of the policy, shape (A,).
+        action: action that the robot was given, shape (A,): the policy's, except for `replaced`.
         activations: output of every hidden unit, shape (U,), float32.
         attributes: attributes after the step, shape (J,).
         poses: poses of the bodies after the step, shape (B, 7).
@@ -56,6 +81,7 @@ class StepRecord(NamedTuple):
         obstacles: obstacles as in `Robot.obstacles`, shape (N, 3): the same array in every step of a world.
             They are not recorded.
         fell: whether the episode ended with a fall: neither finished nor out of time.
+        replaced: components of the action that the operator set during a takeover, empty without one.
     """
 
     step: int
@@ -76,3 +102,9 @@ class StepRecord(NamedTuple):
     finished: bool = False
     obstacles: Floats = NO_OBSTACLES
     fell: bool = False
+    replaced: tuple[ReplacedAction, ...] = ()
+
+    @property
+    def involved(self) -> bool:
+        """Whether the step counts as human involvement."""
+        return involves_operator(any(event.key for event in self.events), bool(self.replaced))

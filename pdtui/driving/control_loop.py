@@ -15,6 +15,7 @@ from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import KeystrokeError, MapError, SimulationDiverged
 from pdtui.core.step_record import StepRecord
 from pdtui.core.units import Stimulation
+from pdtui.driving.manual_takeover import ManualTakeover
 from pdtui.driving.rewind_history import STEPS_PER_KEPT_STATE, DriveState, RewindHistory
 from pdtui.policies.runtime.policy import Policy, PolicyStep
 from pdtui.robots.robot import Robot, is_fall
@@ -38,7 +39,8 @@ class ControlLoop:
         start: name of the state in which episodes start; empty for the robot's default.
 
     Raises:
-        PdtuiError: a unit or a command that the map names does not exist, or the robot has no such start.
+        PdtuiError: a unit or a command that the map names does not exist, the robot has no such start, or
+            its manual controls do not fit its action.
     """
 
     def __init__(
@@ -57,6 +59,7 @@ class ControlLoop:
         self.step = 0
         self.episode = 0
         self.latch = BehaviorLatch(stimulation_map, policy.layers, robot.attributes, robot.control_dt)
+        self.takeover = ManualTakeover(robot)
         self.act: PolicyAct = policy.act
         """What acts in each control step; an evaluation may put a disturbed policy in its place."""
         self._noise = np.random.default_rng(seed) if stochastic else None
@@ -108,9 +111,10 @@ class ControlLoop:
             self._observation = self.robot.observe()
         behaviors = self.latch.active
         acted = self.act(self._observation, stimulation, self._noise)
+        action, replaced = self.takeover.replace_action(acted.action)
         ended, reward, cost, diverged, fell, finished = "", 0.0, 0.0, False, False, False
         try:
-            self._observation, gained, terminated, truncated, details = self.robot.step(acted.action)
+            self._observation, gained, terminated, truncated, details = self.robot.step(action)
             reward, cost = float(gained), float(details["cost"])
             finished = bool(details.get("finished", False))
             fell = is_fall(terminated, details)
@@ -126,7 +130,7 @@ class ControlLoop:
             behaviors,
             stimulation,
             acted.natural,
-            acted.action,
+            action,
             acted.activations,
             self.attributes,
             self.robot.read_poses(),
@@ -138,29 +142,35 @@ class ControlLoop:
             finished,
             self.robot.obstacles,
             fell,
+            replaced,
         )
         self.step += 1
         self.latch.end_step()
+        self.takeover.end_step()
         self._ended = bool(ended)
         return record
 
     def _apply(self, event: DriveEvent, *, rehearsing: bool = False) -> None:
-        """Apply an event; while rehearsing, only to the latch and to the position in the rewind history."""
+        """Apply an event; while rehearsing, only to latch, takeover and position in the rewind history."""
         match event.kind:
             case "behavior":
                 self.latch.latch_behavior(event.name, self.attributes)
             case "default":
-                self.latch.clear()
+                self._clear()
             case "target":
                 self.latch.set_target(event.name, event.value)
             case "factor":
                 self.latch.set_factor(event.name, event.value)
+            case "takeover" | "control" | "hand back":
+                self.takeover.apply_event(event)
             case "reset" if rehearsing:
-                self.latch.clear()
+                self._clear()
             case "reset":
                 self._start_episode()
             case "rewind" if rehearsing:
-                self.latch.restore_state(self.history.return_to(event.value, self.step).latch)
+                state = self.history.return_to(event.value, self.step)
+                self.latch.restore_state(state.latch)
+                self.takeover.restore_state(state.takeover)
             case "rewind":
                 self._rewind(event.value)
             case _:
@@ -168,31 +178,42 @@ class ControlLoop:
 
     @contextmanager
     def rehearsal(self) -> Iterator[Callable[[DriveEvent], None]]:
-        """Yield a function that applies an event of this step to the latch; at the end, all is undone.
+        """Yield a function that applies an event to latch and takeover; at the end, all is undone.
 
         It shows what a key means after other keys that were pressed before the same step.
         """
-        latch, position = self.latch.copy_state(), self.history.position
+        latch, takeover = self.latch.copy_state(), self.takeover.copy_state()
+        position = self.history.position
         if self._ended:
-            self.latch.clear()  # the next step begins an episode
+            self._clear()  # the next step begins an episode
         try:
             yield partial(self._apply, rehearsing=True)
         finally:
             self.latch.restore_state(latch)
+            self.takeover.restore_state(takeover)
             self.history.position = position
 
     def _start_episode(self) -> None:
         self._observation, _ = self.robot.reset(options=self._options)
         self.policy.reset()
         self.attributes = self.robot.read_attributes()
-        self.latch.clear()
+        self._clear()
         self.episode += 1
         self._ended = False
+
+    def _clear(self) -> None:
+        self.latch.clear()
+        self.takeover.clear()
 
     def _keep_state(self) -> None:
         noise = self._noise.bit_generator.state if self._noise is not None else {}
         state = DriveState(
-            self.robot.snapshot(), self.policy.snapshot(), self.latch.copy_state(), noise, self.episode
+            self.robot.snapshot(),
+            self.policy.snapshot(),
+            self.latch.copy_state(),
+            self.takeover.copy_state(),
+            noise,
+            self.episode,
         )
         self.history.keep(self.step, state)
 
@@ -201,6 +222,7 @@ class ControlLoop:
         self.robot.restore(state.robot)
         self.policy.restore(state.policy)
         self.latch.restore_state(state.latch)
+        self.takeover.restore_state(state.takeover)
         if self._noise is not None:
             self._noise.bit_generator.state = state.noise
         self.episode = state.episode

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats, attribute_column
 from pdtui.core.drive_events import DriveEvent
-from pdtui.core.step_record import StepRecord
+from pdtui.core.step_record import ReplacedAction, StepRecord
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import drive_from_keystrokes, open_step_recorder
@@ -29,7 +29,8 @@ class DriveArrays:
         info: everything that determined the run, besides its events.
         attributes: attributes after each step, in their units, shape (S, J).
         activations: activations of all hidden units as the next layer saw them, shape (S, U), float32.
-        actions: shape (S, A), float32.
+        actions: what the robot was given, by the policy or during a takeover by the operator, shape (S, A),
+            float32.
         rewards, costs: shape (S,).
         episodes: number of the episode, shape (S,).
         digests: digest of the simulator's state after each step, shape (S,).
@@ -37,6 +38,7 @@ class DriveArrays:
         stimulations: units and the values that overwrote them in each step.
         events: everything that changed the run, in order.
         endings: why an episode ended, by its last step.
+        replaced_actions: components of each step's action that the operator had taken over.
     """
 
     info: DriveInfo
@@ -51,6 +53,7 @@ class DriveArrays:
     stimulations: tuple[Stimulation, ...] = field(repr=False)
     events: tuple[DriveEvent, ...] = field(repr=False)
     endings: dict[int, str] = field(repr=False)
+    replaced_actions: tuple[tuple[ReplacedAction, ...], ...] = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.digests)
@@ -114,4 +117,5 @@ def _stack_records(loop: ControlLoop, records: Sequence[StepRecord]) -> DriveArr
         stimulations=tuple(record.stimulation for record in records),
         events=tuple(event for record in records for event in record.events),
         endings={record.step: record.ended for record in records if record.ended},
+        replaced_actions=tuple(record.replaced for record in records),
     )

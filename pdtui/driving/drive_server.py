@@ -87,6 +87,7 @@ class DriveServer:
                 layers=loop.policy.layers,
                 recording=str(recorder.path) if recorder is not None else "",
                 recorded=recorder is not None and recorder.created,
+                manual_controls=tuple(control.name for control in loop.robot.manual_controls),
             )
         )
 

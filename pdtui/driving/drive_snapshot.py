@@ -29,6 +29,7 @@ class DriveFacts:
         layers: widths of the policy's hidden layers.
         recording: file that the drive is recorded into, or will be; empty if it is not recorded.
         recorded: whether that file was created, which happens with the first control step.
+        manual_controls: names of the controls that the operator can take over.
     """
 
     title: str
@@ -40,6 +41,7 @@ class DriveFacts:
     layers: tuple[int, ...]
     recording: str = ""
     recorded: bool = False
+    manual_controls: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -71,11 +73,12 @@ class DriveSnapshot:
         paused: whether the drive is paused.
         speed: requested speed, in multiples of real time.
         achieved_speed: speed of the latest steps, in multiples of real time.
-        involvement: control steps in which a key was pressed.
+        involvement: control steps that count as human involvement.
         recorded_bytes: size of the recording, bytes.
         notice: what the user should read now (a fall, a rewind, a key that does nothing); may be empty.
         finished: why the drive is over; empty while it runs.
         statistics: statistics of the present episode.
+        manual: name and value of each control that the operator has taken over; empty without a takeover.
         obstacles: `Robot.obstacles` if they have changed since the last snapshot; else None.
     """
 
@@ -99,3 +102,4 @@ class DriveSnapshot:
     finished: str = ""
     statistics: EpisodeStatistics = NO_STATISTICS
     obstacles: Floats | None = None
+    manual: tuple[tuple[str, float], ...] = ()

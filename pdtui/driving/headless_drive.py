@@ -34,7 +34,7 @@ class DriveSummary:
         steps: number of control steps.
         seconds: simulated time, s.
         falls: episodes that ended with a fall.
-        involvement: number of control steps in which a key was pressed.
+        involvement: number of control steps that count as human involvement.
         mean: mean of every attribute, by name.
     """
 
@@ -150,7 +150,7 @@ def drive_headless(
             record_step(record)
             done += 1
             falls += record.fell
-            involvement += any(event.key for event in record.events)
+            involvement += record.involved
             total += record.attributes
             if reason := ended():
                 where = "" if recorder is None else f", recorded in {recorder.path}"

@@ -12,6 +12,7 @@ from pdtui.core.reserved_keys import RUN_KEYS, ReservedKey
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.core.untrusted_file import KEYSTROKES_BUDGET, describe_bytes
 from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.manual_takeover import NO_CONTROLS
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 MAX_PRESSES = 200_000
@@ -44,6 +45,8 @@ def interpret_key(key: str, loop: ControlLoop) -> DriveEvent | str:
             return _target_event(row, loop)
         case "factor":
             return _factor_event(row, loop)
+        case "takeover":
+            return _takeover_event(row, loop)
         case "rewind":
             return _rewind_event(row, loop)
         case kind:
@@ -76,8 +79,23 @@ def _rewind_event(row: ReservedKey, loop: ControlLoop) -> DriveEvent | str:
     return DriveEvent(loop.step, "rewind", value=float(target), key=row.key)
 
 
+def _takeover_event(row: ReservedKey, loop: ControlLoop) -> DriveEvent | str:
+    if not loop.robot.manual_controls:
+        return f"{loop.robot.name} {NO_CONTROLS}"
+    return DriveEvent(loop.step, "hand back" if loop.takeover.values else "takeover", key=row.key)
+
+
 def _target_event(row: ReservedKey, loop: ControlLoop) -> DriveEvent | str:
-    """Return the event of an arrow: left and right move the target of a heading, up and down any other."""
+    """Return the event of an arrow: during a takeover, it changes a control.
+
+    Otherwise, left and right move the target of a heading, up and down any other.
+    """
+    control = loop.takeover.control_of_arrow(row.key)
+    if control is not None:
+        changed = loop.takeover.values[control.name] + row.direction * control.step
+        # Rounded, so that as many presses forth and back lead to 0.
+        value = min(1.0, max(-1.0, round(changed, 9)))
+        return DriveEvent(loop.step, "control", control.name, value, row.key)
     held = [view for view in loop.latch.active if view.target is not None]
     if not held:
         return "no target is held; only behaviors of mode pid hold one"

@@ -25,6 +25,7 @@ class DriveState:
         robot: state of the simulator.
         policy: recurrent state of the network.
         latch: the latched behaviors.
+        takeover: values of the controls that the operator has taken over.
         noise: state of the generator of action noise; empty for a deterministic policy.
         episode: number of the episode.
     """
@@ -32,6 +33,7 @@ class DriveState:
     robot: RobotState
     policy: PolicyState
     latch: list[Any]
+    takeover: Mapping[str, float]
     noise: Mapping[str, Any]
     episode: int
 

@@ -42,11 +42,13 @@ class SnapshotBuilder:
         if len(record.poses):
             self._path.append((float(record.poses[0, 0]), float(record.poses[0, 1]), float(row)))
         del self._history[:-_ROWS_KEPT], self._path[:-_ROWS_KEPT]
-        keyed = any(event.key for event in record.events)
-        self._involvement += keyed
-        self._statistics.add(record.episode, keyed=keyed, cost=record.cost, attributes=record.attributes)
+        involved = record.involved
+        self._involvement += involved
+        self._statistics.add(
+            record.episode, involved=involved, cost=record.cost, attributes=record.attributes
+        )
         for event in record.events:
-            if event.jumps:
+            if event.jumps or event.kind in ("takeover", "hand back"):
                 self.notice = describe_event(event)
         if record.ended:
             self.notice = record.ended
@@ -86,6 +88,7 @@ class SnapshotBuilder:
             finished=finished,
             statistics=self._statistics.of(loop.episode),
             obstacles=self._obstacles if others else None,
+            manual=tuple(loop.takeover.values.items()),
         )
         self._history, self._path, self._restarted, self.notice = [], [], False, ""
         return snapshot

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import RobotError
-from pdtui.core.robot_links_and_state import Link, RobotState
+from pdtui.core.robot_links_and_state import Link, ManualControl, RobotState
 from pdtui.core.worker_pool import WorkerProcess
 from pdtui.robots.environments.action_log import ActionLog
 from pdtui.robots.road.car_tasks import CAR_GOALS, CAR_TASKS
@@ -48,6 +48,11 @@ class MetaDrive(Robot):
     starts = SCENE_STARTS
     goals = CAR_GOALS
     tasks = CAR_TASKS
+    # Terminals repeat a key that is held, which then outruns the steering's way back.
+    manual_controls = (
+        ManualControl("steering", 0, "sideways", step=0.1, return_rate=0.5),
+        ManualControl("throttle", 1, "lengthways", step=0.25),
+    )
     episode_steps = 1000
     control_dt = 0.1
     training_recipe = TrainingRecipe(

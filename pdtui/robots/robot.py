@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import RobotError
-from pdtui.core.robot_links_and_state import NO_OBSTACLES, CommandRange, Link, RobotState
+from pdtui.core.robot_links_and_state import NO_OBSTACLES, CommandRange, Link, ManualControl, RobotState
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
 from pdtui.robots.task import Task, find_task
 
@@ -79,6 +79,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         starts: States besides the usual one in which `reset` can start, by its option ``start``.
         commands: What a policy can be commanded, and its default, by name; empty for most robots.
         command_ranges: Ranges in which the policy was trained to follow the commands.
+        manual_controls: Components of the action that an operator can take over; empty for most robots.
         goals: What a dissection looks for.
         tasks: What `pdtui pursue` can look for, with the judge that tells whether it was done.
         training_recipe: How `pdtui train` trains a policy for the robot.
@@ -95,6 +96,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     starts: tuple[str, ...] = ()
     commands: Mapping[str, float] = MappingProxyType({})
     command_ranges: Mapping[str, CommandRange] = MappingProxyType({})
+    manual_controls: tuple[ManualControl, ...] = ()
     goals: RobotGoals = WALKING_GOALS
     tasks: tuple[Task, ...] = ()
     training_recipe: TrainingRecipe = TrainingRecipe()

@@ -158,8 +158,9 @@ def _decode_attribute(item: dict[str, Any]) -> Attribute:
     wraps = item["wraps"]
     if type(wraps) is not bool:
         raise ValueError("'wraps' is not a boolean")
-    (scale,) = _check_numbers([item["scale"]], 1)
-    return Attribute(_check_text(item["name"]), _check_text(item["unit"]), scale, wraps)
+    # Older sessions lack the offset.
+    scale, offset = _check_numbers([item["scale"], item.get("offset", 0.0)], 2)
+    return Attribute(_check_text(item["name"]), _check_text(item["unit"]), scale, wraps, offset)
 
 
 def _decode_link(item: dict[str, Any]) -> Link:

@@ -21,7 +21,7 @@ class EpisodeStatistics:
     Attributes:
         episode: number of the episode.
         steps: number of control steps, including those that were rewound.
-        involvement: number of control steps in which a key was pressed: the paper's human involvement.
+        involvement: number of control steps that count as human involvement (`involves_operator`).
         distance: latest value of the robot's attribute ``distance``, m; None if the robot lacks it.
         collisions: sum of the cost of all steps where there are obstacles, else None.
     """
@@ -34,7 +34,7 @@ class EpisodeStatistics:
 
     @property
     def share(self) -> float:
-        """The share of control steps in which a key was pressed, 0..1."""
+        """The share of control steps that count as human involvement, 0..1."""
         return self.involvement / max(1, self.steps)
 
 
@@ -57,19 +57,19 @@ class EpisodeStatisticsCounter:
         )
         self._statistics: dict[int, EpisodeStatistics] = {}
 
-    def add(self, episode: int, *, keyed: bool, cost: float, attributes: Floats) -> None:
-        """Count one control step, with its cost, the attributes after it, and whether a key was pressed."""
+    def add(self, episode: int, *, involved: bool, cost: float, attributes: Floats) -> None:
+        """Count one control step, with its cost, the attributes after it, and whether it was involvement."""
         before = self.of(episode)
         self._statistics[episode] = replace(
             before,
             steps=before.steps + 1,
-            involvement=before.involvement + keyed,
+            involvement=before.involvement + involved,
             distance=None if self._column is None else float(attributes[self._column]),
             collisions=None if before.collisions is None else before.collisions + cost,
         )
 
     def add_steps(
-        self, episodes: NDArray[np.int64], *, keyed: NDArray[np.bool_], costs: Floats, attributes: Floats
+        self, episodes: NDArray[np.int64], *, involved: NDArray[np.bool_], costs: Floats, attributes: Floats
     ) -> None:
         """Count n control steps, n > 0: arrays of shape (n,), and attributes of shape (n, J)."""
         starts = [0, *(np.flatnonzero(np.diff(episodes)) + 1).tolist(), len(episodes)]
@@ -78,7 +78,7 @@ class EpisodeStatisticsCounter:
             self._statistics[before.episode] = replace(
                 before,
                 steps=before.steps + stop - start,
-                involvement=before.involvement + int(np.count_nonzero(keyed[start:stop])),
+                involvement=before.involvement + int(np.count_nonzero(involved[start:stop])),
                 distance=None if self._column is None else float(attributes[stop - 1, self._column]),
                 collisions=None
                 if before.collisions is None

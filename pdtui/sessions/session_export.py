@@ -153,6 +153,16 @@ def _unit_columns(block: StepBlock, header: SessionHeader) -> Columns:
     }
 
 
+def _takeover_columns(block: StepBlock, _: SessionHeader) -> Columns:
+    rows, components = block.replaced_row_indices, block.replaced[:, 0].astype(np.int64)
+    return {
+        "step": block.steps[rows],
+        "action": components,
+        "operator": block.actions_as_float32()[rows, components],
+        "policy": block.replaced[:, 1],
+    }
+
+
 def _event_table(header: SessionHeader) -> pa.Table:
     steps = np.array([event.step for event in header.events], np.int64)
     columns: Columns = {"step": steps, "time": steps * header.info.dt}
@@ -168,7 +178,7 @@ def _name_columns(block: NDArray[Any], names: list[str]) -> Columns:
 
 STREAMS: dict[str, ExportStream] = {
     "attributes": ExportStream("kinematic attributes after each step", _attribute_columns),
-    "actions": ExportStream("what the policy commanded", _action_columns),
+    "actions": ExportStream("what the policy, or during a takeover the operator, commanded", _action_columns),
     "gains": ExportStream("reward, cost, episode, and why it ended", _reward_columns),
     "digests": ExportStream("digest of the simulator's state after each step", _digest_columns),
     "activations": ExportStream(
@@ -177,6 +187,10 @@ STREAMS: dict[str, ExportStream] = {
     "behaviors": ExportStream("active behaviors with their controllers, one row each", _behavior_columns),
     "stimulation": ExportStream(
         "stimulated units, with natural and overwritten outputs, one row each", _unit_columns
+    ),
+    "takeover": ExportStream(
+        "components of the action that the operator set, with the policy's own value, one row each",
+        _takeover_columns,
     ),
     "events": ExportStream("everything that changed the run, one row per event", None),
 }

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import SessionError
-from pdtui.core.step_record import ActiveBehavior
+from pdtui.core.step_record import ActiveBehavior, ReplacedAction
 from pdtui.core.units import Stimulation
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_header import SessionHeader
@@ -32,6 +32,7 @@ class Session(SessionHeader):
         active: the active behaviors of each step with their controllers, ordered by when they were latched.
         stimulations: for each step, the stimulated units and the values that overwrote their outputs.
         natural: for each step, the outputs that those units would have had.
+        replaced_actions: for each step, the components of the action that the operator had taken over.
     """
 
     digests: NDArray[np.int64] = field(repr=False)
@@ -43,6 +44,7 @@ class Session(SessionHeader):
     active: tuple[tuple[ActiveBehavior, ...], ...] = field(repr=False)
     stimulations: tuple[Stimulation, ...] = field(repr=False)
     natural: tuple[tuple[float, ...], ...] = field(repr=False)
+    replaced_actions: tuple[tuple[ReplacedAction, ...], ...] = field(repr=False)
 
     @property
     def behaviors(self) -> tuple[tuple[str, ...], ...]:
@@ -74,6 +76,7 @@ def read_session(path: Path | str) -> Session:
             active=block.active,
             stimulations=block.stimulations,
             natural=block.natural,
+            replaced_actions=block.replaced_actions,
         )
     except SessionError as error:
         raise SessionError(f"{path}: {error}") from error

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
+from pdtui.core.step_record import involves_operator
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.episode_statistics import EpisodeStatistics, EpisodeStatisticsCounter
 from pdtui.sessions.rrd.end_index import read_end_index
@@ -41,11 +42,12 @@ class SessionSummary:
         seconds: simulated time, s.
         episodes: number of episodes that began.
         falls: number of episodes that ended by themselves.
-        involvement: number of control steps in which a key was pressed.
+        involvement: number of control steps that count as human involvement (`involves_operator`).
         total_reward, total_cost: sums over all steps, including those that were rewound.
         stimulated: number of control steps in which units were overwritten.
         tallies: statistics of the episodes, ordered by their numbers.
         attributes: the robot's attributes in their order; the mean of an angle that wraps is meaningless.
+        taken_over: number of control steps in which the operator set a component of the action.
     """
 
     steps: int
@@ -58,6 +60,7 @@ class SessionSummary:
     stimulated: int
     tallies: tuple[EpisodeStatistics, ...]
     attributes: tuple[AttributeSummary, ...]
+    taken_over: int = 0
 
 
 class SessionSummaryCounter:
@@ -75,7 +78,7 @@ class SessionSummaryCounter:
         self._statistics = EpisodeStatisticsCounter(info)
         self._pending: list[tuple[NDArray[Any], ...]] = []
         self._rows = 0
-        self._steps = self._keyed = self._stimulated = 0
+        self._steps = self._involvement = self._stimulated = self._taken_over = 0
         self._last_episode = -1
         self._reward = self._cost = 0.0
 
@@ -86,18 +89,20 @@ class SessionSummaryCounter:
         rewards: Floats,
         costs: Floats,
         episodes: NDArray[np.int64],
-        keyed: NDArray[np.bool_],
+        involved: NDArray[np.bool_],
         stimulated: NDArray[np.bool_],
+        taken_over: NDArray[np.bool_],
     ) -> None:
         """Add n control steps in their order. The counter keeps the arrays, which must not be changed.
 
         Args:
             attributes: shape (n, J).
             rewards, costs, episodes: shape (n,).
-            keyed: whether a key was pressed before each step, shape (n,).
+            involved: whether each step counts as human involvement, shape (n,).
             stimulated: whether units were overwritten in each step, shape (n,).
+            taken_over: whether the operator set a component of the action of each step, shape (n,).
         """
-        self._pending.append((attributes, rewards, costs, episodes, keyed, stimulated))
+        self._pending.append((attributes, rewards, costs, episodes, involved, stimulated, taken_over))
         self._rows += len(rewards)
         if self._rows >= _COUNTED_AT_ONCE:
             self._count_pending()
@@ -111,7 +116,7 @@ class SessionSummaryCounter:
             seconds=self._steps * self._info.dt,
             episodes=self._last_episode + 1,
             falls=falls,
-            involvement=self._keyed,
+            involvement=self._involvement,
             total_reward=self._reward,
             total_cost=self._cost,
             stimulated=self._stimulated,
@@ -120,6 +125,7 @@ class SessionSummaryCounter:
                 AttributeSummary(attribute.name, attribute.unit, float(mean), float(deviation))
                 for attribute, mean, deviation in rows
             ),
+            taken_over=self._taken_over,
         )
 
     def _count_pending(self, *, all_rows: bool = False) -> None:
@@ -139,14 +145,16 @@ class SessionSummaryCounter:
         rewards: Floats,
         costs: Floats,
         episodes: NDArray[np.int64],
-        keyed: NDArray[np.bool_],
+        involved: NDArray[np.bool_],
         stimulated: NDArray[np.bool_],
+        taken_over: NDArray[np.bool_],
     ) -> None:
         self._moments.add(attributes)
-        self._statistics.add_steps(episodes, keyed=keyed, costs=costs, attributes=attributes)
+        self._statistics.add_steps(episodes, involved=involved, costs=costs, attributes=attributes)
         self._steps += len(rewards)
-        self._keyed += int(np.count_nonzero(keyed))
+        self._involvement += int(np.count_nonzero(involved))
         self._stimulated += int(np.count_nonzero(stimulated))
+        self._taken_over += int(np.count_nonzero(taken_over))
         self._last_episode = max(self._last_episode, int(episodes.max()))
         self._reward += float(rewards.sum())
         self._cost += float(costs.sum())
@@ -177,13 +185,15 @@ def summarise_session(session: SessionHeader) -> SessionSummary:
     counter = SessionSummaryCounter(session.info)
     keyed = np.array(sorted({event.step for event in session.events if event.key}), np.int64)
     for block in read_step_blocks(session):
+        taken_over = block.replaced_counts > 0
         counter.add(
             attributes=block.attributes,
             rewards=block.rewards,
             costs=block.costs,
             episodes=block.episodes,
-            keyed=np.isin(block.steps, keyed),
+            involved=involves_operator(np.isin(block.steps, keyed), taken_over),
             stimulated=block.stimulated_counts > 0,
+            taken_over=taken_over,
         )
     return counter.summary(len(session.endings))
 

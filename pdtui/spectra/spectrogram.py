@@ -42,8 +42,9 @@ def scaled_attribute_series(
     if preset.scaling == "standardised":
         return _standardised(series)
     if preset.scaling == "observed":
-        scales = np.array([attribute.scale for attribute in attributes])
-        return [values * scales for values in series]
+        for values in series:
+            for column, attribute in enumerate(attributes):
+                values[:, column] = attribute.as_observed(values[:, column])
     return series
 
 

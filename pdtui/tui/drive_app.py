@@ -124,8 +124,9 @@ class DriveApp(App[str], inherit_bindings=False):
             loop.add_signal_handler(number, self._end, number)
 
     def watch_facts(self, facts: DriveFacts | None) -> None:
-        """Leave out the robot's picture for a world without links."""
+        """Leave out the robot's picture for a world without links, and show the keys that the robot has."""
         self.screen_stack[0].set_class(facts is not None and not facts.links, "-bodiless")
+        self._show_keys()
 
     def _end(self, number: signal.Signals) -> None:
         self.exit(f"ended by {number.name}", return_code=1)
@@ -145,12 +146,14 @@ class DriveApp(App[str], inherit_bindings=False):
 
     @property
     def keys_now(self) -> dict[str, tuple[str, str]]:
-        """Key and description of each binding by id, as remapped, without those hidden by the map's keys."""
+        """Key and description of each binding by id, as remapped, unless map or robot leave it out."""
         found: dict[str, tuple[str, str]] = {}
         for key, active in self.screen_stack[0].active_bindings.items():
             binding = active.binding
             if active.node is self and binding.id and (binding.priority or key not in self._map_keys):
                 found.setdefault(binding.id, (key, binding.description))
+        if self.facts is None or not self.facts.manual_controls:
+            found.pop("takeover", None)
         return {name: found[name] for binding in BINDINGS if (name := binding.id) in found}
 
     def _show_keys(self) -> None:
@@ -158,9 +161,9 @@ class DriveApp(App[str], inherit_bindings=False):
         shown = tuple(
             (displayed_key_name(now[name][0]), says) for name, says in _HINTS.items() if name in now
         )
-        self.query_one(KeyLine).keys = shown
+        self.screen_stack[0].query_one(KeyLine).keys = shown
         leave = now.get("quit", now["quit_always"])[0]
-        self.query_one(NoticeLine).hints = f"{displayed_key_name(leave)} quits"
+        self.screen_stack[0].query_one(NoticeLine).hints = f"{displayed_key_name(leave)} quits"
 
     def _poll(self) -> None:
         if self._notice_until and monotonic() > self._notice_until:

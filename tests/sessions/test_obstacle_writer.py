@@ -105,7 +105,7 @@ def test_a_repaired_session_has_them(course: Course, tmp_path: Path) -> None:
 def test_what_a_robot_has_not_is_not_counted() -> None:
     info = course_loop().info
     tallies = EpisodeStatisticsCounter(replace(info, obstacles=False, attributes=info.attributes[:1]))
-    tallies.add(2**62, keyed=True, cost=3.0, attributes=np.zeros(1))
+    tallies.add(2**62, involved=True, cost=3.0, attributes=np.zeros(1))
     (tally,) = tallies.all
     assert (tally.steps, tally.share, tally.distance, tally.collisions) == (1, 1.0, None, None)
     assert EpisodeStatisticsCounter(info).of(4) == EpisodeStatistics(4, 0, 0, 0.0, 0.0)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pyarrow as pa
 import pytest
 
 from pdtui.core.errors import SessionError
+from pdtui.sessions.drive_info import decode_drive_info, encode_drive_info
 from pdtui.sessions.rrd.message_decoder import decompress_start
 from pdtui.sessions.rrd.message_framing import CHUNK, read_message_spans
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_reader import read_session
+from pdtui.sessions.writer.session_recorder import SessionRecorder
+from tests.sessions.conftest import Recorded
 
 SAMPLES = Path(__file__).parents[2] / "sessions" / "samples"
 
@@ -22,6 +27,25 @@ def test_the_header_says_what_the_whole_session_says(sample: str) -> None:
     header, session = read_session_header(path), read_session(path)
     assert vars(header) == {name: getattr(session, name) for name in vars(header)}
     assert header.steps == len(session.digests) > 0
+
+
+def test_the_offset_of_an_attribute_is_recorded_and_0_in_older_sessions(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    _, loop, records = recorded
+    observed = (replace(loop.info.attributes[0], scale=0.25, offset=0.5), *loop.info.attributes[1:])
+    info = replace(loop.info, attributes=observed)
+    path = tmp_path / "a.rrd"
+    with SessionRecorder(path, info) as recorder:
+        recorder.write(records[0])
+    assert read_session_header(path).info.attributes == observed
+    properties = {name: [value] for name, value in encode_drive_info(info, "").items()}
+    properties["layers"] = list(info.layers)
+    older = [asdict(one) for one in observed]
+    for one in older:
+        del one["offset"]
+    properties["attributes"] = [json.dumps(older)]
+    assert decode_drive_info(properties)[0].attributes == (replace(observed[0], offset=0.0), *observed[1:])
 
 
 def test_the_data_of_the_steps_is_not_read_for_the_header(tmp_path: Path) -> None:

@@ -122,8 +122,9 @@ def test_the_summary_does_not_depend_on_the_size_of_the_blocks(recorded: Recorde
                 rewards=np.array([one.reward for one in rows]),
                 costs=np.array([one.cost for one in rows]),
                 episodes=np.array([one.episode for one in rows]),
-                keyed=np.array([one.step in keyed for one in rows]),
+                involved=np.array([one.step in keyed for one in rows]),
                 stimulated=np.array([bool(one.stimulation.units) for one in rows]),
+                taken_over=np.zeros(len(rows), bool),
             )
         summaries.append(counter.summary(falls=0))
     assert all(asdict(one) == asdict(summaries[0]) for one in summaries)

@@ -51,6 +51,28 @@ def test_a_copy_of_the_attribute_matches_best_and_exactly() -> None:
     assert found.discrepancy[1, [0, 1, 2, 3, 5]].min() > 0.1
 
 
+def test_an_offset_moves_the_level_at_which_an_attribute_is_compared() -> None:
+    """A unit that observes ``heading / π + 0.5`` is found by this, and not by the heading in rad."""
+    heading = np.random.default_rng(4).uniform(-1.0, 1.0, 320)
+    activations = np.stack([heading / np.pi, heading / np.pi + 0.5], axis=1).astype(np.float32)
+    heading = (activations[:, 1].astype(np.float64) - 0.5) * np.pi
+    one = MonitoredEpisode(4, activations, np.column_stack([heading, heading]))
+    scaled = Attribute("heading", "rad", scale=1 / np.pi)
+    observed = Attribute("heading", "rad", scale=1 / np.pi, offset=0.5)
+    for preset in (PRESETS["paper"], PRESETS["authors"]):
+        found = match_units([one], (scaled, observed), preset)
+        assert found.discrepancy[:, [0, 1]].argmin(axis=1).tolist() == [0, 1]
+        by_hand = MonitoredEpisode(4, activations, np.stack([heading / np.pi, heading / np.pi + 0.5], axis=1))
+        expected = by_scipy(by_hand, (Attribute("a", ""), Attribute("b", "")), preset)
+        np.testing.assert_allclose(found.discrepancy, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_without_an_offset_no_bit_changes() -> None:
+    values = np.array([[-0.0, 0.1], [0.0, -7.0]])
+    for attribute in ATTRIBUTES:
+        assert attribute.as_observed(values).tobytes() == (values * attribute.scale).tobytes()
+
+
 def test_level_share_tells_a_mean_from_a_movement() -> None:
     time = np.arange(256)
     activations = np.zeros((256, 2), np.float32)

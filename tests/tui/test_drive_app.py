@@ -152,11 +152,38 @@ async def test_help_lists_all_keys_and_the_drive_goes_on(make_app: MakeApp) -> N
         for behavior in drive_map().behaviors.values():
             assert behavior.says in text
         for binding in BINDINGS:
-            assert binding.description in text
+            # The Ant has no controls to take over.
+            assert (binding.description in text) == (binding.id != "takeover")
         await pilot.press("space")
         assert connection.pressed == ["space"]
         await pilot.press("question_mark")
         assert not isinstance(app.screen, HelpScreen)
+
+
+async def test_a_takeover_is_offered_and_shown_where_the_robot_has_controls(
+    make_app: MakeApp, drive: Drive
+) -> None:
+    facts, snapshots = drive
+    app, connection = make_app()
+    async with app.run_test(size=(160, 48)) as pilot:
+        await played(pilot, connection)
+        assert "take over" not in shown(app.query_one("#keys"))
+    steered = replace(facts, manual_controls=("steering", "throttle"))
+    manual = replace(snapshots[1], manual=(("steering", -0.3), ("throttle", 0.5)), notice="")
+    for size in ((80, 24), (160, 48)):
+        app, connection = make_app([steered, snapshots[0]])
+        async with app.run_test(size=size) as pilot:
+            await played(pilot, connection)
+            assert "⏎ take over" in shown(app.query_one("#keys"))
+            assert "manual" not in shown(app.query_one("#status"))
+            await pilot.press("enter", "left")
+            assert connection.pressed == ["enter", "left"]
+            await pilot.press("question_mark")
+            connection.messages += [steered, manual]  # facts come again when the recording is created
+            await played(pilot, connection)
+            await pilot.press("question_mark")
+            assert "manual: steering −0.30  throttle 0.50" in shown(app.query_one("#status"))
+            assert f"{manual.involvement} steps with a key or a takeover (" in notice(app)
 
 
 async def test_a_terminal_that_is_too_small_says_so_and_recovers(make_app: MakeApp) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pdtui.core.drive_events import DriveEvent, describe_event
 from pdtui.core.errors import MapError
 from pdtui.core.reserved_keys import EVENT_WORDINGS, KEY_TABLE, RUN_KEYS, ReservedKey
+from pdtui.core.robot_links_and_state import ManualControl
 from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.keystrokes import interpret_key, list_drive_keys
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
@@ -18,11 +22,15 @@ from pdtui.tui.help_screen import HelpScreen
 from tests.tui.conftest import MakeApp
 from tests.tui.screens import played
 
+Drive = tuple[DriveFacts, list[DriveSnapshot]]
+
 
 @pytest.fixture(scope="module")
 def driven(policy: Policy, small_map: StimulationMap) -> ControlLoop:
     """A loop in a state in which every key means something."""
-    loop = ControlLoop(make_robot("ant"), policy, small_map, 3)
+    robot = make_robot("ant")
+    robot.manual_controls = (ManualControl("first hip", 0, "lengthways"),)
+    loop = ControlLoop(robot, policy, small_map, 3)
     while loop.step < 75:
         loop.advance()
     loop.advance([DriveEvent(75, "behavior", "hold heading", key="h")])
@@ -52,8 +60,9 @@ def test_every_event_is_worded() -> None:
     assert said["factor"] == "magnitudes of 'spin' set to 40 times the map's"
 
 
-async def test_the_help_lists_every_key_with_its_sentence(make_app: MakeApp) -> None:
-    app, connection = make_app()
+async def test_the_help_lists_every_key_with_its_sentence(make_app: MakeApp, drive: Drive) -> None:
+    facts, snapshots = drive
+    app, connection = make_app([replace(facts, manual_controls=("steering",)), snapshots[0]])
     async with app.run_test(size=(120, 60)) as pilot:
         await played(pilot, connection)
         await pilot.press("question_mark")

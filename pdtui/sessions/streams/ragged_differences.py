@@ -1,4 +1,4 @@
-"""Differences in the streams of which a control step has any number of values: behaviors and stimulation."""
+"""Differences in the streams of which a step has any number of values: behaviors, stimulation, takeover."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.core.attributes import Floats
 from pdtui.sessions.session_schema import ACTIVE_FIELDS
 from pdtui.sessions.streams.step_block import StepBlock
 from pdtui.sessions.streams.value_differences import StreamDifference, StreamValue, differing_values
@@ -51,27 +52,52 @@ def find_stimulation_difference(
     here: StepBlock, recorded: StepBlock, unit: Callable[[int], str], tolerance: float | None
 ) -> StreamDifference | None:
     """Return the first difference of the stimulated units and their outputs; None if there is none."""
-    row = _first_unequal_row(
-        (here.stimulated_counts, here.stimulated_row_indices, here.stimulated[:, 0]),
-        (recorded.stimulated_counts, recorded.stimulated_row_indices, recorded.stimulated[:, 0]),
-    )
-    count = _elements_before(here.stimulated_row_indices, row)
-    a, b = here.stimulated[:count], recorded.stimulated[:count]
-    wrong = differing_values(a, b, tolerance)
+    tables = [(one.stimulated_counts, one.stimulated_row_indices, one.stimulated) for one in (here, recorded)]
+    names = ("stimulated units", "overwritten", "natural")
+    return _find_table_difference(here.steps, tables[0], tables[1], names, unit, tolerance)
+
+
+def find_takeover_difference(
+    here: StepBlock, recorded: StepBlock, tolerance: float | None
+) -> StreamDifference | None:
+    """Return the first difference of what the operator had taken over; None if there is none."""
+    tables = [(one.replaced_counts, one.replaced_row_indices, one.replaced) for one in (here, recorded)]
+    names = ("components taken over", "policy's action")
+    return _find_table_difference(here.steps, tables[0], tables[1], names, str, tolerance)
+
+
+_Table = tuple[NDArray[np.int64], NDArray[np.int64], Floats]
+
+
+def _find_table_difference(
+    steps: NDArray[np.int64],
+    a: _Table,
+    b: _Table,
+    names: Sequence[str],
+    label: Callable[[int], str],
+    tolerance: float | None,
+) -> StreamDifference | None:
+    """Return the first difference of two tables, of which the first column says what a row is about.
+
+    The names are those of the first column as a whole and of each of the others.
+    """
+    (counts_a, rows, first), (counts_b, other_rows, second) = a, b
+    row = _first_unequal_row((counts_a, rows, first[:, 0]), (counts_b, other_rows, second[:, 0]))
+    count = _elements_before(rows, row)
+    wrong = differing_values(first[:count], second[:count], tolerance)
     if wrong.any():
-        element, field = divmod(int(wrong.argmax()), 3)
-        step = int(here.steps[here.stimulated_row_indices[element]])
-        values = a[element, field].item(), b[element, field].item()
+        element, field = divmod(int(wrong.argmax()), len(names))
+        values = first[element, field].item(), second[element, field].item()
         return StreamDifference(
-            step, ("", "overwritten", "natural")[field], unit(int(a[element, 0])), *values
+            int(steps[rows[element]]), names[field], label(int(first[element, 0])), *values
         )
     if row is None:
         return None
-    units = (
-        " ".join(unit(int(flat)) for flat in one.stimulated[one.stimulated_row_indices == row, 0]) or "none"
-        for one in (here, recorded)
+    about = (
+        " ".join(label(int(one)) for one in table[places == row, 0]) or "none"
+        for table, places in ((first, rows), (second, other_rows))
     )
-    return StreamDifference(int(here.steps[row]), "stimulated units", "", *units)
+    return StreamDifference(int(steps[row]), names[0], "", *about)
 
 
 _Ragged = tuple[NDArray[np.int64], NDArray[np.int64], Sequence[Any] | NDArray[Any]]

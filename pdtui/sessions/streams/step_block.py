@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.core.step_record import ActiveBehavior, StepRecord
+from pdtui.core.step_record import ActiveBehavior, ReplacedAction, StepRecord
 from pdtui.core.units import Stimulation
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_schema import ACTIVE_FIELDS
@@ -29,13 +29,17 @@ class StepBlock:
         digests: digest of the simulator's state after each step, shape (n,), int64.
         episodes: number of the episode of each step, shape (n,), int64.
         attributes: attributes after each step, shape (n, J).
-        actions: action of each step, shape (n, A): float32 values, which a session keeps as float64.
+        actions: action of each step, shape (n, A), with what the operator had taken over: float32 values,
+            which a session keeps as float64.
         rewards, costs: reward and cost of each step, shape (n,).
         behavior_counts: number of active behaviors of each step, shape (n,).
         behavior_names: their names, step after step.
         behavior_states: their `ACTIVE_FIELDS`, with NaN for None, shape (sum of the counts, 6).
         stimulated_counts: number of stimulated units of each step, shape (n,).
         stimulated: flat index, overwritten and natural output of each, shape (sum of the counts, 3).
+        replaced_counts: number of components of each step's action that the operator had taken over, shape
+            (n,).
+        replaced: index in the action and the policy's value of each, shape (sum of the counts, 2).
         activations: output of every hidden unit, shape (n, U), float32, or float16 if recorded by half; None
             if they were not recorded or not asked for.
         pose_steps: the steps for which the session has the poses of the robot's shapes, shape (p,).
@@ -56,6 +60,8 @@ class StepBlock:
     behavior_states: Floats
     stimulated_counts: NDArray[np.int64]
     stimulated: Floats
+    replaced_counts: NDArray[np.int64]
+    replaced: Floats
     activations: NDArray[Any] | None = None
     pose_steps: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     poses: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
@@ -83,6 +89,12 @@ class StepBlock:
         values = self.stimulated[:, 2].tolist()
         return tuple(tuple(values[start:stop]) for start, stop in _spans(self.stimulated_counts))
 
+    @property
+    def replaced_actions(self) -> tuple[tuple[ReplacedAction, ...], ...]:
+        """For each step, the components of the action that the operator had taken over."""
+        flat = [ReplacedAction(int(component), natural) for component, natural in self.replaced.tolist()]
+        return tuple(tuple(flat[start:stop]) for start, stop in _spans(self.replaced_counts))
+
     @cached_property
     def behavior_row_indices(self) -> NDArray[np.int64]:
         """The row of the block to which each active behavior belongs, shape (sum of the counts,)."""
@@ -93,8 +105,13 @@ class StepBlock:
         """The row of the block to which each stimulated unit belongs, shape (sum of the counts,)."""
         return np.repeat(np.arange(len(self)), self.stimulated_counts)
 
+    @cached_property
+    def replaced_row_indices(self) -> NDArray[np.int64]:
+        """The row of the block to which each component that was taken over belongs."""
+        return np.repeat(np.arange(len(self)), self.replaced_counts)
+
     def actions_as_float32(self) -> NDArray[np.float32]:
-        """Return the actions as the policy gave them; what exceeds float32, as damage may, is infinite."""
+        """Return the actions as they acted; what exceeds float32, as damage may, is infinite."""
         with np.errstate(over="ignore"):
             return self.actions.astype(np.float32)
 
@@ -104,9 +121,9 @@ class StepBlock:
             return self
         rows, steps = slice(start, stop), self.steps[start:stop]
         low, high = (steps[0], steps[-1]) if len(steps) else (0, -1)
-        behaviors, units = (
+        behaviors, units, components = (
             slice(int(counts[:start].sum()), int(counts[:stop].sum()))
-            for counts in (self.behavior_counts, self.stimulated_counts)
+            for counts in (self.behavior_counts, self.stimulated_counts, self.replaced_counts)
         )
         drawn = slice(*np.searchsorted(self.pose_steps, (low, high + 1)).tolist())
         return StepBlock(
@@ -122,6 +139,8 @@ class StepBlock:
             behavior_states=self.behavior_states[behaviors],
             stimulated_counts=self.stimulated_counts[rows],
             stimulated=self.stimulated[units],
+            replaced_counts=self.replaced_counts[rows],
+            replaced=self.replaced[components],
             activations=None if self.activations is None else self.activations[rows],
             pose_steps=self.pose_steps[drawn],
             poses={name: vectors[drawn] for name, vectors in self.poses.items()},
@@ -145,6 +164,8 @@ def empty_step_block(info: DriveInfo) -> StepBlock:
         behavior_states=np.empty((0, len(ACTIVE_FIELDS))),
         stimulated_counts=numbers,
         stimulated=np.empty((0, 3)),
+        replaced_counts=numbers,
+        replaced=np.empty((0, 2)),
         activations=np.empty((0, sum(info.layers)), np.float32),
     )
 
@@ -189,6 +210,8 @@ def step_block_of_records(
             ],
             axis=1,
         ),
+        replaced_counts=np.fromiter(map(len, of.replaced), np.int64, len(records)),
+        replaced=np.array(list(chain.from_iterable(of.replaced)), np.float64).reshape(-1, 2),
         activations=activations,
         pose_steps=drawn,
         poses=place_link_shapes(info.links, np.array(poses)) if poses else {},

@@ -39,6 +39,12 @@ def decode_step_block(
     chosen = stimulated[:, 0]
     if not ((chosen >= 0) & (chosen < units) & (chosen == np.floor(chosen))).all():
         raise SessionError(f"stream 'stimulation': expected units 0..{units - 1} with two values each")
+    pairs, flat = drive.read_ragged("takeover", np.float64)
+    if (pairs % 2).any():
+        raise SessionError("stream 'takeover': expected components of the action with a value each")
+    replaced, components = flat.reshape(-1, 2), gains.shape[1] - 2
+    if not np.isin(replaced[:, 0], np.arange(components)).all():
+        raise SessionError(f"stream 'takeover': expected components 0..{components - 1} with a value each")
     return StepBlock(
         steps=drive.steps,
         digests=counters[:, 0],
@@ -52,6 +58,8 @@ def decode_step_block(
         behavior_states=states.reshape(-1, len(ACTIVE_FIELDS)),
         stimulated_counts=triples // 3,
         stimulated=stimulated,
+        replaced_counts=pairs // 2,
+        replaced=replaced,
         activations=decode_activations(drive, info) if activations and info.activations != "off" else None,
         **others,
     )

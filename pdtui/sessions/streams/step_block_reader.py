@@ -38,6 +38,7 @@ _COLUMNS = {
         DIGEST_EPISODE,
         "activations",
         "stimulation",
+        "takeover",
         "behaviors",
         "active",
     )

@@ -221,8 +221,9 @@ class SessionRecorder:
             rewards=np.array([record.reward for record in records]),
             costs=np.array([record.cost for record in records]),
             episodes=np.array([record.episode for record in records]),
-            keyed=np.array([any(event.key for event in record.events) for record in records]),
+            involved=np.array([record.involved for record in records]),
             stimulated=np.array([bool(record.stimulation.units) for record in records]),
+            taken_over=np.array([bool(record.replaced) for record in records]),
         )
 
     def _write_events(self, records: Sequence[StepRecord]) -> None:

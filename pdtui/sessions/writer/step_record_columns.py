@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,8 @@ def step_record_columns(
 ) -> list[ComponentColumn]:
     """Return columns with one row per control step: a `StepRecord` except its events and poses.
 
-    Behaviors and stimulation get no column if no step of the batch has any; `kept` decides about activations.
+    Behaviors, stimulation and takeover get no column if no step of the batch has any; `kept` decides about
+    activations.
     """
     of: Any = StepRecord._make(zip(*records, strict=True))
     actions = stack_rows(of.action)
@@ -49,6 +51,9 @@ def step_record_columns(
     if any(stimulation.units for stimulation in of.stimulation):
         flat = [_flatten_stimulation(record) for record in records]
         columns.append(ragged_list_column("stimulation", flat, pa.float64()))
+    if any(of.replaced):
+        pairs = [list(chain.from_iterable(replaced)) for replaced in of.replaced]
+        columns.append(ragged_list_column("takeover", pairs, pa.float64()))
     if any(of.behaviors):
         names = [[behavior.name for behavior in behaviors] for behaviors in of.behaviors]
         states = [

@@ -43,7 +43,7 @@ class StatusLine(SnapshotWidget):
         return [row.strip()]
 
     def _parts(self) -> list[tuple[int, str, Style]]:
-        """Return rank, text and style of each part, from left to right; rank 0 is the most important."""
+        """Return rank, text and style of each part, from left to right; the lowest is the most important."""
         facts, snapshot = self.facts, self.snapshot
         if facts is None:
             return [
@@ -59,7 +59,11 @@ class StatusLine(SnapshotWidget):
             name = _shorten(make_printable(PurePath(facts.recording).name), _NAME)
             size = filesize.decimal(snapshot.recorded_bytes)
             recording = [(8, name, STYLES.muted), (3, f"● {size}", STYLES.bad)]
+        manual = "  ".join(
+            f"{make_printable(name)} {format_number(value)}" for name, value in snapshot.manual
+        )
         return [
+            *([(-1, f"manual: {manual}", STYLES.warn)] if manual else []),
             policy,
             *recording[:1],
             (7, f"episode {snapshot.episode}", STYLES.muted),
@@ -118,6 +122,12 @@ class NoticeLine(SnapshotWidget):
             row.add(said, style)
         return [row.strip()]
 
+    @property
+    def _involvement(self) -> str:
+        """What counts as human involvement, in words."""
+        controls = self.facts is not None and bool(self.facts.manual_controls)
+        return "with a key or a takeover" if controls else "with a key"
+
     def _counters(self) -> str:
         """Return distance, collisions and involvement of the episode, for a robot that has them."""
         statistics = self.snapshot.statistics if self.snapshot is not None else NO_STATISTICS
@@ -127,7 +137,7 @@ class NoticeLine(SnapshotWidget):
         if not shown:
             return ""
         steps = "1 step" if statistics.involvement == 1 else f"{statistics.involvement} steps"
-        keyed = f"{steps} with a key ({100.0 * statistics.share:.1f} %)"
+        keyed = f"{steps} {self._involvement} ({100.0 * statistics.share:.1f} %)"
         return f"episode {statistics.episode}: {' · '.join([*shown, keyed])}"
 
     def _summary(self) -> str:
@@ -140,7 +150,7 @@ class NoticeLine(SnapshotWidget):
             return f"seed {facts.seed} · {place}"
         share = 100.0 * self.snapshot.involvement / max(1, self.snapshot.step)
         steps = "1 step" if self.snapshot.involvement == 1 else f"{self.snapshot.involvement} steps"
-        keyed = f"{steps} with a key ({share:.1f} %)"
+        keyed = f"{steps} {self._involvement} ({share:.1f} %)"
         return f"seed {facts.seed} · episode {self.snapshot.episode} · {keyed} · {place}"
 
 
