@@ -15,14 +15,14 @@ from pdtui.core.robot_links_and_state import Link, ManualControl, RobotState
 from pdtui.core.worker_pool import WorkerProcess
 from pdtui.robots.environments.action_log import ActionLog
 from pdtui.robots.road.car_tasks import CAR_GOALS, CAR_TASKS
-from pdtui.robots.road.metadrive_repairs import OBSERVATIONS
+from pdtui.robots.road.metadrive_repairs import LIDAR_RANGE, OBSERVATIONS
 from pdtui.robots.road.road_scenes import SCENE_STARTS
 from pdtui.robots.road.road_world import CarState, RoadWorld
 from pdtui.robots.robot import ResetResult, Robot, StepResult, TrainingRecipe
 
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
-# Width of the road plus one lane, by which MetaDrive divides distances to its edges, and of a lane, m.
-_ROAD_WIDTH, _LANE_WIDTH = 14.0, 3.5
+# Widest road and widest lane that MetaDrive divides distances by, m.
+_ROAD_WIDTH, _LANE_WIDTH = 18.0, 4.5
 # What `restore` is off by at most where the engine is kept: measured on an empty road, 120 steps later.
 _NEAR = 2e-4
 
@@ -77,15 +77,15 @@ class MetaDrive(Robot):
         },
     )
     attributes = (
-        Attribute("speed", "m/s", 3.6 / 81.0),
-        Attribute("lane offset", "m", -1.0 / _LANE_WIDTH),
+        Attribute("speed", "m/s", 3.6 / 81.0, offset=1.0 / 81.0),
+        Attribute("lane offset", "m", -1.0 / _LANE_WIDTH, offset=0.5),
         Attribute("left distance", "m", 1.0 / _ROAD_WIDTH),
         Attribute("right distance", "m", 1.0 / _ROAD_WIDTH),
-        Attribute("heading", "rad", 0.5),
+        Attribute("heading", "rad", -0.5, offset=0.5),
         Attribute("yaw rate", "rad/s"),
-        Attribute("steering", "", 0.5),
-        Attribute("throttle", "", 0.5),
-        Attribute("gap ahead", "m", 1.0 / 50.0),
+        Attribute("steering", "", 0.5, offset=0.5),
+        Attribute("throttle", "", 0.5, offset=0.5),
+        Attribute("gap ahead", "m", 1.0 / LIDAR_RANGE),
         Attribute("route", ""),
     )
     links = (
@@ -97,7 +97,7 @@ class MetaDrive(Robot):
         if importlib.util.find_spec("metadrive") is None:
             raise RobotError("robot 'metadrive' needs Python before 3.12 and: pip install 'pdtui[driving]'")
         self._scenes, self._crashes_end = self.check_start(scenes), crashes_end
-        self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (OBSERVATIONS,), np.float32)
+        self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (OBSERVATIONS,), np.float64)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
         self._process = WorkerProcess("the roads", RoadWorld, crashes_end)
         self._actions = ActionLog(2)

@@ -69,7 +69,7 @@ def _run_episodes(
         if over.all():
             break
         actions = actor(observations.astype(np.float32))
-        for index in np.flatnonzero(~over):
+        for index in np.flatnonzero(~over).tolist():
             robot = robots[index]
             try:
                 observation, reward, terminated, truncated, info = robot.step(actions[index])

@@ -84,7 +84,8 @@ class RobotBatch:
 
     def finish_step(self, index: int, action: NDArray[np.float32]) -> StepResult:
         """Return the result of a robot's step."""
-        return self.robots[index].step(action)
+        observation, gained, terminated, truncated, info = self.robots[index].step(action)
+        return observation, float(gained), terminated, truncated, info
 
     def suggest_actions(self) -> NDArray[np.float32]:
         """Return what a rule-based driver of each robot would do now, shape (robots, actions).
