@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.robot_links_and_state import Link, RobotState
+from pdtui.core.scenery import Scenery
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.runtime.action_decoders import make_action_decoder
 from pdtui.policies.runtime.policy import Policy
@@ -37,13 +38,15 @@ class Course(Robot):
         super().reset(seed=seed, options=options)
         self.x = 0.0
         x = 1.0 + np.arange(COUNT) + self.np_random.uniform(0.0, 0.5, COUNT)
-        self.obstacles = np.column_stack([x, np.zeros(COUNT), self.np_random.uniform(0.1, 0.2, COUNT)])
+        posts = np.column_stack([x, np.zeros(COUNT), self.np_random.uniform(0.1, 0.2, COUNT)])
+        self.scenery = Scenery(cylinders=posts)
         return self.observe(), {}
 
     def step(self, action: NDArray[np.float32]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         del action
         before, self.x = self.x, self.x + _PACE
-        reached = (self.obstacles[:, 0] > before) & (self.obstacles[:, 0] <= self.x)
+        posts = self.scenery.cylinders[:, 0]
+        reached = (posts > before) & (posts <= self.x)
         return self.observe(), 1.0, False, False, {"cost": float(reached.sum())}
 
     def observe(self) -> Floats:
@@ -56,14 +59,16 @@ class Course(Robot):
         return np.array([[self.x, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0]])
 
     def snapshot(self) -> RobotState:
-        return RobotState(self.name, self.observe(), (self.obstacles,), self.np_random.bit_generator.state)
+        posts = self.scenery.cylinders
+        return RobotState(self.name, self.observe(), (posts,), self.np_random.bit_generator.state)
 
     def restore(self, snapshot: RobotState) -> None:
-        self.x, (self.obstacles,) = float(snapshot.state[0]), snapshot.extras
+        self.x, (posts,) = float(snapshot.state[0]), snapshot.extras
+        self.scenery = Scenery(cylinders=posts)
         self.np_random.bit_generator.state = snapshot.rng
 
     def digest(self) -> int:
-        return int(self.x * 1000) + int(self.obstacles.sum() * 1e9)
+        return int(self.x * 1000) + int(self.scenery.cylinders.sum() * 1e9)
 
 
 def course_loop(seed: int = 3) -> ControlLoop:

@@ -6,11 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import numpy as np
-
 from pdtui.core.attributes import Floats
-
-NO_OBSTACLES: Floats = np.empty((0, 3))
 
 
 @dataclass(frozen=True)

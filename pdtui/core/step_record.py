@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.drive_events import DriveEvent
-from pdtui.core.robot_links_and_state import NO_OBSTACLES
+from pdtui.core.scenery import NO_SCENERY, NO_TRAFFIC, Scenery, Traffic
 from pdtui.core.units import Stimulation
 
 
@@ -78,9 +78,10 @@ class StepRecord(NamedTuple):
         ended: why the episode ended with this step; empty if it did not.
         diverged: whether the simulation diverged, so that it cannot continue.
         finished: whether the robot's task is done; if `ended` is empty, the episode can continue.
-        obstacles: obstacles as in `Robot.obstacles`, shape (N, 3): the same array in every step of a world.
-            They are not recorded.
+        scenery: `Robot.scenery`, the same object in every step of a world.
         fell: whether the episode ended with a fall: neither finished nor out of time.
+        traffic: what `Robot.read_traffic` returned after the step. Like the scenery, it is recorded for the
+            viewer only, and not read back.
         replaced: components of the action that the operator set during a takeover, empty without one.
     """
 
@@ -100,8 +101,9 @@ class StepRecord(NamedTuple):
     ended: str = ""
     diverged: bool = False
     finished: bool = False
-    obstacles: Floats = NO_OBSTACLES
+    scenery: Scenery = NO_SCENERY
     fell: bool = False
+    traffic: Traffic = NO_TRAFFIC
     replaced: tuple[ReplacedAction, ...] = ()
 
     @property

@@ -84,7 +84,9 @@ class ControlLoop:
             attributes=self.robot.attributes,
             links=self.robot.links,
             layers=self.policy.layers,
-            obstacles=len(self.robot.obstacles) > 0,
+            # On a road, a step costs something also where nothing is hit.
+            obstacles=len(self.robot.scenery.cylinders) > 0 and not self.robot.scenery.lines,
+            roads=bool(self.robot.scenery.lines),
         )
 
     @property
@@ -140,8 +142,9 @@ class ControlLoop:
             ended,
             diverged,
             finished,
-            self.robot.obstacles,
+            self.robot.scenery,
             fell,
+            self.robot.read_traffic(),
             replaced,
         )
         self.step += 1

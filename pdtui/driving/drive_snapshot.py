@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from pdtui.core.scenery import NO_TRAFFIC
 from pdtui.sessions.episode_statistics import NO_STATISTICS, EpisodeStatistics
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 
     from pdtui.core.attributes import Attribute, Floats
     from pdtui.core.robot_links_and_state import Link
+    from pdtui.core.scenery import Scenery, Traffic
     from pdtui.core.step_record import ActiveBehavior
 
 
@@ -79,7 +81,8 @@ class DriveSnapshot:
         finished: why the drive is over; empty while it runs.
         statistics: statistics of the present episode.
         manual: name and value of each control that the operator has taken over; empty without a takeover.
-        obstacles: `Robot.obstacles` if they have changed since the last snapshot; else None.
+        scenery: `Robot.scenery` if it has changed since the last snapshot; else None.
+        traffic: what was around the robot after the last step.
     """
 
     step: int
@@ -101,5 +104,6 @@ class DriveSnapshot:
     notice: str = ""
     finished: str = ""
     statistics: EpisodeStatistics = NO_STATISTICS
-    obstacles: Floats | None = None
     manual: tuple[tuple[str, float], ...] = ()
+    scenery: Scenery | None = None
+    traffic: Traffic = NO_TRAFFIC

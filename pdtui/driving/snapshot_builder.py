@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pdtui.core.attributes import Floats
 from pdtui.core.drive_events import describe_event
-from pdtui.core.robot_links_and_state import NO_OBSTACLES
+from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_snapshot import DriveSnapshot, StimulatedUnit
@@ -27,7 +26,7 @@ class SnapshotBuilder:
         self._episode = 0
         self._involvement = 0
         self._statistics = EpisodeStatisticsCounter(loop.info)
-        self._obstacles: Floats = NO_OBSTACLES
+        self._scenery: Scenery = NO_SCENERY
         self._last: StepRecord | None = None
         self.notice = ""
 
@@ -65,8 +64,8 @@ class SnapshotBuilder:
             stimulated = zip(last.stimulation.units, last.natural, last.stimulation.values, strict=True)
             units = tuple(StimulatedUnit(*view) for view in stimulated)
         size = len(loop.robot.attributes)
-        others = loop.robot.obstacles is not self._obstacles
-        self._obstacles = loop.robot.obstacles
+        other_scenery = loop.robot.scenery is not self._scenery
+        self._scenery = loop.robot.scenery
         snapshot = DriveSnapshot(
             step=loop.step,
             time=loop.step * loop.robot.control_dt,
@@ -87,8 +86,9 @@ class SnapshotBuilder:
             notice=self.notice,
             finished=finished,
             statistics=self._statistics.of(loop.episode),
-            obstacles=self._obstacles if others else None,
             manual=tuple(loop.takeover.values.items()),
+            scenery=self._scenery if other_scenery else None,
+            traffic=loop.robot.read_traffic() if last is None else last.traffic,
         )
         self._history, self._path, self._restarted, self.notice = [], [], False, ""
         return snapshot

@@ -16,7 +16,7 @@ _NEAREST = 0.15  # least distance of a point that is drawn, as a share of the ta
 
 @dataclass(frozen=True)
 class PerspectiveCamera:
-    """A perspective camera whose picture has world x to the right.
+    """A perspective camera whose picture has world x to the right, or another direction on the ground.
 
     Attributes:
         target: the point that appears at `centre`, m.
@@ -24,6 +24,7 @@ class PerspectiveCamera:
         extent: half the size of the area to show, m; the camera is 6 times as far away.
         zoom: dots per m at the target's distance.
         centre: place of the target in the picture, in dots.
+        azimuth: angle from world x to the picture's right, counterclockwise about the vertical, rad.
     """
 
     target: tuple[float, float, float]
@@ -31,13 +32,14 @@ class PerspectiveCamera:
     extent: float
     zoom: float
     centre: tuple[float, float]
+    azimuth: float = 0.0
 
     def project(self, points: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Return dots (..., 2) and magnifications (...) of points (..., 3), and which are in front of it.
 
         Magnification is relative to the target. Points that do not lie in front must not be drawn.
         """
-        relative = points - np.array(self.target)
+        relative = self._turned(points)
         up = relative[..., 2] * cos(radians(self.elevation)) + relative[..., 1] * sin(radians(self.elevation))
         depth = 1.0 + self.depth(points) / (_DISTANCE * self.extent)
         before = depth > _NEAREST
@@ -53,10 +55,20 @@ class PerspectiveCamera:
 
     def depth(self, points: Floats) -> Floats:
         """Return how far points (..., 3) lie behind the target along the line of sight, m."""
-        relative = points - np.array(self.target)
+        relative = self._turned(points)
         elevation = radians(self.elevation)
         away: Floats = relative[..., 1] * cos(elevation) - relative[..., 2] * sin(elevation)
         return away
+
+    def _turned(self, points: Floats) -> Floats:
+        """Return points relative to the target, along the picture's right, away from the camera, and up."""
+        relative: Floats = points - np.array(self.target)
+        if self.azimuth:
+            x, y = relative[..., 0], relative[..., 1]
+            right = x * cos(self.azimuth) + y * sin(self.azimuth)
+            away = y * cos(self.azimuth) - x * sin(self.azimuth)
+            relative = np.stack([right, away, relative[..., 2]], axis=-1)
+        return relative
 
 
 def round_length_down(length: float) -> float:

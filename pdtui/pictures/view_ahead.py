@@ -1,10 +1,11 @@
-"""What the picture from above shows of the ground where there are obstacles: mostly what lies ahead.
+"""What the picture from above shows of the ground where there are obstacles or roads: mostly what lies ahead.
 
 The screen draws by it, and a program that operates the keys in a person's place sees no more.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.robot_links_and_state import Link
+from pdtui.pictures.perspective_camera import PerspectiveCamera
 from pdtui.robots.geometry import rotate_vectors
 
 AHEAD, ASIDE = 16.0, 8.0
@@ -20,6 +22,13 @@ _FORWARD = 0.27
 """Distance from the robot to the middle of the picture, as a share of the picture's size."""
 _EASING = 0.12
 """Share of a turn that the picture follows per frame, so that a swaying gait does not shake it."""
+
+ROAD_SPAN = 60.0
+"""Length of road that is shown, m: along the heading in large pictures, else along the longer side."""
+_ROAD_ZOOM = 1.2
+"""Dots per m above which a picture shows that length along the heading; a lane is then 4 dots wide."""
+_ROAD_ROBOT = 0.76
+"""Place of the robot on a road, as a share of the picture's height from its top."""
 
 
 class GroundArea(NamedTuple):
@@ -54,6 +63,20 @@ class ViewAhead:
         zoom = min(width / AHEAD, height / ASIDE) / extent
         size = np.array([width, height]) / zoom
         return GroundArea(place + _FORWARD * size * ahead, size, zoom)
+
+
+def frame_road(root: Floats, width: float, height: float) -> PerspectiveCamera:
+    """Return a camera above a road, in whose picture the robot's heading is up.
+
+    Args:
+        root: pose of the robot, shape (7,).
+        width, height: size of the picture, dots.
+    """
+    zoom = max(height / ROAD_SPAN, min(max(width, height) / ROAD_SPAN, _ROAD_ZOOM))
+    x, y = heading_on_ground(root)
+    azimuth = math.atan2(y, x) - math.pi / 2 if x or y else 0.0
+    place = (float(root[0]), float(root[1]), 0.0)
+    return PerspectiveCamera(place, 90.0, ROAD_SPAN, zoom, (width / 2, height * _ROAD_ROBOT), azimuth)
 
 
 def heading_on_ground(root: Floats) -> Floats:

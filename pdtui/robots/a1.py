@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
+from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.legged.terrain import RoughGround, draw_rough_ground, scatter_trees
@@ -125,15 +126,14 @@ class A1(BulletRobot):
         bullet.setPhysicsEngineParameter(numSolverIterations=18, enableConeFriction=0)
         angles = _STANCE + rng.uniform(-_START_NOISE, _START_NOISE, 12)
         self.ground: RoughGround | None = None
-        self.obstacles = np.empty((0, 3))
         if start == "plane":
             bullet_robot.add_ground_plane(bullet, _FRICTION)
         else:
             self.ground = draw_rough_ground(rng, self._roughness)
             bullet_robot.add_rough_ground(bullet, self.ground, _FRICTION)
-        if start == "forest":
-            self.obstacles = scatter_trees(rng, self._density)
-        self._trees = bullet_robot.add_trees(bullet, self.obstacles)
+        trees = scatter_trees(rng, self._density) if start == "forest" else None
+        self.scenery = NO_SCENERY if trees is None else Scenery(cylinders=trees)
+        self._trees = bullet_robot.add_trees(bullet, self.scenery.cylinders)
         flags = bullet.URDF_IGNORE_VISUAL_SHAPES
         robot: int = bullet.loadURDF(str(self._urdf), [0, 0, _START_HEIGHT], flags=flags)
         names = {bullet.getJointInfo(robot, j)[12].decode(): j for j in range(bullet.getNumJoints(robot))}
@@ -233,8 +233,8 @@ class A1(BulletRobot):
         return 0.0 if self.ground is None else self.ground.height(x, y)
 
     def _near_trees(self) -> list[int]:
-        away = np.hypot(*(self.obstacles[:, :2] - self._place[:2]).T)
-        return np.flatnonzero(away - self.obstacles[:, 2] < _REACH).tolist()
+        x, y, radius = self.scenery.cylinders.T
+        return np.flatnonzero(np.hypot(x - self._place[0], y - self._place[1]) - radius < _REACH).tolist()
 
     def _sense_contacts(self) -> Floats:
         links = {point[3] for point in self.bullet.getContactPoints(self.robot_id) if point[9] > 0.0}

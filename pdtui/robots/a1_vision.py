@@ -69,5 +69,5 @@ class A1Vision(A1):
         (x, y, _), yaw = self._base()[0], self._attitude()[2]
         nose = (x + _NOSE * math.cos(yaw), y + _NOSE * math.sin(yaw))
         return np.concatenate(
-            [super().observe(), observe_trees_along_rays(nose, yaw, self.obstacles, _RAYS, _SIGHT)]
+            [super().observe(), observe_trees_along_rays(nose, yaw, self.scenery.cylinders, _RAYS, _SIGHT)]
         )

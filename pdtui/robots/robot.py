@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import RobotError
-from pdtui.core.robot_links_and_state import NO_OBSTACLES, CommandRange, Link, ManualControl, RobotState
+from pdtui.core.robot_links_and_state import CommandRange, Link, ManualControl, RobotState
+from pdtui.core.scenery import NO_SCENERY, NO_TRAFFIC, Scenery, Traffic
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
 from pdtui.robots.task import Task, find_task
 
@@ -84,8 +85,8 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         tasks: What `pdtui pursue` can look for, with the judge that tells whether it was done.
         training_recipe: How `pdtui train` trains a policy for the robot.
         episode_steps: Control steps after which training and scores end an episode.
-        obstacles: Upright cylinders in the robot's way, shape (N, 3): x, y and radius, m. The array stays the
-            same until the next `reset` or `restore`, which may replace it by another array.
+        scenery: What stands still around the robot: roads, tree trunks, cones. The object stays the same as
+            long as the world does, and another replaces it when that changes, as in `reset` and `restore`.
         state_arrays: Names of the Python attributes, all of them arrays, that belong to a robot's state.
     """
 
@@ -101,7 +102,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     tasks: tuple[Task, ...] = ()
     training_recipe: TrainingRecipe = TrainingRecipe()
     episode_steps: int = 1000
-    obstacles: Floats = NO_OBSTACLES
+    scenery: Scenery = NO_SCENERY
     state_arrays: tuple[str, ...] = ()
 
     @property
@@ -120,6 +121,10 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     @abstractmethod
     def read_poses(self) -> Floats:
         """Return the world pose of every body, shape (B, 7): x y z in m, then a quaternion w x y z."""
+
+    def read_traffic(self) -> Traffic:
+        """Return the boxes around the robot that may move, appear and vanish; a drive asks once per step."""
+        return NO_TRAFFIC
 
     @abstractmethod
     def snapshot(self) -> RobotState:

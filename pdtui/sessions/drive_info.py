@@ -31,7 +31,9 @@ class DriveInfo:
         attributes, links: kinematic attributes and links of the robot.
         layers: widths of the policy's hidden layers.
         activations: how activations are recorded, which does not affect the run.
-        obstacles: whether there are obstacles where the first episode starts.
+        obstacles: whether there are obstacles, and no roads, where the first episode starts: all costs are
+            collisions then.
+        roads: whether there are roads where the first episode starts.
     """
 
     robot: str
@@ -47,6 +49,7 @@ class DriveInfo:
     activations: ActivationsKept = "all"
     start: str = ""
     obstacles: bool = False
+    roads: bool = False
 
 
 T = TypeVar("T")
@@ -67,6 +70,7 @@ def encode_drive_info(info: DriveInfo, created: str) -> dict[str, Any]:
         "stochastic": info.stochastic,
         "start": info.start,
         "obstacles": info.obstacles,
+        "roads": info.roads,
         "dt": info.dt,
         "layers": list(info.layers),
         "activations": info.activations,
@@ -119,6 +123,7 @@ def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, s
         # Older sessions lack the following properties.
         start=_read_text(properties, "start", default=""),
         obstacles=_read_value(properties, "obstacles", bool, False),
+        roads=_read_value(properties, "roads", bool, False),
     )
     return info, _read_text(properties, "created")
 

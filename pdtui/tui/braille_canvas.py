@@ -83,6 +83,30 @@ class BrailleCanvas:
         row, column = np.nonzero(filled)
         self.inks[(row + y0) // DOTS_Y, (column + x0) // DOTS_X] = ink
 
+    def draw_polygon(self, corners: Floats, ink: int, *, halo: float = 0.0) -> None:
+        """Fill a convex polygon, corners (n, 2) in either order, and clear a rim of `halo` dots around it.
+
+        Of one that covers the middle of no dot, the outline is drawn.
+        """
+        size = np.array([self.width, self.height])
+        low = np.clip(np.floor(corners.min(axis=0) - halo), 0, size)
+        high = np.clip(np.ceil(corners.max(axis=0) + halo), 0, size)
+        if not (low < high).all():  # outside, or not finite
+            return
+        (x0, y0), (x1, y1) = low.astype(int), high.astype(int)
+        x, y = np.arange(x0, x1) + 0.5, (np.arange(y0, y1) + 0.5)[:, None]
+        edges = np.roll(corners, -1, axis=0) - corners
+        area = np.sum(corners[:, 0] * np.roll(corners[:, 1], -1) - corners[:, 1] * np.roll(corners[:, 0], -1))
+        inward = np.full((y1 - y0, x1 - x0), np.inf)
+        for (cx, cy), (dx, dy) in zip(corners, edges, strict=True):
+            distance = np.sign(area) * (dx * (y - cy) - dy * (x - cx)) / max(float(np.hypot(dx, dy)), 1e-9)
+            inward = np.minimum(inward, distance)
+        self.dots[y0:y1, x0:x1] &= inward < -halo
+        row, column = np.nonzero(inward > 0)
+        self.draw_points(column + x0, row + y0, ink)
+        if not len(row):
+            self.draw_segments(corners, np.roll(corners, -1, axis=0), ink)
+
     def draw_text(self, column: int, row: int, text: str, ink: int) -> None:
         """Write characters, each one cell wide, over the dots."""
         if 0 <= row < self.rows:

@@ -83,7 +83,7 @@ def test_a_snapshot_restores_bit_for_bit_into_another_robot(a1: A1, start: str) 
         robot.restore(snapshot)
         assert robot.digest() == digest
         np.testing.assert_array_equal(robot.read_attributes(), seen)
-        np.testing.assert_array_equal(robot.obstacles, a1.obstacles)
+        np.testing.assert_array_equal(robot.scenery.cylinders, a1.scenery.cylinders)
         assert _digests(robot, _actions(40, 1)) == first
     other.close()
 
@@ -170,23 +170,23 @@ def test_a_forest_is_rough_ground_with_trees_that_it_does_not_feel() -> None:
     rough, forest = A1("rough"), A1("forest")
     rough.reset(seed=11)
     forest.reset(seed=11)
-    assert len(rough.obstacles) == 0
-    assert len(forest.obstacles) > 100
-    assert forest.obstacles[:, 0].min() > 2
+    assert len(rough.scenery.cylinders) == 0
+    trees = forest.scenery.cylinders
+    assert len(trees) > 100
+    assert trees[:, 0].min() > 2
     for action in _actions(20):
         np.testing.assert_array_equal(rough.step(action)[0], forest.step(action)[0])
-    apart = np.hypot(*(forest.obstacles[1:, None, :2] - forest.obstacles[None, :, :2]).T)
-    radii = forest.obstacles[:, 2]
+    apart = np.hypot(*(trees[1:, None, :2] - trees[None, :, :2]).T)
+    radii = trees[:, 2]
     gaps = apart - radii[:, None] - radii[None, 1:]
     assert gaps[apart > 0].min() > 0.89
-    before = forest.obstacles
     forest.reset(seed=12)
-    assert not np.array_equal(before, forest.obstacles)
+    assert not np.array_equal(trees, forest.scenery.cylinders)
 
 
 def test_running_into_a_tree_costs_one(a1: A1) -> None:
     a1.reset(seed=0, options={"start": "forest"})
-    x, y, radius = a1.obstacles[0]
+    x, y, radius = a1.scenery.cylinders[0]
     assert a1.step(np.zeros(6, np.float32))[4]["cost"] == 0
     a1.bullet.resetBasePositionAndOrientation(a1.robot_id, [x - radius - 0.2, y, 0.33], [0, 0, 0, 1])
     a1.step(np.zeros(6, np.float32))  # now it knows where it is

@@ -25,7 +25,7 @@ def test_it_sees_what_the_simulators_rays_hit() -> None:
         ends = [[x + 5.0 * math.cos(yaw + a), y + 5.0 * math.sin(yaw + a), 0.6] for a in FAN]
         hits = robot.bullet.rayTestBatch([[x, y, 0.6]] * len(FAN), ends)
         expected = 1.0 - np.array([hit[2] for hit in hits])
-        found = observe_trees_along_rays((x, y), yaw, robot.obstacles, FAN, 5.0)
+        found = observe_trees_along_rays((x, y), yaw, robot.scenery.cylinders, FAN, 5.0)
         # Bullet's cylinders have a margin, and a ray along an edge may go either way.
         assert np.quantile(np.abs(found - expected), 0.9) < 0.01
         nonzero += int((found > 0).sum())

@@ -16,7 +16,7 @@ from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUn
 from pdtui.stimulation.stimulation_map import Behavior, MotorPrimitive, PidGains, StimulationMap
 
 ARRAYS = ("activations", "attributes", "poses", "history", "path")
-ABSENT = ("obstacles", "statistics")
+ABSENT = ("scenery", "traffic", "statistics")
 """The Ant has none to show."""
 
 

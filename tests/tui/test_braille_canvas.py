@@ -83,3 +83,28 @@ def test_text_is_cut_at_both_edges() -> None:
     canvas.draw_text(3, 1, "xyz", 0)
     canvas.draw_text(0, 2, "below", 0)
     assert text_of(canvas) == ["cd  ", "   x"]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_polygon_is_filled_and_has_a_rim(order: int) -> None:
+    canvas = BrailleCanvas(6, 3)
+    canvas.dots[:] = True
+    corners = np.array([[3.0, 3.0], [8.0, 3.0], [8.0, 8.0], [3.0, 8.0]])[::order]
+    canvas.draw_polygon(corners, 1, halo=1.0)
+    expected = np.ones((12, 12), bool)
+    expected[2:9, 2:9] = False
+    expected[3:8, 3:8] = True
+    np.testing.assert_array_equal(canvas.dots, expected)
+
+
+def test_the_thinnest_polygon_is_still_seen() -> None:
+    canvas = BrailleCanvas(2, 1)
+    canvas.draw_polygon(np.array([[0.6, 1.6], [3.4, 1.6], [3.4, 1.7], [0.6, 1.7]]), 0)
+    assert text_of(canvas) == ["⠒⠒"]
+
+
+@pytest.mark.parametrize("offset", [100.0, 1e300, np.nan, np.inf])
+def test_a_polygon_elsewhere_is_not_drawn(offset: float) -> None:
+    canvas = BrailleCanvas(2, 1)
+    canvas.draw_polygon(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]) + offset, 0)
+    assert not canvas.dots.any()

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from rich.cells import cell_len
 from textual.app import App, ComposeResult
 
 from pdtui.core.attributes import Attribute
+from pdtui.core.scenery import BoxKind, LineKind, RoadLine, Scenery, Traffic
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUnit
 from pdtui.guide.guide_pages import read_guide
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
@@ -97,6 +98,15 @@ def hostile_drives() -> dict[str, Drive]:
         return replace(first, **arrays)
 
     obstacles = np.array([[2.0, 0.0, 0.3], [-1.0, 4.0, 1.0], [0.0, 0.0, 50.0], [1e4, 1e4, 0.1]])
+    points = np.array([[-50.0, 2.0], [0.0, 2.0], [1e4, 2.0], [1e4, 2.0]])
+    road = Scenery(
+        tuple(RoadLine(kind, points + row) for row, kind in enumerate(get_args(LineKind))), obstacles
+    )
+    kinds: tuple[BoxKind, ...] = ("vehicle", "obstacle", "vehicle")
+    places = np.array([[5.0, 1.0, 0.5, 0.3], [0.0, 0.0, 0.0, 0.0], [1e300, 0.0, 0.0, 1.0]])
+    sizes = np.array([[4.0, 2.0, 1.0], [0.0, 0.0, 0.0], [1e4, 1e4, 1e4]])
+    crowd = Traffic(np.arange(3), kinds, places, sizes, places[:, :2])
+    nowhere = Traffic(np.arange(3), kinds, places * np.nan, sizes, places[:, :2] * np.nan)
     bodiless = replace(facts, links=())
     nothing = replace(first, poses=np.empty((0, 7)), path=np.empty((0, 3)))
     return {
@@ -112,7 +122,14 @@ def hostile_drives() -> dict[str, Drive]:
         "huge": (facts, [first, filled(1e200)]),
         "largest": (facts, [first, filled(1.7e308)]),
         "zeros": (facts, [filled(0.0)]),
-        "obstacles": (facts, [replace(first, obstacles=obstacles), replace(stimulated, restarted=True)]),
+        "obstacles": (
+            facts,
+            [replace(first, scenery=Scenery(cylinders=obstacles)), replace(stimulated, restarted=True)],
+        ),
+        "road": (
+            facts,
+            [replace(filled(np.nan), scenery=road, traffic=nowhere), replace(first, traffic=crowd)],
+        ),
         "no body": (bodiless, [nothing]),
         "no attributes": (
             replace(facts, attributes=(), recording="x" * 300),

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pdtui.core.scenery import Scenery
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.pictures.perspective_camera import PerspectiveCamera
 from pdtui.sessions.episode_statistics import EpisodeStatistics
@@ -53,7 +54,7 @@ async def test_a_drive_among_obstacles_begins_from_above(
     facts, (first, *rest) = drive[0], drive[1][:6]
     x, y = first.poses[0, :2]
     ahead = np.array([[x + 6.0, y + 0.5, 0.3]])
-    messages = [facts, replace(first, obstacles=ahead), *rest[:2]]
+    messages = [facts, replace(first, scenery=Scenery(cylinders=ahead)), *rest[:2]]
     app, connection = make_app(messages)
     async with app.run_test(size=size) as pilot:
         await played(pilot, connection)
@@ -68,7 +69,7 @@ async def test_a_drive_among_obstacles_begins_from_above(
         ]
         assert any(inks), "what is 6 m ahead of an Ant is in the picture"
         await pilot.press("v")
-        connection.messages.append(replace(rest[2], obstacles=ahead + 1.0))
+        connection.messages.append(replace(rest[2], scenery=Scenery(cylinders=ahead + 1.0)))
         await played(pilot, connection)
         chosen: str = robot.view
         assert chosen == "side", "what the user chose stays"

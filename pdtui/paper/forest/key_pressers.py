@@ -32,9 +32,9 @@ class OperatorPresser:
         }
         self._loop, self._keys = loop, operator_keys(loop.map)
         self._operator = ScriptedOperator(key_models, dt, periods)
-        self._sight = OperatorSight(loop.robot.links, loop.robot.obstacles)
+        self._sight = OperatorSight(loop.robot.links, loop.robot.scenery.cylinders)
         self._yaw = loop.robot.attribute_index("yaw")
-        self._trees: Floats = loop.robot.obstacles[:0]
+        self._trees: Floats = loop.robot.scenery.cylinders[:0]
 
     def press(self, step: int) -> str:
         poses = self._loop.robot.read_poses()

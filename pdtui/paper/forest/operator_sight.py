@@ -23,11 +23,11 @@ class OperatorSight:
 
     Args:
         links: links of the robot.
-        obstacles: x, y and radius of all trees, m, shape (N, 3).
+        trees: x, y and radius of all trees, m, shape (N, 3).
     """
 
-    def __init__(self, links: Sequence[Link], obstacles: Floats) -> None:
-        self._links, self._obstacles = links, obstacles
+    def __init__(self, links: Sequence[Link], trees: Floats) -> None:
+        self._links, self._trees = links, trees
         self._view, self._extent = ViewAhead(), 0.0
 
     def look(self, poses: Floats) -> Floats:
@@ -37,5 +37,5 @@ class OperatorSight:
         self._extent = max(self._extent, measure_stretch(self._links, root, ends))
         self._view.follow(root)
         area = self._view.frame(root[:2], self._extent, AHEAD, ASIDE)
-        beyond = np.abs(self._obstacles[:, :2] - area.middle) - area.size / 2
-        return self._obstacles[(beyond < self._obstacles[:, 2:]).all(axis=1)]
+        beyond = np.abs(self._trees[:, :2] - area.middle) - area.size / 2
+        return self._trees[(beyond < self._trees[:, 2:]).all(axis=1)]

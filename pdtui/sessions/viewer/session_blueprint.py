@@ -26,6 +26,11 @@ _CURVES = (
 _MOST_NAMED = 8
 """Largest number of curves with a legend; a longer one hides the curves, which are also named on hovering."""
 _MARGIN = 0.08
+_EYE, _ROAD_EYE = (2.5, -2.5, 1.7), (-16.0, -10.0, 9.0)
+"""Where the eye is at first, m: it then follows the robot."""
+_ROAD_HEIGHT = 60.0
+"""Height from which a road is seen from above, m."""
+_PATH_RADIUS, _ROAD_PATH_RADIUS = 0.02, 0.15
 
 
 @dataclass(frozen=True)
@@ -83,18 +88,35 @@ def _lay_out_robot(info: DriveInfo, content: BlueprintContent) -> rrb.Vertical:
         )
         for timeline in (schema.TIME, schema.STEP)
     ]
+    # Only the path is shown over time; everything else is shown at the current time.
+    width = _ROAD_PATH_RADIUS if info.roads else _PATH_RADIUS
+    strips = rr.LineStrips3D.from_fields(radii=width).visualizer()
+    world = [schema.ROBOT, schema.PATH, schema.OBSTACLES, schema.ROAD_LINES, f"{schema.TRAFFIC}/**"]
     robot = rrb.Spatial3DView(
-        contents=[schema.ROBOT, schema.PATH, schema.OBSTACLES],
+        contents=world,
         name=f"Robot {info.robot}, policy {info.policy}; its path in the colors of the behaviors",
-        # Only the path is shown over time; robot and obstacles are shown at the current time.
-        overrides={
-            schema.PATH: [rr.LineStrips3D.from_fields(radii=0.02).visualizer(), rrb.VisibleTimeRanges(trails)]
-        },
+        overrides={schema.PATH: [strips, rrb.VisibleTimeRanges(trails)]},
         eye_controls=rrb.EyeControls3D(
-            position=(2.5, -2.5, 1.7), look_target=(0.0, 0.0, 0.5), tracking_entity=schema.ROBOT
+            position=_ROAD_EYE if info.roads else _EYE,
+            look_target=(0.0, 0.0, 0.5),
+            tracking_entity=schema.ROBOT,
         ),
         line_grid=True,
     )
+    if info.roads:
+        from_above = rrb.Spatial3DView(
+            contents=world,
+            name="Road from above",
+            overrides={schema.PATH: [strips, rrb.VisibleTimeRanges(trails)]},
+            eye_controls=rrb.EyeControls3D(
+                position=(0.0, 0.0, _ROAD_HEIGHT),
+                look_target=(0.0, 0.0, 0.0),
+                eye_up=(0.0, 1.0, 0.0),
+                tracking_entity=schema.ROBOT,
+            ),
+            line_grid=False,
+        )
+        return rrb.Vertical(robot, rrb.Horizontal(from_above, keys, column_shares=[4, 3]), row_shares=[3, 3])
     above = rrb.Spatial2DView(
         contents=[schema.OBSTACLES_ABOVE, schema.PATH],
         name="Path from above",

@@ -18,6 +18,12 @@ LogStatic = Callable[[str, Any], None]
 Color = tuple[int, int, int]
 
 
+def pack_color(color: Color) -> int:
+    """Return an opaque color as Rerun's columns keep it: red, green, blue and alpha in 32 bits."""
+    red, green, blue = color
+    return red << 24 | green << 16 | blue << 8 | 255
+
+
 class ViewerCurves(Generic[CurveKey]):
     """Writes one entity per key and one curve per field, with gaps where a key has no values.
 

@@ -1,4 +1,5 @@
-"""Write what only the viewer needs: robot, path, stimulated units, controllers, behaviors and heat map.
+"""Write what only the viewer needs: the robot, what is around it, its path, stimulated units, controllers,
+behaviors and heat map.
 
 All of it follows from the data of the drive, so it is written in larger batches: a crash that loses the last
 batch loses no information.
@@ -20,9 +21,10 @@ from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_schema import BEHAVIORS, HEAT_MAP, MAGNITUDES, PATH, ROBOT, TARGETS, UNITS
 from pdtui.sessions.viewer.activation_heat_map import ActivationHeatMap
 from pdtui.sessions.viewer.behavior_legend import BehaviorColorLegend
-from pdtui.sessions.viewer.obstacle_writer import ObstacleWriter
+from pdtui.sessions.viewer.scenery_writer import SceneryWriter
 from pdtui.sessions.viewer.session_blueprint import BlueprintContent
-from pdtui.sessions.viewer.viewer_curves import Color, LogStatic, SendRows, ViewerCurves
+from pdtui.sessions.viewer.traffic_writer import TrafficWriter
+from pdtui.sessions.viewer.viewer_curves import Color, LogStatic, SendRows, ViewerCurves, pack_color
 from pdtui.sessions.viewer.viewer_link_shapes import ViewerLinkShapes
 from pdtui.sessions.writer.arrow_columns import number_list_column, polyline_column, text_column
 
@@ -54,7 +56,8 @@ class ViewerDataWriter:
         color = self._legend.color
         self._targets = ViewerCurves[str](TARGETS, str, color, ("target",), send, log_static)
         self._magnitudes = ViewerCurves[str](MAGNITUDES, str, color, ("",), send, log_static)
-        self._obstacles = ObstacleWriter(send, log_static)
+        self._scenery = SceneryWriter(send, log_static)
+        self._traffic = TrafficWriter(self._draw_every, send)
         self._shown_units: dict[str, tuple[int, ...]] = {}
         self._left_out = False
         self._states: dict[str, tuple[str, ...]] = {name: (name,) for name in self._legend.names}
@@ -73,7 +76,8 @@ class ViewerDataWriter:
     def add(self, records: Sequence[StepRecord]) -> None:
         """Add control steps."""
         self._pending += len(records)
-        self._obstacles.add(records)
+        self._scenery.add(records)
+        self._traffic.add(records)
         for record in records:
             self._last, behaviors, stimulation = record.step, record.behaviors, record.stimulation
             state = " + ".join([behavior.name for behavior in behaviors]) if behaviors else ""
@@ -110,12 +114,13 @@ class ViewerDataWriter:
             self._write_robot(steps, np.array(poses), states, np.array(jumps))
             self._drawn = []
         self._pending = 0
+        self._traffic.write()
         for curves in (self._units, self._targets, self._magnitudes):
             curves.write()
 
     def write_changes(self) -> None:
-        """Write the steps at which the active behaviors or the obstacles changed."""
-        self._obstacles.write()
+        """Write the steps at which the active behaviors or the scenery changed."""
+        self._scenery.write()
         if self._new_state:
             colors = [self._color(state) for state in self._states]
             self._log_static(BEHAVIORS, rr.StateConfiguration(values=list(self._states), colors=colors))
@@ -181,7 +186,7 @@ class ViewerDataWriter:
         pieces[:, 0, :2], pieces[:, 1, :2] = before, here
         # The y axis of a 2D view points down, and only a 2D view can be fitted to the path.
         above = pieces[:, :, :2] * np.array([1.0, -1.0], np.float32)
-        packed = {state: _pack_color(self._color(state)) for state in set(states)}
+        packed = {state: pack_color(self._color(state)) for state in set(states)}
         colors = number_list_column(
             rr.LineStrips3D.descriptor_colors(), np.array([packed[state] for state in states], np.uint32)
         )
@@ -192,8 +197,3 @@ class ViewerDataWriter:
             replace(colors, descriptor=rr.LineStrips2D.descriptor_colors()),
         ]
         self._send(PATH, steps, columns)
-
-
-def _pack_color(color: Color) -> int:
-    red, green, blue = color
-    return red << 24 | green << 16 | blue << 8 | 255

@@ -80,6 +80,23 @@ def vector_list_column(descriptor: Descriptor, block: NDArray[Any]) -> Component
     return _list_column(descriptor, values, _even_offsets(count, width))
 
 
+def ragged_vector_column(
+    descriptor: Descriptor, vectors: NDArray[Any], counts: Sequence[int]
+) -> ComponentColumn:
+    """Return an array (m, k) as one list of vectors of length k per row; the counts add up to m."""
+    values = vector_list_column(descriptor, vectors[None]).array.values
+    return _list_column(descriptor, values, pa.array([0, *accumulate(counts)], pa.int32()))
+
+
+def polylines_column(descriptor: Descriptor, strips: Sequence[NDArray[Any]]) -> ComponentColumn:
+    """Return arrays (m, k) of any lengths as one row of polylines through m points with k coordinates."""
+    points = np.concatenate(strips) if strips else np.empty((0, 3), np.float32)
+    column = ragged_vector_column(descriptor, points, [len(strip) for strip in strips])
+    item = pa.field("item", column.array.type.value_type, nullable=False)
+    values = pa.ListArray.from_arrays(column.array.offsets, column.array.values, type=pa.list_(item))
+    return _list_column(descriptor, values, pa.array([0, len(strips)], pa.int32()))
+
+
 def polyline_column(descriptor: Descriptor, block: NDArray[Any]) -> ComponentColumn:
     """Return an array (n, m, k) as n lists of one polyline through m points with k coordinates."""
     points = vector_list_column(descriptor, block).array

@@ -9,41 +9,52 @@ from textual.reactive import reactive
 from textual.strip import Strip
 
 from pdtui.core.attributes import Floats
-from pdtui.core.robot_links_and_state import NO_OBSTACLES
+from pdtui.core.robot_links_and_state import Link
+from pdtui.core.scenery import NO_SCENERY, BoxKind, LineKind, Scenery, Traffic
 from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.pictures.perspective_camera import PerspectiveCamera, round_length_down
-from pdtui.pictures.view_ahead import AHEAD, ViewAhead, heading_on_ground, measure_stretch
+from pdtui.pictures.view_ahead import AHEAD, ViewAhead, frame_road, heading_on_ground, measure_stretch
 from pdtui.robots.geometry import capsule_ends, compute_link_poses, root_body_row, rotate_vectors
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.obstacle_drawing import draw_obstacles_from_above, draw_obstacles_from_side
+from pdtui.tui.road_drawing import BOX_CORNERS, RoadLineDrawing, draw_box_edges, draw_lidar_hits, draw_traffic
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
 View = Literal["side", "above"]
 _SIDE_ELEVATION = 14.0  # of the camera at the side, degrees
-_GROUND, _AXIS, _SHADOW, _HEADING, _LABEL, _OBSTACLE, _FIRST_SHADE = range(7)
+_GROUND, _AXIS, _SHADOW, _ROBOT, _LABEL, _OBSTACLE, _LANE, _EDGE, _ROUTE, _VEHICLE, _FIRST_SHADE = range(11)
 _INKS = (
     *(STYLES.faint, STYLES.muted, STYLES.faint, STYLES.accent, STYLES.muted, STYLES.obstacle),
+    *(STYLES.muted, STYLES.text, STYLES.primary, STYLES.warn),
     *STYLES.depth,
 )
+_LINE_INKS: dict[LineKind, int] = {
+    "solid lane line": _LANE,
+    "broken lane line": _LANE,
+    "road edge": _EDGE,
+    "route": _ROUTE,
+}
+_BOX_INKS: dict[BoxKind, int] = {"vehicle": _VEHICLE, "obstacle": _OBSTACLE}
 _FARTHEST = 0.55  # least magnification of the ground grid that is drawn
 _ARROW = 0.5
 """Least size of the heading arrow, in extents of the camera."""
-_BOX_EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1]
 
 
 class RobotView(SnapshotWidget):
     """Draws the robot from the side (x to the right, z up) or from above (x to the right, y up).
 
     With obstacles around, the view from above comes first, reaches farther and shows more of what lies ahead.
+    On a road it reaches 60 m, and the robot's heading is up.
     """
 
     BORDER_TITLE = "robot · side"
     view: reactive[View] = reactive("side", init=False, repaint=False)
 
     _extent = 0.0
-    _obstacles: Floats = NO_OBSTACLES
+    _scenery: Scenery = NO_SCENERY
+    _road_lines = RoadLineDrawing((), _LINE_INKS)
     _looked = False
 
     def on_mount(self) -> None:
@@ -54,11 +65,12 @@ class RobotView(SnapshotWidget):
         self.redraw()
 
     def remember(self, snapshot: DriveSnapshot) -> None:
-        if snapshot.obstacles is not None:
-            self._obstacles = snapshot.obstacles
-            if len(snapshot.obstacles) and not self._looked:
+        if snapshot.scenery is not None:
+            self._scenery = snapshot.scenery
+            self._road_lines = RoadLineDrawing(self._scenery.lines, _LINE_INKS)
+            if (len(self._scenery.cylinders) or self._scenery.lines) and not self._looked:
                 self._looked, self.view = True, "above"
-        if self.facts is not None and len(self._obstacles) and len(snapshot.poses):
+        if self.facts is not None and len(self._scenery.cylinders) and len(snapshot.poses):
             root = snapshot.poses[root_body_row(self.facts.links)]
             self._view_ahead.follow(root, restarted=snapshot.restarted)
 
@@ -75,20 +87,26 @@ class RobotView(SnapshotWidget):
             return canvas.render_strips(_INKS)
         root = self.snapshot.poses[root_body_row(self.facts.links)]
         camera = self._camera(canvas, root, ends)
-        self._draw_ground(canvas, camera, root)
-        self._draw_shadow(canvas, camera, ends)
-        if self.view == "above":
-            draw_obstacles_from_above(canvas, camera, self._obstacles, _OBSTACLE)
+        if self._shows_road:
+            self._draw_surroundings(canvas, camera, self.snapshot.traffic)
+            self._draw_links_on_road(canvas, camera, placed, ends)
         else:
-            draw_obstacles_from_side(canvas, camera, self._obstacles, _OBSTACLE, behind=True)
-        self._draw_heading(canvas, camera, root)
-        self._draw_links(canvas, camera, placed, ends)
+            self._draw_ground(canvas, camera, root)
+            self._draw_shadow(canvas, camera, ends)
+            self._draw_surroundings(canvas, camera, self.snapshot.traffic)
+            self._draw_heading(canvas, camera, root)
+            self._draw_links(canvas, camera, placed, ends)
         if self.view == "side":
-            draw_obstacles_from_side(canvas, camera, self._obstacles, _OBSTACLE, behind=False)
+            draw_obstacles_from_side(canvas, camera, self._scenery.cylinders, _OBSTACLE, behind=False)
         x, y, z = (format_number(float(value)) for value in root[:3])
         place = f"x {x}  y {y}  z {z} m"
         canvas.draw_text(width - len(place), height - 1, place, _LABEL)
         return canvas.render_strips(_INKS)
+
+    @property
+    def _shows_road(self) -> bool:
+        """Whether the picture is the one of a road from above, which is as simple as a map."""
+        return self.view == "above" and bool(self._scenery.lines)
 
     def _loading(self, width: int, height: int) -> list[Strip]:
         lines = (("loading the policy…", STYLES.title), ("this takes a few seconds", STYLES.muted))
@@ -103,7 +121,9 @@ class RobotView(SnapshotWidget):
         assert self.facts is not None
         self._extent = max(self._extent, measure_stretch(self.facts.links, root, ends))
         extent, centre = self._extent, (canvas.width / 2, canvas.height / 2)
-        if self.view == "above" and len(self._obstacles):
+        if self._shows_road:
+            return frame_road(root, canvas.width, canvas.height)
+        if self.view == "above" and len(self._scenery.cylinders):
             area = self._view_ahead.frame(root[:2], extent, canvas.width, canvas.height)
             x, y = area.middle.tolist()
             return PerspectiveCamera((x, y, 0.0), 90.0, AHEAD / 2 * extent, area.zoom, centre)
@@ -134,6 +154,16 @@ class RobotView(SnapshotWidget):
             inks = np.broadcast_to(ink[:, None], before.shape)[before]
             canvas.draw_points(dots[before][:, 0], dots[before][:, 1], inks)
 
+    def _draw_surroundings(self, canvas: BrailleCanvas, camera: PerspectiveCamera, traffic: Traffic) -> None:
+        """Draw scenery and traffic, except obstacles between the robot and a camera at its side."""
+        draw_lidar_hits(canvas, camera, traffic.lidar_hits, _SHADOW)
+        self._road_lines.draw(canvas, camera)
+        if self.view == "above":
+            draw_obstacles_from_above(canvas, camera, self._scenery.cylinders, _OBSTACLE)
+        else:
+            draw_obstacles_from_side(canvas, camera, self._scenery.cylinders, _OBSTACLE, behind=True)
+        draw_traffic(canvas, camera, traffic, _BOX_INKS, filled=self._shows_road)
+
     def _draw_shadow(self, canvas: BrailleCanvas, camera: PerspectiveCamera, ends: Floats) -> None:
         flat = ends * np.array([1.0, 1.0, 0.0])
         dots, _, before = camera.project(flat)
@@ -154,7 +184,7 @@ class RobotView(SnapshotWidget):
         lines = np.array([[tail, tip], [tip, barbs[0]], [tip, barbs[1]]])
         dots, _, before = camera.project(lines)
         if before.all():
-            canvas.draw_segments(dots[:, 0], dots[:, 1], _HEADING)
+            canvas.draw_segments(dots[:, 0], dots[:, 1], _ROBOT)
 
     def _draw_links(
         self, canvas: BrailleCanvas, camera: PerspectiveCamera, placed: Floats, ends: Floats
@@ -170,21 +200,29 @@ class RobotView(SnapshotWidget):
                 continue
             link, ink = self.facts.links[row], _FIRST_SHADE + int(shade[row])
             if link.shape == "box":
-                self._draw_box(canvas, camera, placed[row], link.size, ink)
+                corners, _, corners_before = camera.project(_box_corners(link, placed[row]))
+                if corners_before.all():
+                    draw_box_edges(canvas, corners, ink)
                 continue
             thick = link.size[0] * float(magnification[row].mean()) * camera.zoom
             canvas.draw_capsule(dots[row, 0], dots[row, 1], thick, ink, halo=1.0)
 
-    def _draw_box(
-        self,
-        canvas: BrailleCanvas,
-        camera: PerspectiveCamera,
-        pose: Floats,
-        size: tuple[float, ...],
-        ink: int,
+    def _draw_links_on_road(
+        self, canvas: BrailleCanvas, camera: PerspectiveCamera, placed: Floats, ends: Floats
     ) -> None:
-        signs = np.array([[(corner >> axis & 1) * 2 - 1 for axis in range(3)] for corner in range(8)])
-        dots, _, before = camera.project(pose[:3] + rotate_vectors(pose[3:], signs * np.array(size)))
-        if before.all():
-            edges = np.array(_BOX_EDGES)
-            canvas.draw_segments(dots[edges[:, 0]], dots[edges[:, 1]], ink)
+        """Draw all links in one colour, after the rims of all, so that none cuts into another."""
+        assert self.facts is not None
+        dots, _, _ = camera.project(ends)
+        for halo in (1.0, 0.0):
+            for row, link in enumerate(self.facts.links):
+                if link.shape == "box":
+                    corners, _, _ = camera.project(_box_corners(link, placed[row]))
+                    canvas.draw_polygon(corners[:4], _ROBOT, halo=halo)
+                else:
+                    thick = link.size[0] * camera.zoom
+                    canvas.draw_capsule(dots[row, 0], dots[row, 1], thick, _ROBOT, halo=halo)
+
+
+def _box_corners(link: Link, pose: Floats) -> Floats:
+    """Return the corners of a box with this pose in the world, shape (8, 3), ordered as `BOX_CORNERS`."""
+    return pose[:3] + rotate_vectors(pose[3:], BOX_CORNERS * 2 * np.array(link.size))

@@ -45,10 +45,10 @@ def course(tmp_path_factory: pytest.TempPathFactory) -> Course:
                 paused=False, speed=1.0, achieved_speed=1.0, recorded_bytes=0, finished=""
             )
             tallies.append(snapshot.statistics)
-            obstacles.append(record.obstacles)
-            assert (snapshot.obstacles is not None) == (step in (0, 12, 18)), step
-            if snapshot.obstacles is not None:
-                np.testing.assert_array_equal(snapshot.obstacles, record.obstacles)
+            obstacles.append(record.scenery.cylinders)
+            assert (snapshot.scenery is not None) == (step in (0, 12, 18)), step
+            if snapshot.scenery is not None:
+                assert snapshot.scenery is record.scenery
     return path, obstacles, tallies
 
 

@@ -1,0 +1,82 @@
+"""Drawing roads and traffic: lines, boxes and what a lidar hits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.attributes import Floats
+from pdtui.core.scenery import BoxKind, LineKind, RoadLine, Traffic
+from pdtui.pictures.perspective_camera import PerspectiveCamera
+from pdtui.tui.braille_canvas import BrailleCanvas
+
+_AROUND = ((-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5))
+BOX_CORNERS = np.array([(x, y, z) for z in (-0.5, 0.5) for x, y in _AROUND])
+"""Corners of a box of size 1: the lower four in their order around it, then the upper four, shape (8, 3)."""
+_BOX_EDGES = np.array(
+    [(a, b) for a in range(8) for b in range(a + 1, 8) if (BOX_CORNERS[a] != BOX_CORNERS[b]).sum() == 1]
+)
+"""Rows of the corners at both ends of each edge, shape (12, 2)."""
+_ORDER: tuple[LineKind, ...] = ("route", "broken lane line", "solid lane line", "road edge")
+"""Kinds of lines as they are drawn, the later over the earlier."""
+
+
+class RoadLineDrawing:
+    """The lines of roads, cut into straight segments once per world.
+
+    Args:
+        lines: the lines.
+        inks: index of the ink of each kind of line.
+    """
+
+    def __init__(self, lines: tuple[RoadLine, ...], inks: dict[LineKind, int]) -> None:
+        ordered = sorted(lines, key=lambda line: _ORDER.index(line.kind))
+        pieces = [(piece, inks[line.kind]) for line in ordered for piece in line.painted_pieces()]
+        empty = np.empty((0, 3))
+        self._starts: Floats = np.concatenate([empty, *(piece[:-1] for piece, _ in pieces)])
+        self._ends: Floats = np.concatenate([empty, *(piece[1:] for piece, _ in pieces)])
+        self._inks: NDArray[np.int16] = np.repeat(
+            np.array([ink for _, ink in pieces], np.int16), [len(piece) - 1 for piece, _ in pieces]
+        )
+
+    def draw(self, canvas: BrailleCanvas, camera: PerspectiveCamera) -> None:
+        """Draw those segments that lie in front of the camera."""
+        starts, _, before = camera.project(self._starts)
+        ends, _, also_before = camera.project(self._ends)
+        kept = before & also_before
+        canvas.draw_segments(starts[kept], ends[kept], self._inks[kept])
+
+
+def draw_box_edges(canvas: BrailleCanvas, corners: Floats, ink: int) -> None:
+    """Draw the edges of a box whose `BOX_CORNERS` are at these dots, shape (8, 2)."""
+    canvas.draw_segments(corners[_BOX_EDGES[:, 0]], corners[_BOX_EDGES[:, 1]], ink)
+
+
+def draw_lidar_hits(canvas: BrailleCanvas, camera: PerspectiveCamera, hits: Floats, ink: int) -> None:
+    """Draw a dot per point that a lidar hits, shape (M, 2), m."""
+    dots, _, before = camera.project(np.concatenate([hits, np.zeros((len(hits), 1))], axis=1))
+    canvas.draw_points(dots[before, 0], dots[before, 1], ink)
+
+
+def draw_traffic(
+    canvas: BrailleCanvas,
+    camera: PerspectiveCamera,
+    traffic: Traffic,
+    inks: dict[BoxKind, int],
+    *,
+    filled: bool,
+) -> None:
+    """Draw boxes, filled for a camera above them, or else their edges."""
+    turns = traffic.poses[:, 3]
+    local = BOX_CORNERS * traffic.sizes[:, None, :]
+    corners = np.empty_like(local)
+    corners[..., 0] = local[..., 0] * np.cos(turns)[:, None] - local[..., 1] * np.sin(turns)[:, None]
+    corners[..., 1] = local[..., 0] * np.sin(turns)[:, None] + local[..., 1] * np.cos(turns)[:, None]
+    corners[..., 2] = local[..., 2]
+    dots, _, before = camera.project(corners + traffic.poses[:, None, :3])
+    for row in np.flatnonzero(before.all(axis=1)):
+        ink = inks[traffic.kinds[row]]
+        if filled:
+            canvas.draw_polygon(dots[row, :4], ink, halo=1.0)
+        else:
+            draw_box_edges(canvas, dots[row], ink)
