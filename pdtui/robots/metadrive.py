@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import RobotError
 from pdtui.core.robot_links_and_state import Link, ManualControl, RobotState
+from pdtui.core.scenery import Traffic
 from pdtui.core.worker_pool import WorkerProcess
 from pdtui.robots.environments.action_log import ActionLog
 from pdtui.robots.road.car_tasks import CAR_GOALS, CAR_TASKS
@@ -102,7 +103,7 @@ class MetaDrive(Robot):
         self._process = WorkerProcess("the roads", RoadWorld, crashes_end)
         self._actions = ActionLog(2)
         self._seed, self._start = 0, self._scenes
-        self._keeps_engine = False
+        self._keeps_engine, self._shown = False, ("", -1)
 
     def make_alike(self) -> MetaDrive:
         """Return another car with the same options, whose resets keep the engine."""
@@ -160,6 +161,11 @@ class MetaDrive(Robot):
     def read_attributes(self) -> Floats:
         return self._state.motion
 
+    def read_traffic(self) -> Traffic:
+        self._process.send(RoadWorld.read_traffic)
+        traffic: Traffic = self._process.receive()
+        return traffic
+
     def read_poses(self) -> Floats:
         return self._state.pose[None]
 
@@ -182,3 +188,6 @@ class MetaDrive(Robot):
         self._seed, self._start, self._actions = seed, start, ActionLog(2)
         self._process.send(RoadWorld.reset, start, seed, exactly)
         self._state = self._process.receive()
+        if self._shown != (start, seed):
+            self._process.send(RoadWorld.read_scenery)
+            self.scenery, self._shown = self._process.receive(), (start, seed)

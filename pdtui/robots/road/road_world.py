@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
+from pdtui.core.scenery import Scenery, Traffic
 from pdtui.robots.road.metadrive_repairs import (
     LIDAR_RANGE,
     LIDAR_RAYS,
@@ -19,6 +20,7 @@ from pdtui.robots.road.metadrive_repairs import (
     blocks_without_ramps,
     repair_observation,
 )
+from pdtui.robots.road.road_scenery import TrafficReader, read_scenery
 from pdtui.robots.road.road_scenes import SceneKind, find_scene
 
 MAX_STEPS = 1000
@@ -74,6 +76,7 @@ class RoadWorld:
         BaseEngine.try_pull_asset = staticmethod(lambda: None)
         self._crashes_end = crashes_end
         self._rules: Any = None
+        self._traffic = TrafficReader()
         self._env: Any = None
         self._kind: SceneKind | None = None
 
@@ -93,7 +96,7 @@ class RoadWorld:
             self.close()
             self._env, self._kind = self._make(kind), kind
         observed, _ = self._env.reset(seed=scene)
-        self._rules = None
+        self._rules, self._traffic = None, TrafficReader()
         self._cost = 0.0
         return self._state(observed, 0.0, {})
 
@@ -107,6 +110,14 @@ class RoadWorld:
         return self._state(
             observed, float(reward), info if terminated or truncated else {"cost": info["cost"]}
         )
+
+    def read_scenery(self) -> Scenery:
+        """Return the road, the route and the cones of the episode."""
+        return read_scenery(self._env)
+
+    def read_traffic(self) -> Traffic:
+        """Return cars, barriers and what the lidar hits, as they are now."""
+        return self._traffic.read(self._env, self._observation)
 
     def suggest_action(self) -> NDArray[np.float32]:
         """Return what MetaDrive's rule-based driver, which keeps lane and distance, would do now."""
@@ -156,10 +167,10 @@ class RoadWorld:
         )
 
     def _state(self, observed: NDArray[np.float32], reward: float, info: dict[str, Any]) -> CarState:
-        car = self._env.agent
+        car, self._observation = self._env.agent, repair_observation(observed)
         outcome = next((word for key, word in _WORDS if info.get(key)), "")
         return CarState(
-            repair_observation(observed),
+            self._observation,
             reward,
             float(info.get("cost", 0.0)),
             outcome,
