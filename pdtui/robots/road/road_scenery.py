@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,7 @@ def _read_route(navigation: Any, network: Any) -> Iterator[RoadLine]:
     """Yield the route along the middle lane of each road."""
     nodes = navigation.checkpoints
     pieces = []
-    for start, end in zip(nodes, nodes[1:], strict=False):
+    for start, end in pairwise(nodes):
         lanes = network.graph.get(start, {}).get(end)
         if lanes:
             pieces.append(_sample(lanes[len(lanes) // 2], 0.0))
@@ -118,7 +119,6 @@ def _lidar_hits(car: Any, observation: NDArray[np.float32]) -> Floats:
     rays = observation[FIRST_RAY:].astype(np.float64)
     hit = np.flatnonzero(rays < 1.0)
     angles = car.heading_theta - hit * (2.0 * math.pi / LIDAR_RAYS)
-    reach = rays[hit] * LIDAR_RANGE
-    return np.stack(
-        [car.position[0] + reach * np.cos(angles), car.position[1] + reach * np.sin(angles)], axis=-1
-    )
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    hits: Floats = np.array(car.position) + rays[hit, None] * LIDAR_RANGE * directions
+    return hits

@@ -26,6 +26,7 @@ from pdtui.robots.road.road_scenes import SceneKind, find_scene
 MAX_STEPS = 1000
 # Speed that the rule-based driver aims at, km/h.
 _RULES_SPEED = 35.0
+_QUARTER_TURN = math.sqrt(0.5)
 _WORDS = (
     ("arrive_dest", "arrived"),
     ("out_of_road", "left the road"),
@@ -226,5 +227,6 @@ def _place(thing: Any) -> tuple[float, ...]:
 
 
 def _pose(car: Any) -> Floats:
-    w, x, y, z = car.origin.getQuat()
-    return np.array([*car.origin.getPos(), w, x, y, z], np.float64)
+    # A car of MetaDrive heads along its own y axis; ours, as all robots, along x.
+    w, x, y, z = _QUARTER_TURN * np.array(car.origin.getQuat())
+    return np.array([*car.origin.getPos(), w - z, x + y, y - x, z + w], np.float64)
