@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.drive_events import DriveEvent
+from pdtui.core.outcome import Outcome
 from pdtui.core.robot_links_and_state import NO_OBSTACLES
 from pdtui.core.units import Stimulation
 
@@ -76,11 +77,10 @@ class StepRecord(NamedTuple):
         reward, cost: reward and cost of the step.
         digest: digest of the simulator's state after the step.
         ended: why the episode ended with this step; empty if it did not.
-        diverged: whether the simulation diverged, so that it cannot continue.
-        finished: whether the robot's task is done; if `ended` is empty, the episode can continue.
+        outcome: how it ended; or, if `ended` is empty, that its task is done and it can go on. An episode
+            arrives once: one that goes on afterwards and ends without failing is out of time.
         obstacles: obstacles as in `Robot.obstacles`, shape (N, 3): the same array in every step of a world.
             They are not recorded.
-        fell: whether the episode ended with a fall: neither finished nor out of time.
         replaced: components of the action that the operator set during a takeover, empty without one.
     """
 
@@ -98,10 +98,8 @@ class StepRecord(NamedTuple):
     cost: float
     digest: int
     ended: str = ""
-    diverged: bool = False
-    finished: bool = False
+    outcome: Outcome | None = None
     obstacles: Floats = NO_OBSTACLES
-    fell: bool = False
     replaced: tuple[ReplacedAction, ...] = ()
 
     @property

@@ -34,7 +34,7 @@ def collect_start_states(
     """Take one state from each of several unstimulated walks, which differ in heading and phase of the gait.
 
     The state is taken `at` control steps after the reset. Seeds whose walk does not get that far are skipped,
-    but not those whose walk would fall later: to leave these out would flatter every stimulation.
+    but not those whose walk would end later: to leave out those that fall would flatter every stimulation.
 
     Raises:
         RobotError: too few of ``4 * count`` walks last that long.
