@@ -36,14 +36,16 @@ def _cell(text: object, style: str = "") -> Text:
 
 def session_list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
     """Return one row per file; that of a broken file says what is wrong."""
+    rows = list(rows)
+    told = ["episodes"] if any(row.get("outcomes") for row in rows) else []
     table = new_table(
-        *("", "session", "robot", "length", "keys", "size", "episodes", "outcome"),
-        left=("session", "robot", "episodes", "outcome"),
+        *("", "session", "robot", "length", "keys", "size", *told, "outcome"),
+        left=("session", "robot", *told, "outcome"),
     )
     for row in rows:
         name, size = _cell(Path(row["path"]).relative_to(folder)), filesize.decimal(row["bytes"])
         if row["broken"]:
-            table.add_row(name, "", "", "", size, "", _cell(f"broken: {row['broken']}", "red"))
+            table.add_row(name, "", "", "", size, *[""] * len(told), _cell(f"broken: {row['broken']}", "red"))
             continue
         table.add_row(
             name,
@@ -51,7 +53,7 @@ def session_list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
             f"{row['seconds']:.1f} s",
             str(row["keys"]),
             size,
-            describe_outcomes(row["outcomes"]) if any(row["outcomes"].values()) else "",
+            *[describe_outcomes(row["outcomes"]) if row["outcomes"] else ""] * len(told),
             _cell(row["outcome"]) if row["outcome"] else _cell("cut off: no outcome", "yellow"),
         )
     return table
