@@ -37,7 +37,7 @@ class PolicyEvaluation:
 
 
 def evaluate_policy(
-    config: DriveConfig,
+    config: DriveConfig | ControlLoop,
     seeds: Sequence[int],
     *,
     steps: int | None = None,
@@ -45,19 +45,19 @@ def evaluate_policy(
 ) -> PolicyEvaluation:
     """Run the policy without stimulation for one episode per seed.
 
-    Episodes begin at the start of `config`, whose seed is not used, and last the robot's usual number of
-    control steps unless `steps` is given.
+    Episodes begin at the start of `config`, or of a loop, whose seed is not used. They last the robot's usual
+    number of control steps unless `steps` is given, and end before if the robot arrives.
 
     Raises:
         PdtuiError: the robot, policy or map cannot be loaded.
     """
-    built = build_control_loop(config)
+    built = build_control_loop(config) if isinstance(config, DriveConfig) else config
     steps = steps or built.robot.episode_steps
     names = [attribute.name for attribute in built.robot.attributes]
     column = names.index("speed") if "speed" in names else None
     speeds, net_speeds, returns, outcomes = [], [], [], []
     for done, seed in enumerate(seeds, start=1):
-        loop = ControlLoop(built.robot, built.policy, built.map, seed, start=config.start)
+        loop = ControlLoop(built.robot, built.policy, built.map, seed, start=built.start)
         total = 0.0
         start = loop.robot.read_poses()[:1, :2]
         for record in run_episode(loop, steps):

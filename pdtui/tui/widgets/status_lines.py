@@ -63,7 +63,7 @@ class StatusLine(SnapshotWidget):
             f"{make_printable(name)} {format_number(value)}" for name, value in snapshot.manual
         )
         arrivals = [] if snapshot.arrivals is None else [(5, f"arrived {snapshot.arrivals}", STYLES.muted)]
-        cost = [(6, f"cost {format_number(snapshot.cost)}", STYLES.muted)] if snapshot.cost else []
+        cost = [(6, f"cost {snapshot.cost:g}", STYLES.muted)] if snapshot.cost else []
         return [
             *([(-1, f"manual: {manual}", STYLES.warn)] if manual else []),
             policy,
