@@ -184,7 +184,7 @@ def drive(
     >>> import pdtui
     >>> drive = pdtui.drive("ant", keys={50: "x"}, steps=150)
     >>> drive
-    <Drive of ant by ant: 150 steps (7.5 s), 1 events, 0 falls>
+    <Drive of ant by ant: 150 steps (7.5 s), 1 events, falls 0>
     >>> bool(drive["speed"][-20:].mean() < drive["speed"][30:50].mean())
     True
 

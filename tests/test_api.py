@@ -165,7 +165,7 @@ def test_arrays_are_addressed_by_name() -> None:
     np.testing.assert_array_equal(drive.unit("features.0:10")[5:], np.float32(0.3))
     np.testing.assert_array_equal(drive.unit("0:10"), drive.activations[:, 10])
     assert drive.behaviors[4:6] == ((), ("push",))
-    assert repr(drive) == "<Drive of dot by dot: 12 steps (0.6 s), 1 events, 0 falls>"
+    assert repr(drive) == "<Drive of dot by dot: 12 steps (0.6 s), 1 events, falls 0>"
 
 
 def test_changed_weights_are_another_policy() -> None:

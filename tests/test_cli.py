@@ -88,7 +88,7 @@ def test_evaluate_prints_the_agreed_json(map_path: Path) -> None:
     assert (data["robot"], data["policy"], data["seeds"]) == ("ant", "small", [100])
     assert {row["behavior"] for row in data["behaviors"]} == {"push"}
     push = data["behaviors"][0]
-    assert {"condition", "criterion", "onset", "lasts", "judged", "back", "falls", "holds"} <= push.keys()
+    assert {"condition", "criterion", "onset", "lasts", "judged", "back", "outcomes", "holds"} <= push.keys()
     assert {"effect", "low", "high", "p_value", "corrected", "default"} <= push["last"].keys()
     assert [one["kind"] for one in push["substitutes"]] == ["random units", "random directions", "actions"]
 

@@ -22,6 +22,7 @@ from pdtui.cli.shared_options import (
     start_option,
 )
 from pdtui.core.errors import KeystrokeError, ScreenError, SessionError
+from pdtui.core.outcome import describe_outcomes
 from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.sessions.viewer.viewer_address import LOCAL, PORT, ViewerAddress
@@ -136,9 +137,10 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
     with catch_ending_signals() as ended:
         summary = drive_headless(loop, presses, steps, recorder, ended)
     takeover = " or a takeover" if loop.robot.manual_controls else ""
+    cost = f"cost {summary.cost:g}, " if summary.cost else ""
     click.echo(
-        f"{summary.steps} steps, {summary.seconds:g} s simulated; falls {summary.falls}, "
-        f"steps with a key{takeover} {summary.involvement}"
+        f"{summary.steps} steps, {summary.seconds:g} s simulated; {describe_outcomes(summary.outcomes)}, "
+        f"{cost}steps with a key{takeover} {summary.involvement}"
     )
     means = ", ".join(f"{name} {value:.3g}" for name, value in list(summary.mean.items())[:8])
     click.echo(make_printable(f"mean {means}"))

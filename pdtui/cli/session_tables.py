@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from pdtui.core.drive_events import describe_event
+from pdtui.core.outcome import describe_outcomes
 from pdtui.core.printable_text import make_printable
 from pdtui.core.text_tables import new_facts_table, new_table
 
@@ -35,13 +36,16 @@ def _cell(text: object, style: str = "") -> Text:
 
 def session_list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
     """Return one row per file; that of a broken file says what is wrong."""
+    rows = list(rows)
+    told = ["episodes"] if any(row.get("outcomes") for row in rows) else []
     table = new_table(
-        "", "session", "robot", "length", "keys", "size", "outcome", left=("session", "robot", "outcome")
+        *("", "session", "robot", "length", "keys", "size", *told, "outcome"),
+        left=("session", "robot", *told, "outcome"),
     )
     for row in rows:
         name, size = _cell(Path(row["path"]).relative_to(folder)), filesize.decimal(row["bytes"])
         if row["broken"]:
-            table.add_row(name, "", "", "", size, _cell(f"broken: {row['broken']}", "red"))
+            table.add_row(name, "", "", "", size, *[""] * len(told), _cell(f"broken: {row['broken']}", "red"))
             continue
         table.add_row(
             name,
@@ -49,6 +53,7 @@ def session_list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
             f"{row['seconds']:.1f} s",
             str(row["keys"]),
             size,
+            *[describe_outcomes(row["outcomes"]) if row["outcomes"] else ""] * len(told),
             _cell(row["outcome"]) if row["outcome"] else _cell("cut off: no outcome", "yellow"),
         )
     return table
@@ -75,7 +80,7 @@ def session_details(session: SessionHeader, summary: SessionSummary) -> Any:
     ]
     figures = [
         ("length", f"{summary.steps} steps, {summary.seconds:g} s"),
-        ("episodes", f"{summary.episodes}, of which {summary.falls} ended on their own"),
+        ("episodes", _ended(session, summary)),
         ("human involvement", _involvement(summary, summary)),
         *([("taken over", f"{summary.taken_over} steps")] if summary.taken_over else []),
         ("stimulated", f"{summary.stimulated} steps"),
@@ -100,6 +105,18 @@ def _involvement(part: SessionSummary | EpisodeStatistics, whole: SessionSummary
     return f"{part.involvement} steps {what} ({100.0 * part.involvement / max(1, part.steps):.1f} %)"
 
 
+def _ended(session: SessionHeader, summary: SessionSummary) -> str:
+    """Return the number of episodes and how they ended, as far as an older session says it."""
+    untold = len(session.endings.keys() - session.outcomes.keys())
+    known = [describe_outcomes(summary.outcomes)] if summary.outcomes or not untold else []
+    return ", ".join(
+        [
+            f"{summary.episodes}: {known[0]}" if known else f"{summary.episodes}",
+            *([f"ended {untold}"] * bool(untold)),
+        ]
+    )
+
+
 def _episodes(summary: SessionSummary) -> list[Table]:
     """Return one row per episode, where the robot has a distance or obstacles."""
     tallies = summary.tallies
@@ -109,10 +126,11 @@ def _episodes(summary: SessionSummary) -> list[Table]:
     if not (far or hits):
         return []
     columns = ["distance"] * far + ["collisions"] * hits
-    table = new_table("", "episode", "steps", *columns, "human involvement")
+    table = new_table("", "episode", "steps", *columns, "human involvement", "outcome", left=("outcome",))
     for tally in tallies:
         cells = [_figure(tally.distance, ".2f", " m")] * far + [_figure(tally.collisions, "g")] * hits
-        table.add_row(str(tally.episode), str(tally.steps), *cells, _involvement(tally, summary))
+        involvement = _involvement(tally, summary)
+        table.add_row(str(tally.episode), str(tally.steps), *cells, involvement, tally.outcome)
     return [table]
 
 
@@ -124,10 +142,18 @@ def _happened(session: SessionHeader) -> Table:
     """Return events and ends of episodes in the order of their steps."""
     table = new_table("", "time", "step", "key", "what", left=("key", "what"))
     rows = [(event.step, 0, event.key, describe_event(event)) for event in session.events]
-    rows += [(step, 1, "", f"episode ended: {reason}") for step, reason in session.endings.items()]
+    rows += [(step, 1, "", _describe_end(step, session)) for step in session.endings | session.outcomes]
     for step, _, key, what in sorted(rows, key=lambda row: row[:2]):
         table.add_row(f"{step * session.info.dt:.2f} s", str(step), _cell(key), _cell(what))
     return table
+
+
+def _describe_end(step: int, session: SessionHeader) -> str:
+    outcome, reason = session.outcomes.get(step), session.endings.get(step)
+    if reason is None:
+        return f"{outcome}, and the episode goes on"
+    said = reason if outcome is None or reason.startswith(outcome) else f"{outcome}: {reason}"
+    return f"episode ended: {said}"
 
 
 def attribute_deviation_table(deviations: Sequence[AttributeDeviation]) -> Table:

@@ -50,7 +50,6 @@ def _list_row(path: Path) -> dict[str, Any]:
         header = read_session_header(path)
     except SessionError as error:
         return {**row, "broken": str(error).removeprefix(f"{path}: ")}
-    recording = not header.outcome and is_being_recorded(path)
     return {
         **row,
         "robot": header.info.robot,
@@ -58,7 +57,8 @@ def _list_row(path: Path) -> dict[str, Any]:
         "missing": header.missing,
         "seconds": header.seconds,
         "keys": header.keys,
-        "outcome": "is being recorded" if recording else header.outcome,
+        "outcomes": header.outcome_counts,
+        "outcome": header.outcome or "is being recorded" * is_being_recorded(path),
     }
 
 

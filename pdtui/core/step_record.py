@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.drive_events import DriveEvent
+from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import NO_SCENERY, NO_TRAFFIC, Scenery, Traffic
 from pdtui.core.units import Stimulation
 
@@ -76,12 +77,11 @@ class StepRecord(NamedTuple):
         reward, cost: reward and cost of the step.
         digest: digest of the simulator's state after the step.
         ended: why the episode ended with this step; empty if it did not.
-        diverged: whether the simulation diverged, so that it cannot continue.
-        finished: whether the robot's task is done; if `ended` is empty, the episode can continue.
         scenery: `Robot.scenery`, the same object in every step of a world.
-        fell: whether the episode ended with a fall: neither finished nor out of time.
         traffic: what `Robot.read_traffic` returned after the step. Like the scenery, it is recorded for the
             viewer only, and not read back.
+        outcome: how it ended; or, if `ended` is empty, that its task is done and it can go on. An episode
+            arrives once: one that goes on afterwards and ends without failing is out of time.
         replaced: components of the action that the operator set during a takeover, empty without one.
     """
 
@@ -99,11 +99,9 @@ class StepRecord(NamedTuple):
     cost: float
     digest: int
     ended: str = ""
-    diverged: bool = False
-    finished: bool = False
     scenery: Scenery = NO_SCENERY
-    fell: bool = False
     traffic: Traffic = NO_TRAFFIC
+    outcome: Outcome | None = None
     replaced: tuple[ReplacedAction, ...] = ()
 
     @property

@@ -55,7 +55,7 @@ class Dissection:
         tasks: Best stimulation for each task that the robot's goals name.
         rollouts, control_steps, minutes: What the dissection took.
         import_options: Answers to what the weights file does not state.
-        shortened: A sentence on roll-outs that were shortened because the policy falls; empty if none was.
+        shortened: A sentence on roll-outs that were shortened because walks end early; empty if none was.
     """
 
     robot: str

@@ -44,7 +44,8 @@ def gather_probe_starts(pool: RolloutPool, settings: DissectionSettings, first_s
     """Take one start state from each of several walks, whether or not the walk would go on for long.
 
     If more than a quarter of the walks do not last as long as the longest roll-out (a hopper may fall after
-    two seconds), starts and roll-outs are shortened: what a unit does within a second is still worth knowing.
+    two seconds, a car arrive after ten), starts and roll-outs are shortened: what a unit does within a second
+    is still worth knowing. A roll-out that arrives is measured up to its end.
 
     Raises:
         RobotError: The walks are too short even for that.
@@ -65,9 +66,8 @@ def gather_probe_starts(pool: RolloutPool, settings: DissectionSettings, first_s
         settings = settings.shortened_to(lasting)
         if settings.longest_rollout < _SHORTEST:
             raise RobotError(
-                f"{pool.robot.name}: expected walks of {wanted} steps without a fall, but {_LASTING:.0%} of "
-                f"{len(seeds)} walks last no longer than {lasting} steps; dissection needs a policy that "
-                "stays up longer"
+                f"{pool.robot.name}: expected walks of {wanted} steps, but {_LASTING:.0%} of {len(seeds)} "
+                f"walks last no longer than {lasting} steps; dissection needs walks that are longer"
             )
         shortened = (
             f"Of {len(seeds)} walks, {sum(length >= wanted for length in lengths)} lasted the {wanted} steps "

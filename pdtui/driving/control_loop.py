@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Floats
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import KeystrokeError, MapError, SimulationDiverged
+from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
 from pdtui.core.units import Stimulation
 from pdtui.driving.manual_takeover import ManualTakeover
 from pdtui.driving.rewind_history import STEPS_PER_KEPT_STATE, DriveState, RewindHistory
 from pdtui.policies.runtime.policy import Policy, PolicyStep
-from pdtui.robots.robot import Robot, is_fall
+from pdtui.robots.robot import Robot
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.stimulation.behavior_latch import BehaviorLatch
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -63,7 +64,7 @@ class ControlLoop:
         self.act: PolicyAct = policy.act
         """What acts in each control step; an evaluation may put a disturbed policy in its place."""
         self._noise = np.random.default_rng(seed) if stochastic else None
-        self._ended = False
+        self._ended = self._arrived = False
         self.history = RewindHistory()
         self._observation, _ = robot.reset(seed=seed, options=self._options)
         policy.reset()
@@ -114,16 +115,17 @@ class ControlLoop:
         behaviors = self.latch.active
         acted = self.act(self._observation, stimulation, self._noise)
         action, replaced = self.takeover.replace_action(acted.action)
-        ended, reward, cost, diverged, fell, finished = "", 0.0, 0.0, False, False, False
+        ended, reward, cost, outcome = "", 0.0, 0.0, None
         try:
             self._observation, gained, terminated, truncated, details = self.robot.step(action)
             reward, cost = float(gained), float(details["cost"])
-            finished = bool(details.get("finished", False))
-            fell = is_fall(terminated, details)
+            outcome = self.robot.outcome_of(terminated, truncated, details)
             if terminated or truncated:
                 ended = str(details.get("reason", "the episode is over"))
         except SimulationDiverged as error:
-            diverged, fell, ended = True, True, str(error)
+            outcome, ended = Outcome.DIVERGED, str(error)
+        if outcome is Outcome.ARRIVED and self._arrived:  # it was said before
+            outcome = Outcome.OUT_OF_TIME if ended else None
         self.attributes = self.robot.read_attributes()
         record = StepRecord(
             self.step,
@@ -140,17 +142,15 @@ class ControlLoop:
             cost,
             self.robot.digest(),
             ended,
-            diverged,
-            finished,
             self.robot.scenery,
-            fell,
             self.robot.read_traffic(),
+            outcome,
             replaced,
         )
         self.step += 1
         self.latch.end_step()
         self.takeover.end_step()
-        self._ended = bool(ended)
+        self._ended, self._arrived = bool(ended), self._arrived or outcome is Outcome.ARRIVED
         return record
 
     def _apply(self, event: DriveEvent, *, rehearsing: bool = False) -> None:
@@ -202,7 +202,7 @@ class ControlLoop:
         self.attributes = self.robot.read_attributes()
         self._clear()
         self.episode += 1
-        self._ended = False
+        self._ended = self._arrived = False
 
     def _clear(self) -> None:
         self.latch.clear()
@@ -217,6 +217,7 @@ class ControlLoop:
             self.takeover.copy_state(),
             noise,
             self.episode,
+            self._arrived,
         )
         self.history.keep(self.step, state)
 
@@ -231,7 +232,7 @@ class ControlLoop:
         self.episode = state.episode
         self._observation = self.robot.observe()
         self.attributes = self.robot.read_attributes()
-        self._ended = False
+        self._ended, self._arrived = False, state.arrived
 
 
 def _check_commands(robot: Robot, stimulation_map: StimulationMap) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats, attribute_column
 from pdtui.core.drive_events import DriveEvent
+from pdtui.core.outcome import Outcome, count_outcomes, describe_outcomes
 from pdtui.core.step_record import ReplacedAction, StepRecord
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.driving.control_loop import ControlLoop
@@ -38,6 +39,7 @@ class DriveArrays:
         stimulations: units and the values that overwrote them in each step.
         events: everything that changed the run, in order.
         endings: why an episode ended, by its last step.
+        outcomes: how an episode ended, or that it arrived and went on, by the step in which it did.
         replaced_actions: components of each step's action that the operator had taken over.
     """
 
@@ -53,6 +55,7 @@ class DriveArrays:
     stimulations: tuple[Stimulation, ...] = field(repr=False)
     events: tuple[DriveEvent, ...] = field(repr=False)
     endings: dict[int, str] = field(repr=False)
+    outcomes: dict[int, Outcome] = field(repr=False)
     replaced_actions: tuple[tuple[ReplacedAction, ...], ...] = field(repr=False)
 
     def __len__(self) -> int:
@@ -65,7 +68,7 @@ class DriveArrays:
         seconds = len(self) * self.info.dt
         return (
             f"<Drive of {self.info.robot} by {self.info.policy}: {len(self)} steps ({seconds:g} s), "
-            f"{len(self.events)} events, {len(self.endings)} falls>"
+            f"{len(self.events)} events, {describe_outcomes(count_outcomes(self.outcomes.values()))}>"
         )
 
     def unit(self, address: str) -> NDArray[np.float32]:
@@ -117,5 +120,6 @@ def _stack_records(loop: ControlLoop, records: Sequence[StepRecord]) -> DriveArr
         stimulations=tuple(record.stimulation for record in records),
         events=tuple(event for record in records for event in record.events),
         endings={record.step: record.ended for record in records if record.ended},
+        outcomes={record.step: record.outcome for record in records if record.outcome is not None},
         replaced_actions=tuple(record.replaced for record in records),
     )

@@ -15,6 +15,7 @@ from typing import Any
 
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import PdtuiError, SessionError, format_error_in_one_line
+from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
@@ -148,7 +149,7 @@ class DriveServer:
             self._record(self._recorder, record)
         self._builder.add_step(record)
         self._pacer.note_step(time.monotonic())
-        if record.diverged:
+        if record.outcome is Outcome.DIVERGED:
             self._finished, self.failed = record.ended, True
             self._close_recording()
         if self._watched is not None:

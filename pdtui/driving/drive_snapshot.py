@@ -76,6 +76,8 @@ class DriveSnapshot:
         speed: requested speed, in multiples of real time.
         achieved_speed: speed of the latest steps, in multiples of real time.
         involvement: control steps that count as human involvement.
+        arrivals: episodes in which the robot arrived; None for a robot that neither has nor is known to.
+        cost: sum of the cost of all steps.
         recorded_bytes: size of the recording, bytes.
         notice: what the user should read now (a fall, a rewind, a key that does nothing); may be empty.
         finished: why the drive is over; empty while it runs.
@@ -100,6 +102,8 @@ class DriveSnapshot:
     speed: float = 1.0
     achieved_speed: float = 1.0
     involvement: int = 0
+    arrivals: int | None = None
+    cost: float = 0.0
     recorded_bytes: int = 0
     notice: str = ""
     finished: str = ""

@@ -18,6 +18,7 @@ from pdtui.core.errors import (
     SimulationDiverged,
     format_error_in_one_line,
 )
+from pdtui.core.outcome import Outcome, OutcomeCounts, count_outcomes
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.keystrokes import interpret_keys
@@ -33,14 +34,16 @@ class DriveSummary:
     Attributes:
         steps: number of control steps.
         seconds: simulated time, s.
-        falls: episodes that ended with a fall.
+        outcomes: how episodes ended, and how often.
+        cost: sum of the cost of all steps.
         involvement: number of control steps that count as human involvement.
         mean: mean of every attribute, by name.
     """
 
     steps: int
     seconds: float
-    falls: int
+    outcomes: OutcomeCounts
+    cost: float
     involvement: int
     mean: dict[str, float]
 
@@ -70,7 +73,7 @@ def drive_from_keystrokes(
     for _ in range(steps):
         record = loop.advance(events_of_pressed_keys(presses.get(loop.step, ()), loop))
         yield record
-        if record.diverged:
+        if record.outcome is Outcome.DIVERGED:
             raise SimulationDiverged(f"step {record.step}: {record.ended}")
 
 
@@ -143,13 +146,15 @@ def drive_headless(
         DriveEnded: `ended` returned a reason.
         PdtuiError: as for `drive_from_keystrokes`; the recording is complete all the same.
     """
-    falls = involvement = done = 0
+    involvement, done, cost = 0, 0, 0.0
+    outcomes: list[Outcome] = []
     total = np.zeros(len(loop.robot.attributes))
     with open_step_recorder(recorder) as record_step:
         for record in drive_from_keystrokes(loop, presses, steps):
             record_step(record)
             done += 1
-            falls += record.fell
+            cost += record.cost
+            outcomes += [record.outcome] if record.outcome is not None else []
             involvement += record.involved
             total += record.attributes
             if reason := ended():
@@ -159,4 +164,5 @@ def drive_headless(
         attribute.name: float(value / max(done, 1))
         for attribute, value in zip(loop.robot.attributes, total, strict=True)
     }
-    return DriveSummary(done, done * loop.robot.control_dt, falls, involvement, means)
+    counts = count_outcomes(outcomes, loop.robot.outcomes)
+    return DriveSummary(done, done * loop.robot.control_dt, counts, cost, involvement, means)

@@ -28,6 +28,7 @@ class DriveState:
         takeover: values of the controls that the operator has taken over.
         noise: state of the generator of action noise; empty for a deterministic policy.
         episode: number of the episode.
+        arrived: whether the robot has arrived in it.
     """
 
     robot: RobotState
@@ -36,6 +37,7 @@ class DriveState:
     takeover: Mapping[str, float]
     noise: Mapping[str, Any]
     episode: int
+    arrived: bool
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from torch import nn
 
 from pdtui.core.drive_events import group_events_by_step
 from pdtui.core.errors import PdtuiError, SessionError
+from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
@@ -78,7 +79,7 @@ def replay_session(
     """Run a session from its file and its policy alone, and compare every step.
 
     Everything that is recorded is compared: digests, attributes, actions, rewards, costs, activations,
-    stimulated units with both outputs, behaviors with their controllers, episodes and how they ended, the
+    stimulated units with both outputs, behaviors with their controllers, episodes and their outcomes, the
     poses for the viewer, and the description of robot and policy.
 
     On the machine and with the versions that recorded it, every bit must be the same. Elsewhere, sums may
@@ -164,7 +165,7 @@ def _compare_steps(
                 records.append(record)
                 if progress is not None:
                     progress(comparison.steps + len(records), total)
-            if record.diverged and comparison.steps + len(records) < total:
+            if record.outcome is Outcome.DIVERGED and comparison.steps + len(records) < total:
                 stopped = f"step {step}: {record.ended}"
                 break
         comparison.add(records, block.part(0, len(records)))

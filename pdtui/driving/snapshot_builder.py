@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pdtui.core.drive_events import describe_event
+from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
@@ -24,7 +25,8 @@ class SnapshotBuilder:
         self._path: list[tuple[float, float, float]] = []
         self._restarted = False
         self._episode = 0
-        self._involvement = 0
+        self._involvement, self._cost = 0, 0.0
+        self._arrivals = 0 if Outcome.ARRIVED in loop.robot.outcomes else None
         self._statistics = EpisodeStatisticsCounter(loop.info)
         self._scenery: Scenery = NO_SCENERY
         self._last: StepRecord | None = None
@@ -43,14 +45,19 @@ class SnapshotBuilder:
         del self._history[:-_ROWS_KEPT], self._path[:-_ROWS_KEPT]
         involved = record.involved
         self._involvement += involved
+        self._cost += record.cost
+        if record.outcome is Outcome.ARRIVED:
+            self._arrivals = (self._arrivals or 0) + 1
+        if record.outcome is not None:
+            self._statistics.add_outcome(record.episode, record.outcome)
         self._statistics.add(
             record.episode, involved=involved, cost=record.cost, attributes=record.attributes
         )
         for event in record.events:
             if event.jumps or event.kind in ("takeover", "hand back"):
                 self.notice = describe_event(event)
-        if record.ended:
-            self.notice = record.ended
+        if record.outcome is not None:
+            self.notice = record.ended or f"{record.outcome}; the episode goes on"
         self._last = record
 
     def build_snapshot(
@@ -82,6 +89,8 @@ class SnapshotBuilder:
             speed=speed,
             achieved_speed=achieved_speed,
             involvement=self._involvement,
+            arrivals=self._arrivals,
+            cost=self._cost,
             recorded_bytes=recorded_bytes,
             notice=self.notice,
             finished=finished,

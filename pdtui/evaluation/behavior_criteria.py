@@ -76,7 +76,7 @@ class BehaviorCriterion:
         words: The criterion, for tables.
         quantity: What is measured, with its unit.
         measure: Measures it in a run; NaN where the run has ended.
-        judge: Tells whether a run without a fall meets it.
+        judge: Tells whether a run that does not fail meets it.
     """
 
     words: str
@@ -85,9 +85,10 @@ class BehaviorCriterion:
     judge: Callable[[JudgedRun], bool]
 
     def is_met(self, run: JudgedRun) -> bool:
-        """Return whether a run meets the criterion and the robot is on its feet until the release."""
-        fell_at = run.trace.fell_at
-        return (fell_at is None or fell_at >= run.times.held) and bool(self.judge(run))
+        """Return whether a run meets the criterion and does not fail before the release."""
+        ended_at = run.trace.ended_at
+        failed = run.trace.failed and ended_at is not None and ended_at < run.times.held
+        return not failed and bool(self.judge(run))
 
 
 def choose_criterion(name: str, aim: BehaviorAim, attributes: Sequence[Attribute]) -> BehaviorCriterion:
@@ -189,5 +190,5 @@ def _beyond_default(aim: BehaviorAim, unit: str) -> BehaviorCriterion:
 
 def _beats_default(run: JudgedRun, aim: BehaviorAim) -> bool:
     default = run.last(aim.attribute, default=True)
-    # A default that has fallen proves nothing, so only the sign of what is there counts.
+    # A default that has ended proves nothing, so only the sign of what is there counts.
     return aim.sign * (run.last(aim.attribute) - (0.0 if np.isnan(default) else default)) > 0.0

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from pdtui.core.outcome import count_failures
 from pdtui.core.worker_pool import StepProgress, WorkerPool
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
@@ -17,7 +18,6 @@ from pdtui.evaluation.behavior_summary import (
     BehaviorEvaluation,
     BehaviorRuns,
     SubstituteFigures,
-    correct_over_table,
     summarise_behavior,
     summarise_substitute,
 )
@@ -31,6 +31,7 @@ from pdtui.evaluation.held_run import (
     measure_intervention,
     run_held_behavior,
 )
+from pdtui.evaluation.paired_statistics import holm_correction
 from pdtui.evaluation.protocol_settings import ProtocolSettings
 from pdtui.evaluation.tasks.task_runs import (
     count_task_steps,
@@ -54,7 +55,7 @@ class MapEvaluation:
         robot, policy: Their names.
         seeds: The seeds.
         settings: The sizes of the evaluation.
-        control_steps: Control steps that were planned; falls make them fewer.
+        control_steps: Control steps that were planned; episodes that end early make them fewer.
         start_spread: Standard deviation over seeds of the mean speed (of the first attribute, where there is
             no speed) in the first window without a press, as a share of its mean; NaN for one seed.
         nearly_one_start: Whether that is less than 2 %, so that many seeds tell hardly more than one.
@@ -81,7 +82,9 @@ class MapEvaluation:
     def measured_effects(self) -> dict[str, MeasuredEffect]:
         """Return the undisturbed effects at the end of the hold by behavior, as maps hold them."""
         return {
-            row.behavior: MeasuredEffect(row.last.effect, row.last.low, row.last.high, row.falls, row.runs)
+            row.behavior: MeasuredEffect(
+                row.last.effect, row.last.low, row.last.high, count_failures(row.outcomes), row.runs
+            )
             for row in self.undisturbed()
         }
 
@@ -98,7 +101,7 @@ def plan_evaluation(
 
 
 def count_control_steps(plan: EvaluationPlan) -> int:
-    """Return how many control steps an evaluation runs; falls make it fewer."""
+    """Return how many control steps an evaluation runs; episodes that end early make it fewer."""
     held = sum(plan.times(key.behavior, key.seed).steps for key in plan.held_runs())
     measuring = [*plan.measuring_runs(), *task_measuring_runs(plan)]
     first = sum(run.times.press + run.times.window for run in measuring)
@@ -191,6 +194,7 @@ def _runs_of(
         [plan.times(behavior.name, seed) for seed in seeds],
         [traces[RunKey(behavior.name, seed, condition)] for seed in seeds],
         [traces[RunKey("", seed, condition)] for seed in seeds],
+        plan.loop.robot.outcomes,
     )
 
 
@@ -207,3 +211,18 @@ def _summarise_substitutes(
             drawn = [[traces[key] for key in row] for row in keys]
             figures.append(summarise_substitute(kind, own, drawn))
     return tuple(figures)
+
+
+def correct_over_table(rows: Sequence[BehaviorEvaluation], level: float) -> list[BehaviorEvaluation]:
+    """Correct the p-values of each window over the rows of one table, and say which effects hold."""
+    first = holm_correction([row.first.p_value for row in rows])
+    last = holm_correction([row.last.p_value for row in rows])
+    return [
+        replace(
+            row,
+            first=replace(row.first, corrected=p_first),
+            last=replace(row.last, corrected=p_last),
+            holds=p_last < level and row.last.effect * row.wanted > 0.0,
+        )
+        for row, p_first, p_last in zip(rows, first, last, strict=True)
+    ]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
 from pdtui.core.attributes import Attribute
+from pdtui.core.outcome import Outcome, OutcomeCounts, count_outcomes
 from pdtui.evaluation.behavior_criteria import BehaviorCriterion, JudgedRun, choose_criterion
 from pdtui.evaluation.effect_figures import (
     EffectSpecificity,
@@ -20,7 +22,7 @@ from pdtui.evaluation.effect_figures import (
     window_effect,
 )
 from pdtui.evaluation.held_run import HeldRunTrace
-from pdtui.evaluation.paired_statistics import holm_correction, share_interval
+from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.evaluation.protocol_settings import RunTimes
 from pdtui.stimulation.stimulation_map import Behavior
 
@@ -42,7 +44,7 @@ class SubstituteFigures:
         judged: Draws that meet the behavior's criterion on at least half of their seeds.
         effect: Median over draws of the mean effect in the last window.
         own_effect: That of the behavior on the same seeds.
-        falls: Runs in which the robot fell, of `draws` × `seeds`.
+        outcomes: How runs ended, of `draws` × `seeds`.
     """
 
     kind: str
@@ -55,7 +57,7 @@ class SubstituteFigures:
     judged: int
     effect: float
     own_effect: float
-    falls: int
+    outcomes: OutcomeCounts
 
 
 @dataclass(frozen=True)
@@ -75,12 +77,12 @@ class BehaviorEvaluation:
         onset: Median time until half of the effect of the first window is there, s; NaN if it never is.
         lasts: Median time until less than half of it is left for good, s.
         lasting: Number of runs in which that is the whole hold.
-        judged: Number of runs that meet the criterion without a fall until the release.
+        judged: Number of runs that meet the criterion and do not fail before the release.
         judged_low, judged_high: 95 % interval of that share (Clopper and Pearson).
         judged_by_itself: Number of runs without a press that meet it.
         back: Number of runs that are back to the usual gait after the release.
-        falls: Number of runs in which the robot fell.
-        default_falls: Number of runs without a press in which it fell.
+        outcomes: How runs ended before their time.
+        default_outcomes: How those without a press did.
         holds: Whether the effect of the last window is in the wanted direction and its corrected p-value
             below the level.
         side_effects: The effect beside those on the other attributes.
@@ -110,8 +112,8 @@ class BehaviorEvaluation:
     judged_high: float
     judged_by_itself: int
     back: int
-    falls: int
-    default_falls: int
+    outcomes: OutcomeCounts
+    default_outcomes: OutcomeCounts
     holds: bool
     side_effects: EffectSpecificity
     seed_effects: tuple[float, ...]
@@ -121,7 +123,10 @@ class BehaviorEvaluation:
 
 @dataclass(frozen=True)
 class BehaviorRuns:
-    """The runs of one behavior in one condition, and those without a press, in the order of the seeds."""
+    """The runs of one behavior in one condition, and those without a press, in the order of the seeds.
+
+    `possible` are the outcomes of the robot.
+    """
 
     behavior: Behavior
     condition: str
@@ -129,6 +134,7 @@ class BehaviorRuns:
     times: Sequence[RunTimes]
     traces: Sequence[HeldRunTrace]
     defaults: Sequence[HeldRunTrace]
+    possible: Sequence[Outcome] = (Outcome.FELL,)
 
     @property
     def column(self) -> int:
@@ -161,6 +167,10 @@ class BehaviorRuns:
         """Return the median of what the criterion measures; NaN if every run ended before."""
         seen = np.array([self.criterion.measure(run) for run in self.judged_runs(self.traces)])
         return float(np.nanmedian(seen)) if np.isfinite(seen).any() else float("nan")
+
+    def count(self, traces: Iterable[HeldRunTrace]) -> OutcomeCounts:
+        """Return how runs ended."""
+        return count_outcomes((trace.outcome for trace in traces), self.possible)
 
     def wanted_effects(self, traces: Sequence[HeldRunTrace]) -> tuple[float, float]:
         """Return the mean effects in the first and the last window in the wanted direction."""
@@ -202,8 +212,8 @@ def summarise_behavior(runs: BehaviorRuns) -> BehaviorEvaluation:
         judged_high=judged_high,
         judged_by_itself=by_itself,
         back=count_back_to_gait(*both, runs.attributes, column),
-        falls=sum(run.fell for run in runs.traces),
-        default_falls=sum(run.fell for run in runs.defaults),
+        outcomes=runs.count(runs.traces),
+        default_outcomes=runs.count(runs.defaults),
         holds=False,
         side_effects=measure_side_effects(*both, runs.attributes, column, times),
         seed_effects=tuple(effects[:, : times.held_bins].mean(axis=1).tolist()),
@@ -229,20 +239,5 @@ def summarise_substitute(
         sum(2 * sum(own.judge(traces)) >= seeds for traces in draws),
         float(np.median(effects[:, 1])) * own.sign,
         own_last * own.sign,
-        sum(trace.fell for traces in draws for trace in traces),
+        own.count(chain.from_iterable(draws)),
     )
-
-
-def correct_over_table(rows: Sequence[BehaviorEvaluation], level: float) -> list[BehaviorEvaluation]:
-    """Correct the p-values of each window over the rows of one table, and say which effects hold."""
-    first = holm_correction([row.first.p_value for row in rows])
-    last = holm_correction([row.last.p_value for row in rows])
-    return [
-        replace(
-            row,
-            first=replace(row.first, corrected=p_first),
-            last=replace(row.last, corrected=p_last),
-            holds=p_last < level and row.last.effect * row.wanted > 0.0,
-        )
-        for row, p_first, p_last in zip(rows, first, last, strict=True)
-    ]

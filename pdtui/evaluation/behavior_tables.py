@@ -7,6 +7,7 @@ import math
 from rich.console import Group
 from rich.table import Table
 
+from pdtui.core.outcome import failure_noun, format_failures
 from pdtui.core.text_tables import format_mean_with_interval, format_p_value, format_seed_range, new_table
 from pdtui.evaluation.behavior_evaluation import MapEvaluation
 from pdtui.evaluation.behavior_summary import AS_LARGE, BehaviorEvaluation
@@ -33,7 +34,8 @@ def _criteria_table(result: MapEvaluation) -> Table:
     rows = result.undisturbed()
     title = f"{_title(result)}, held for {rows[0].held:.0f} s"
     left = ["behavior", "is called so if it"]
-    columns = ("median", "met [95 %]", "by itself", "falls", "falls by itself", "back after release")
+    noun = failure_noun(rows[0].outcomes)
+    columns = ("median", "met [95 %]", "by itself", noun, f"{noun} by itself", "back after release")
     table = new_table(title, *left, *columns, left=left)
     for row in rows:
         table.add_row(
@@ -41,10 +43,10 @@ def _criteria_table(result: MapEvaluation) -> Table:
             row.criterion,
             f"{row.seen:.2f} {row.quantity}",
             f"{row.judged}/{row.runs} [{row.judged_low:.0%}, {row.judged_high:.0%}]",
-            *(
-                f"{count}/{row.runs}"
-                for count in (row.judged_by_itself, row.falls, row.default_falls, row.back)
-            ),
+            f"{row.judged_by_itself}/{row.runs}",
+            format_failures(row.outcomes, row.runs),
+            format_failures(row.default_outcomes, row.runs),
+            f"{row.back}/{row.runs}",
         )
     return table
 
@@ -68,7 +70,7 @@ def _time_table(result: MapEvaluation) -> Table:
             f"{row.lasts:.1f} s ({row.lasting}/{row.runs} to the end)",
         )
     table.caption = (
-        "Intervals: studentised bootstrap over starts; a run counts as 0 from its fall on. p: paired "
+        "Intervals: studentised bootstrap over starts; a run counts as 0 from its end on. p: paired "
         "sign-flip test of the last 5 s, corrected over the rows (Holm); an effect holds if p < "
         f"{result.settings.level:g} and it goes the wanted way. Half there: half of the effect of the first "
         "5 s; lasts: until less is left for good (medians)."
@@ -77,20 +79,20 @@ def _time_table(result: MapEvaluation) -> Table:
 
 
 def _substitutes_table(result: MapEvaluation) -> Table:
-    settings = result.settings
+    settings, noun = result.settings, failure_noun(result.behaviors[0].outcomes)
     table = new_table(
         "Would something else do as well?",
-        *("behavior", "random units: as large, met, falls", "random directions", "on the actions"),
+        *("behavior", f"random units: as large, met, {noun}", "random directions", "on the actions"),
         *("specificity", "largest side effect"),
     )
     for row in result.undisturbed():
         side, cells = row.side_effects, {}
         for one in row.substitutes:
-            runs = one.draws * one.seeds
-            cells[one.kind] = f"{one.as_large}/{one.draws}, {one.judged}/{one.draws}, {one.falls}/{runs}"
+            failures = format_failures(one.outcomes, one.draws * one.seeds)
+            cells[one.kind] = f"{one.as_large}/{one.draws}, {one.judged}/{one.draws}, {failures}"
             if one.kind == "actions":
                 met = "met" if one.judged else "not met"
-                cells[one.kind] = f"{one.effect:+.2f} of {one.own_effect:+.2f}, {met}, {one.falls}/{runs}"
+                cells[one.kind] = f"{one.effect:+.2f} of {one.own_effect:+.2f}, {met}, {failures}"
         table.add_row(
             row.behavior,
             *(cells.get(kind, "–") for kind in ("random units", "random directions", "actions")),
@@ -108,9 +110,10 @@ def _substitutes_table(result: MapEvaluation) -> Table:
 
 
 def _conditions_table(result: MapEvaluation) -> Table:
+    noun = failure_noun(result.behaviors[0].outcomes)
     table = new_table(
         "Disturbed; p is corrected over the disturbed rows",
-        *("behavior", "condition", "last 5 s [95 %]", "p", "holds", "met", "falls", "falls by itself"),
+        *("behavior", "condition", "last 5 s [95 %]", "p", "holds", "met", noun, f"{noun} by itself"),
         left=["behavior", "condition"],
     )
     for name in dict.fromkeys(row.behavior for row in result.behaviors):
@@ -122,13 +125,14 @@ def _conditions_table(result: MapEvaluation) -> Table:
 
 
 def _condition_cells(row: BehaviorEvaluation) -> list[str]:
-    counts = (row.judged, row.falls, row.default_falls)
     return [
         row.condition,
         _effect(row.last),
         format_p_value(row.last.corrected),
         "yes" if row.holds else "no",
-        *(f"{count}/{row.runs}" for count in counts),
+        f"{row.judged}/{row.runs}",
+        format_failures(row.outcomes, row.runs),
+        format_failures(row.default_outcomes, row.runs),
     ]
 
 

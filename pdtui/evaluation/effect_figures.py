@@ -21,10 +21,10 @@ _GAIT_SPREADS, _GAIT_SHARE = 3.0, 0.1
 
 @dataclass(frozen=True)
 class WindowEffect:
-    """The effect in one window; a run counts as 0 from its fall on.
+    """The effect in one window; a run counts as 0 from its end on.
 
     Attributes:
-        value, default: Means of the attribute with the behavior and without, over the runs that are still up.
+        value, default: Means of the attribute with the behavior and without, over the runs that still go on.
         effect: Mean of the paired differences.
         low, high: 95 % interval of `effect` (studentised bootstrap over starts).
         p_value: That of a paired sign-flip test.
@@ -59,7 +59,7 @@ class EffectSpecificity:
 
 
 def paired_effects(traces: Sequence[HeldRunTrace], defaults: Sequence[HeldRunTrace], column: int) -> Floats:
-    """Return the differences of an attribute by seed and bin, shape (n, bins); 0 where either has fallen."""
+    """Return the differences of an attribute by seed and bin, shape (n, bins); 0 where either has ended."""
     with_it, without = (np.array([one.values[:, column] for one in runs]) for runs in (traces, defaults))
     differences: Floats = np.nan_to_num(with_it - without[:, : with_it.shape[1]])
     return differences

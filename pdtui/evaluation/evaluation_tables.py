@@ -8,6 +8,7 @@ from rich.console import Group
 from rich.table import Table
 
 from pdtui.core.confidence_intervals import PairedRatio
+from pdtui.core.outcome import Outcome, count_failures, describe_outcomes, failure_noun
 from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.evaluation.policy_evaluation import PolicyEvaluation
 from pdtui.search.gain_tuning import TunedGains
@@ -24,7 +25,12 @@ def policy_evaluation_table(result: PolicyEvaluation) -> Table:
         if speed is not None:
             table.add_row(name, f"{speed:.2f}")
     table.add_row("return", f"{result.mean_return:.0f} ± {result.std_return:.0f}")
-    table.add_row("episodes without a fall", f"{result.finished}/{len(result.seeds)}")
+    others = result.outcomes.keys() - {Outcome.FELL, Outcome.OUT_OF_TIME}
+    if Outcome.ARRIVED in others or any(result.outcomes[one] for one in others):
+        table.add_row("outcomes", describe_outcomes(result.outcomes, len(result.seeds)))
+    else:
+        upright = len(result.seeds) - count_failures(result.outcomes)
+        table.add_row("episodes without a fall", f"{upright}/{len(result.seeds)}")
     return table
 
 
@@ -33,7 +39,7 @@ def tracking_table(result: TrackingSummary) -> Table:
     unit = result.unit
     table = new_table(
         f"{result.behavior}: {result.attribute} ({unit}), {format_seed_range(result.seeds)}, "
-        f"falls {result.falls}",
+        f"{describe_outcomes(result.outcomes)}",
         *(f"target ({unit})", "mean |error|", "last 25 steps"),
     )
     for row in result.targets:
@@ -83,7 +89,8 @@ def add_tracking_figures(table: Table, columns: Sequence[TrackingSummary]) -> No
     table.add_row("rise time (s)", *map(_rise, responses))
     table.add_row("steps not risen", *(f"{one.unrisen} of {one.steps}" for one in responses))
     table.add_row("overshoot", *map(_overshoot, responses))
-    table.add_row("falls", *(f"{one.falls} of {len(one.seeds)}" for one in columns))
+    failures = (describe_outcomes(one.outcomes, len(one.seeds)).removeprefix("falls ") for one in columns)
+    table.add_row(failure_noun(columns[0].outcomes), *failures)
 
 
 def _with_interval(figures: TrackingSummary) -> str:

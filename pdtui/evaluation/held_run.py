@@ -11,6 +11,7 @@ import numpy as np
 
 from pdtui.core.attributes import Floats, unwrap_angles
 from pdtui.core.drive_events import DriveEvent
+from pdtui.core.outcome import Outcome, is_failure
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import run_episode
@@ -60,23 +61,25 @@ class HeldRunPlan:
 
 @dataclass(frozen=True)
 class HeldRunTrace:
-    """What is kept of a run: means over bins from the press on, NaN after a fall.
+    """What is kept of a run: means over bins from the press on, NaN after the end of the episode.
 
     Attributes:
         values: Attributes, shape (bins, J), angles unwrapped.
         places: Where the first body is at the end of each bin, x and y in m, shape (bins, 2); NaN for a robot
             without poses.
-        fell_at: Control steps from the press to a fall; negative for a fall before it, None for none.
+        outcome: How the episode ended, or that its task was done; None if it lasted as long as planned.
+        ended_at: Control steps from the press to that end; negative for one before it, None for none.
     """
 
     values: Floats
     places: Floats
-    fell_at: int | None
+    outcome: Outcome | None = None
+    ended_at: int | None = None
 
     @property
-    def fell(self) -> bool:
-        """Whether the robot fell."""
-        return self.fell_at is not None
+    def failed(self) -> bool:
+        """Whether the episode failed."""
+        return is_failure(self.outcome)
 
 
 @contextmanager
@@ -111,12 +114,13 @@ def drive_held_run(built: ControlLoop, plan: HeldRunPlan) -> Iterator[StepRecord
 def run_held_behavior(built: ControlLoop, plan: HeldRunPlan) -> HeldRunTrace:
     """Run once and keep what figures and judges need."""
     times, attributes = plan.times, built.robot.attributes
-    rows, places, fell_at = [], [], None
+    rows, places, outcome, ended_at = [], [], None, None
     for record in drive_held_run(built, plan):
         rows.append(record.attributes)
         places.append(record.poses[0, :2] if len(record.poses) else np.full(2, np.nan))
-        if record.fell:
-            fell_at = record.step - times.press
+        outcome = record.outcome or outcome
+        if record.ended:
+            ended_at = record.step - times.press
     smooth = unwrap_angles(np.array(rows), attributes)[times.press :]
     values = np.full((times.bins, len(attributes)), np.nan)
     ends = np.full((times.bins, 2), np.nan)
@@ -124,7 +128,7 @@ def run_held_behavior(built: ControlLoop, plan: HeldRunPlan) -> HeldRunTrace:
         part = slice(number * times.bin, (number + 1) * times.bin)
         values[number] = smooth[part].mean(axis=0)
         ends[number] = places[times.press + part.stop - 1]
-    return HeldRunTrace(values, ends, fell_at)
+    return HeldRunTrace(values, ends, outcome, ended_at)
 
 
 @dataclass(frozen=True)
@@ -167,31 +171,31 @@ class HeldRunFilm:
     """Poses of a run at some times, and its whole way.
 
     Attributes:
-        seconds: Time of each frame from the press on, s; frames after a fall are missing.
+        seconds: Time of each frame from the press on, s; frames after the end are missing.
         poses: Poses of all bodies in each frame, shape (frames, B, 7).
         way: Where the robot is at each control step from the press on, x and y in m, shape (steps, 2).
         held: Control steps from the press to the release.
-        fell: Whether it fell.
+        outcome: How the episode ended, or that its task was done; None if it lasted as long as planned.
     """
 
     seconds: tuple[float, ...]
     poses: Floats
     way: Floats
     held: int
-    fell: bool
+    outcome: Outcome | None
 
 
 def film_held_run(built: ControlLoop, plan: HeldRunPlan, seconds: Sequence[float]) -> HeldRunFilm:
     """Run once more and keep the poses at some times from the press on, s."""
     times, root = plan.times, root_body_row(built.robot.links)
     wanted = {times.press + round(one / times.dt): one for one in seconds}
-    taken, poses, way, fell = [], [], [], False
+    taken, poses, way, outcome = [], [], [], None
     for record in drive_held_run(built, plan):
         if record.step in wanted:
             taken.append(wanted[record.step])
             poses.append(record.poses)
         if record.step >= times.press:
             way.append(record.poses[root, :2])
-        fell = fell or record.fell
+        outcome = record.outcome or outcome
     bodies = np.array(poses).reshape(len(poses), -1, 7)
-    return HeldRunFilm(tuple(taken), bodies, np.array(way).reshape(-1, 2), times.held, fell)
+    return HeldRunFilm(tuple(taken), bodies, np.array(way).reshape(-1, 2), times.held, outcome)

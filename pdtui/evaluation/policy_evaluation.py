@@ -1,4 +1,4 @@
-"""`pdtui evaluate --policy-only`: speed, return and falls of the policy alone, over whole episodes."""
+"""`pdtui evaluate --policy-only`: speed, return and outcomes of the policy alone, over whole episodes."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pdtui.core.outcome import Outcome, OutcomeCounts, count_outcomes
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
@@ -23,7 +24,7 @@ class PolicyEvaluation:
         net_speed: distance between start and end over time, mean over episodes, m/s; None for a robot
             without poses.
         mean_return, std_return: mean and standard deviation of the episodes' returns.
-        finished: number of episodes without a fall.
+        outcomes: how the episodes ended; those that lasted all steps are out of time.
     """
 
     seeds: tuple[int, ...]
@@ -32,11 +33,11 @@ class PolicyEvaluation:
     net_speed: float | None
     mean_return: float
     std_return: float
-    finished: int
+    outcomes: OutcomeCounts
 
 
 def evaluate_policy(
-    config: DriveConfig,
+    config: DriveConfig | ControlLoop,
     seeds: Sequence[int],
     *,
     steps: int | None = None,
@@ -44,31 +45,31 @@ def evaluate_policy(
 ) -> PolicyEvaluation:
     """Run the policy without stimulation for one episode per seed.
 
-    Episodes begin at the start of `config`, whose seed is not used, and last the robot's usual number of
-    control steps unless `steps` is given.
+    Episodes begin at the start of `config`, or of a loop, whose seed is not used. They last the robot's usual
+    number of control steps unless `steps` is given, and end before if the robot arrives.
 
     Raises:
         PdtuiError: the robot, policy or map cannot be loaded.
     """
-    built = build_control_loop(config)
+    built = build_control_loop(config) if isinstance(config, DriveConfig) else config
     steps = steps or built.robot.episode_steps
     names = [attribute.name for attribute in built.robot.attributes]
     column = names.index("speed") if "speed" in names else None
-    speeds, net_speeds, returns, finished = [], [], [], 0
+    speeds, net_speeds, returns, outcomes = [], [], [], []
     for done, seed in enumerate(seeds, start=1):
-        loop = ControlLoop(built.robot, built.policy, built.map, seed, start=config.start)
+        loop = ControlLoop(built.robot, built.policy, built.map, seed, start=built.start)
         total = 0.0
         start = loop.robot.read_poses()[:1, :2]
         for record in run_episode(loop, steps):
             total += record.reward
             if column is not None:
                 speeds.append(float(record.attributes[column]))
-            if record.finished:
+            if record.outcome is not None:
                 break
         seconds = loop.step * loop.robot.control_dt
         net_speeds += (np.linalg.norm(record.poses[:1, :2] - start, axis=1) / seconds).tolist()
         returns.append(total)
-        finished += not record.fell
+        outcomes.append(record.outcome or Outcome.OUT_OF_TIME)
         if progress is not None:
             progress(done, len(seeds))
     return PolicyEvaluation(
@@ -78,5 +79,5 @@ def evaluate_policy(
         float(np.mean(net_speeds)) if net_speeds else None,
         float(np.mean(returns)),
         float(np.std(returns)),
-        finished,
+        count_outcomes(outcomes, built.robot.outcomes),
     )

@@ -11,6 +11,7 @@ from rich.table import Table
 from pdtui.core.confidence_intervals import confidence_interval
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import RobotError
+from pdtui.core.outcome import Outcome, OutcomeCounts, count_failures, count_outcomes
 from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
@@ -49,7 +50,7 @@ class CommandFollowingResult:
     Attributes:
         seeds: seeds of the episodes; each draws its own commands.
         steps: control steps per episode; the first 100 do not count.
-        finished: number of episodes without a fall.
+        outcomes: how the episodes ended; those that lasted all steps are out of time.
     """
 
     robot: str
@@ -57,7 +58,7 @@ class CommandFollowingResult:
     seeds: tuple[int, ...]
     steps: int
     commands: tuple[CommandTrackingError, ...]
-    finished: int
+    outcomes: OutcomeCounts
 
 
 def evaluate_command_following(
@@ -75,7 +76,7 @@ def evaluate_command_following(
     if not ranges:
         raise RobotError(f"{robot.name}: it takes no commands")
     columns = [robot.attribute_index(one.attribute) for one in ranges.values()]
-    asked, errors, biases, finished = [], [], [], 0
+    asked, errors, biases, outcomes = [], [], [], []
     press = {0: [DriveEvent(0, "behavior", _ASKED)]}
     for done, seed in enumerate(seeds, start=1):
         rng = np.random.default_rng(seed)
@@ -89,7 +90,7 @@ def evaluate_command_following(
         asked.append(wanted)
         errors.append(np.abs(settled - wanted).mean(axis=0))
         biases.append(np.abs(settled.mean(axis=0) - wanted))
-        finished += not records[-1].fell
+        outcomes.append(records[-1].outcome or Outcome.OUT_OF_TIME)
         if progress is not None:
             progress(done, len(seeds))
     rows = []
@@ -105,7 +106,8 @@ def evaluate_command_following(
                 float(np.array(biases)[:, index].mean()),
             )
         )
-    return CommandFollowingResult(robot.name, policy.name, tuple(seeds), steps, tuple(rows), finished)
+    counts = count_outcomes(outcomes, robot.outcomes)
+    return CommandFollowingResult(robot.name, policy.name, tuple(seeds), steps, tuple(rows), counts)
 
 
 def command_following_table(result: CommandFollowingResult) -> Table:
@@ -122,6 +124,6 @@ def command_following_table(result: CommandFollowingResult) -> Table:
             f"{min(row.asked):+.2f} to {max(row.asked):+.2f}",
             format_mean_with_interval(row.error, row.low, row.high, ".3f"),
             f"{row.bias:.3f}",
-            f"{count - result.finished}/{count}",
+            f"{count_failures(result.outcomes)}/{count}",
         )
     return table

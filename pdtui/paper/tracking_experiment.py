@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pdtui.core.outcome import count_failures
 from pdtui.paper.experiment import Experiment, ExperimentReport, ExperimentRequest
 
 if TYPE_CHECKING:
@@ -45,7 +46,8 @@ def build_heading_figure(result: HeadingPrecisionComparison) -> HeadingFigure:
     headings = []
     for row in result.rows:
         figures = row.tracking
-        falls = f", {figures.falls} of {len(figures.seeds)} fell" if figures.falls else ""
+        failed = count_failures(figures.outcomes)
+        falls = f", {failed} of {len(figures.seeds)} fell" if failed else ""
         name = f"{figures.behavior} ({row.policy})" if several else figures.behavior
         headings.append(TrackedHeading(name, f"{figures.error:.3f} rad{falls}", row.headings))
     robots = ", ".join(dict.fromkeys(row.robot for row in result.rows))

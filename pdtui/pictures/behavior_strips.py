@@ -91,12 +91,10 @@ def draw_strips(path: Path, plan: EvaluationPlan, strips: Sequence[BehaviorStrip
                 axis.set_title(f"{seconds:.1f} s", fontsize=5.5, pad=1, loc="center")
             _draw_way(row[0], strip)
             run, word = strip.run, "met" if strip.run.met else "not met"
+            ended = f", {strip.film.outcome}" if strip.film.outcome else ""
             head = f"{run.behavior} ({run.criterion})\n" if run.rank == "best" else ""
             row[0].set_title(
-                f"{head}{run.rank}, seed {run.plan.seed}: {word}{', fell' if strip.film.fell else ''}",
-                fontsize=5.5,
-                pad=1,
-                loc="left",
+                f"{head}{run.rank}, seed {run.plan.seed}: {word}{ended}", fontsize=5.5, pad=1, loc="left"
             )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pdtui.core.outcome import is_failure
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.core.worker_pool import StepProgress
 from pdtui.probing.measured_effects import PlanEffects, SingleUnitEffects, UnitEffects
@@ -58,9 +59,11 @@ class EffectProbe:
             effects=means - unperturbed,
             means=means,
             unperturbed=unperturbed,
-            falls=np.array([outcome.fell for outcome in probed], np.bool_).reshape(shape),
+            falls=np.array([is_failure(one.outcome) for one in probed], np.bool_).reshape(shape),
             errors=np.array([outcome.error for outcome in probed], np.float64).reshape(shape),
-            unperturbed_falls=np.array([self._unperturbed[key].fell for key in keys], np.bool_),
+            unperturbed_falls=np.array(
+                [is_failure(self._unperturbed[key].outcome) for key in keys], np.bool_
+            ),
         )
 
     def measure_units(

@@ -19,10 +19,11 @@ class PlanEffects:
     Attributes:
         effects: change of each attribute against the unperturbed roll-out from the same start, in its unit,
             shape (S, K, J): a difference of means over the measured steps; for an angle, of its mean change
-            since the start. NaN where the robot fell before the measured steps.
+            since the start. NaN where the episode ended before the measured steps.
         means: the means with stimulation, shape (S, K, J).
         unperturbed: the means without stimulation, shape (K, J).
-        falls: whether the robot fell, shape (S, K).
+        falls: whether the roll-out failed, as `is_failure` says, shape (S, K). One in which the robot arrives
+            is measured up to its end.
         errors: mean distance from the target for plans with a controller, else NaN, shape (S, K).
         unperturbed_falls: whether the robot fell without stimulation, shape (K,).
     """
@@ -68,9 +69,10 @@ class UnitEffects:
         """Return the weakest effect over all starts in the direction of `sign`, shape (N, D).
 
         It is negative where the effect from a start has the other sign, and at most 0 where the robot fell.
-        Starts from which it falls by itself say nothing, and are left out.
+        Starts from which it falls by itself, or has arrived before the measured steps, say nothing, and are
+        left out.
         """
-        stays_up = ~self.unperturbed_falls
+        stays_up = ~self.unperturbed_falls & np.isfinite(self.unperturbed[:, column])
         if not stays_up.any():
             return np.zeros(self.falls.shape[:2])
         weakest = np.min(sign * np.nan_to_num(self.effects[:, :, stays_up, column]), axis=-1)

@@ -11,11 +11,17 @@ import numpy as np
 
 from pdtui.core.closable import Closable
 from pdtui.core.errors import PdtuiError, RobotError
+from pdtui.core.outcome import Outcome
 from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome
 from pdtui.robots.simulators.python_state import digest_values
 
 _SCHEMA = "CREATE TABLE IF NOT EXISTS rollouts (key BLOB PRIMARY KEY, outcome BLOB NOT NULL) WITHOUT ROWID"
+_ENDS = (
+    *(None, Outcome.FELL, Outcome.ARRIVED, Outcome.CRASHED, Outcome.LEFT_ROAD),
+    *(Outcome.OUT_OF_TIME, Outcome.DIVERGED),
+)
+"""Numbers that stand for outcomes. Older journals tell only whether the robot fell, by 0 and 1."""
 
 
 class RolloutJournal(Closable):
@@ -89,9 +95,10 @@ def fingerprint_start_state(start: StartState) -> bytes:
 
 
 def _encode(outcome: RolloutOutcome) -> bytes:
-    return np.array([outcome.error, outcome.steps_survived, outcome.fell, *outcome.means], "<f8").tobytes()
+    end = _ENDS.index(outcome.outcome)
+    return np.array([outcome.error, outcome.steps_survived, end, *outcome.means], "<f8").tobytes()
 
 
 def _decode(row: bytes) -> RolloutOutcome:
-    error, steps_survived, fell, *means = np.frombuffer(row, "<f8").tolist()
-    return RolloutOutcome(np.array(means), error, int(steps_survived), bool(fell))
+    error, steps_survived, end, *means = np.frombuffer(row, "<f8").tolist()
+    return RolloutOutcome(np.array(means), error, int(steps_survived), _ENDS[int(end)])

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from pdtui.core.errors import RobotError, SimulationDiverged
+from pdtui.core.outcome import Outcome, count_outcomes, describe_outcomes
 from pdtui.core.robot_links_and_state import RobotState
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.recurrent_state import PolicyState
@@ -33,22 +34,24 @@ def collect_start_states(
 ) -> list[StartState]:
     """Take one state from each of several unstimulated walks, which differ in heading and phase of the gait.
 
-    The state is taken `at` control steps after the reset. Seeds whose walk does not get that far are skipped,
-    but not those whose walk would fall later: to leave these out would flatter every stimulation.
+    The state is taken `at` control steps after the reset. Seeds whose walk ends before, by a failure or
+    because the robot has arrived, are skipped,
+    but not those whose walk would end later: to leave out those that fall would flatter every stimulation.
 
     Raises:
         RobotError: too few of ``4 * count`` walks last that long.
     """
     starts: list[StartState] = []
+    ends: list[Outcome | None] = []
     for seed in range(first_seed, first_seed + 4 * count):
-        for step in _walk(robot, policy, seed, at):
+        for step in _walk(robot, policy, seed, at, ends):
             if step == at:
                 starts.append(StartState(seed, at, robot.snapshot(), policy.snapshot()))
         if len(starts) == count:
             return starts
     raise RobotError(
-        f"{robot.name}: expected {count} walks of {at} steps without a fall among {4 * count} seeds, found "
-        f"{len(starts)}; dissection needs a policy that mostly stays up"
+        f"{robot.name}: expected {count} walks of {at} steps among {4 * count} seeds, found {len(starts)}: "
+        f"{describe_outcomes(count_outcomes(ends))}; dissection needs longer walks"
     )
 
 
@@ -59,21 +62,26 @@ def measure_walk_lengths(robot: Robot, policy: Policy, seeds: Sequence[int], mos
     """
     lengths: list[int] = []
     for seed in seeds:
-        *_, length = _walk(robot, policy, seed, most)
+        *_, length = _walk(robot, policy, seed, most, [])
         lengths.append(length)
     return lengths
 
 
-def _walk(robot: Robot, policy: Policy, seed: int, most: int) -> Iterator[int]:
-    """Yield 0 after the reset, and then the number of each control step with which the walk does not end."""
+def _walk(robot: Robot, policy: Policy, seed: int, most: int, ends: list[Outcome | None]) -> Iterator[int]:
+    """Yield 0 after the reset, and then the number of each control step with which the walk does not end.
+
+    The outcome of a walk that ends is added to `ends`.
+    """
     observation, _ = robot.reset(seed=seed)
     policy.reset()
     yield 0
     for step in range(1, most + 1):
         try:
-            observation, _, terminated, truncated, _ = robot.step(policy.act(observation).action)
+            observation, _, terminated, truncated, info = robot.step(policy.act(observation).action)
         except SimulationDiverged:
+            ends.append(Outcome.DIVERGED)
             return
         if terminated or truncated:
+            ends.append(robot.outcome_of(terminated, truncated, info))
             return
         yield step

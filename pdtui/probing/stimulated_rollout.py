@@ -9,10 +9,11 @@ import numpy as np
 
 from pdtui.core.attributes import Floats, wrap_angle, wrap_angles
 from pdtui.core.errors import SimulationDiverged
+from pdtui.core.outcome import Outcome
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.start_states import StartState
-from pdtui.robots.robot import Robot, is_fall
+from pdtui.robots.robot import Robot
 from pdtui.stimulation.pid_magnitude import PidMagnitude
 from pdtui.stimulation.stimulation_map import PidGains
 
@@ -49,13 +50,13 @@ class RolloutOutcome(NamedTuple):
             mean change since the start, unwrapped. NaN if it ended before the measured steps.
         error: mean distance from the target over the measured steps; NaN for a fixed stimulation.
         steps_survived: control steps until the episode ended, or all of them.
-        fell: whether the robot fell or the simulation diverged.
+        outcome: how the episode ended; None if it did not.
     """
 
     means: Floats
     error: float
     steps_survived: int
-    fell: bool
+    outcome: Outcome | None
 
 
 def run_rollout(
@@ -71,7 +72,7 @@ def run_rollout(
     observation, before = robot.observe(), robot.read_attributes()
     angles = np.array([attribute.wraps for attribute in robot.attributes])
     turned = np.zeros(len(angles))
-    total, counted, errors, steps_survived, fell = np.zeros(len(angles)), 0, 0.0, 0, False
+    total, counted, errors, steps_survived, outcome = np.zeros(len(angles)), 0, 0.0, 0, None
     controller = _Controller(plan, robot, before) if isinstance(plan, PidStimulationPlan) else None
     values = before
     for step in range(steps):
@@ -82,7 +83,7 @@ def run_rollout(
             action = policy.act(observation, stimulation).action
             observation, _, terminated, truncated, info = robot.step(action)
         except SimulationDiverged:
-            fell = True
+            outcome = Outcome.DIVERGED
             break
         values, previous = robot.read_attributes(), values
         steps_survived += 1
@@ -93,11 +94,11 @@ def run_rollout(
             counted += 1
             errors += controller.distance(values) if controller is not None else 0.0
         if terminated or truncated:
-            fell = is_fall(terminated, info)
+            outcome = robot.outcome_of(terminated, truncated, info)
             break
     means = total / counted if counted else np.full(len(angles), np.nan)
     error = errors / counted if counted and controller is not None else float("nan")
-    return RolloutOutcome(means, error, steps_survived, fell)
+    return RolloutOutcome(means, error, steps_survived, outcome)
 
 
 class _Controller:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
+from pdtui.core.outcome import fall_info
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
@@ -191,10 +192,9 @@ class A1(BulletRobot):
         reason = self._find_fall()
         forward = min(float(moved[0]) / self.control_dt, self._top_speed)
         reward = forward + _ALIVE_REWARD - _ENERGY_WEIGHT * energy / _SUBSTEPS
-        info: dict[str, Any] = {"cost": cost}
         if reason:
-            reward, info["reason"] = reward - _FALL_PENALTY, reason
-        return self.observe(), reward, bool(reason), False, info
+            reward -= _FALL_PENALTY
+        return self.observe(), reward, bool(reason), False, {"cost": cost, **fall_info(reason)}
 
     def observe(self) -> Floats:
         return np.concatenate((self._displacements, self._attitudes, self._targets, self._angles), axis=None)

@@ -10,6 +10,7 @@ from gymnasium.envs.mujoco.ant_v5 import AntEnv
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
+from pdtui.core.outcome import fall_info
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.robot import TRUNK_ATTRIBUTES, TrainingRecipe, torque_attributes
 from pdtui.robots.simulators.mujoco_robot import (
@@ -57,10 +58,8 @@ class Ant(MujocoRobot, AntEnv):
         velocity = (self.data.qpos[:2] - before) / self.dt
         forward = float(velocity[0]) if self._forward == "x" else float(np.abs(velocity).max())
         reward, info = self._get_rew(forward, action)
-        info["cost"] = 0.0
         reason = self._find_fall()
-        if reason:
-            info["reason"] = reason
+        info |= {"cost": 0.0, **fall_info(reason)}
         return self.observe(), float(reward), bool(reason), False, info
 
     def reset_model(self) -> Floats:

@@ -14,6 +14,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.outcome import fall_info
 from pdtui.core.robot_links_and_state import CommandRange
 from pdtui.robots.geometry import roll_pitch_yaw, rotate_vectors
 from pdtui.robots.legged.observations_and_rewards import (
@@ -168,7 +169,7 @@ class Anymal(MujocoRobot):
         info: dict[str, Any] = {"cost": 0.0}
         fell = bool(has_fallen(motion)[0])
         if fell:
-            info["reason"] = f"fell: trunk at {self.data.qpos[2]:.2f} m"
+            info |= fall_info(f"fell: trunk at {self.data.qpos[2]:.2f} m")
         observation: Floats = compute_legged_observations(motion, DEFAULT_ANGLES, len(self.commands))[0]
         return observation, float(reward[0]), fell, False, info
 

@@ -14,6 +14,7 @@ from gymnasium.envs.box2d import bipedal_walker as stock
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
+from pdtui.core.outcome import Outcome, fall_info
 from pdtui.core.robot_links_and_state import Link
 from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
@@ -65,14 +66,15 @@ class FlatBipedalWalker(stock.BipedalWalker):
     def step(self, action: NDArray[np.float32]) -> Any:
         observation, reward, terminated, truncated, info = super().step(action)
         x = float(self.hull.position.x)
-        finished = x > FINISH and not self.game_over
         if self.game_over:
-            info["reason"] = "fell: the hull touched the ground"
+            info |= fall_info("fell: the hull touched the ground")
         elif not 0.0 <= x <= _GROUND_LENGTH:
-            terminated, finished, info["reason"] = True, False, "walked off the end of the ground"
-        elif terminated and finished:
+            terminated = True
+            info |= {"outcome": Outcome.LEFT_ROAD, "reason": "walked off the end of the ground"}
+        elif x > FINISH:
             terminated = False  # Gymnasium's ends the episode at the finish
-        return observation, reward, terminated, truncated, {**info, "finished": finished}
+            info["outcome"] = Outcome.ARRIVED
+        return observation, reward, terminated, truncated, info
 
     def _generate_terrain(self, hardcore: bool) -> None:
         del hardcore
@@ -113,8 +115,8 @@ class BipedalWalker(GymnasiumRobot):
 
     The observation (24) holds the hull's angle and velocities, angles and speeds of the joints, foot
     contacts, and 10 distances to the ground. The reward is Gymnasium's: about 300 for the way to the finish,
-    minus the motors' effort, and −100 for a fall. The ground continues for 2 km; ``finished`` in the info
-    says that the finish is passed.
+    minus the motors' effort, and −100 for a fall. The robot has arrived once it is past the finish; the
+    ground continues for 2 km.
 
     Box2D's lengths are taken for meters. Pitch is positive when leaning forward. The start ``split`` has the
     legs spread on the ground.
@@ -129,6 +131,7 @@ class BipedalWalker(GymnasiumRobot):
     # A fall costs only a third of what the whole way earns, so rewards are scaled up from PPO's usual 0.02.
     training_recipe = TrainingRecipe(settings={"reward_scale": 0.1, "evaluate_steps": 1600})
     episode_steps = 1600
+    outcomes = (Outcome.ARRIVED, Outcome.FELL, Outcome.LEFT_ROAD)
     starts = ("split",)
 
     def __init__(self, torque: float = 300.0) -> None:

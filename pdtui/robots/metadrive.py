@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import RobotError
+from pdtui.core.outcome import Outcome
 from pdtui.core.robot_links_and_state import Link, ManualControl, RobotState
 from pdtui.core.scenery import Traffic
 from pdtui.core.worker_pool import WorkerProcess
@@ -54,6 +55,7 @@ class MetaDrive(Robot):
         ManualControl("steering", 0, "sideways", step=0.1, return_rate=0.5),
         ManualControl("throttle", 1, "lengthways", step=0.25),
     )
+    outcomes = (Outcome.ARRIVED, Outcome.CRASHED, Outcome.LEFT_ROAD)
     episode_steps = 1000
     control_dt = 0.1
     training_recipe = TrainingRecipe(
@@ -140,10 +142,10 @@ class MetaDrive(Robot):
         self._state: CarState = self._process.receive()
         outcome = self._state.outcome
         info: dict[str, Any] = {"cost": self._state.cost}
-        if outcome:
-            info |= {"reason": outcome, "outcome": outcome, "finished": outcome == "arrived"}
-        timed_out = outcome == "out of time"
-        terminated = bool(outcome) and not timed_out
+        if outcome is not None:
+            info |= {"reason": outcome.value, "outcome": outcome}
+        timed_out = outcome is Outcome.OUT_OF_TIME
+        terminated = outcome is not None and not timed_out
         return self.observe(), self._state.reward, terminated, timed_out, info
 
     def ask_rules(self) -> None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import RobotError
+from pdtui.core.outcome import Outcome, outcome_of_step
 from pdtui.core.robot_links_and_state import CommandRange, Link, ManualControl, RobotState
 from pdtui.core.scenery import NO_SCENERY, NO_TRAFFIC, Scenery, Traffic
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
@@ -41,11 +42,6 @@ def torque_attributes(joints: Iterable[str], limits: Iterable[float]) -> list[At
     return [Attribute(name, "N m", 1.0 / limit) for name, limit in zip(names, limits, strict=True)]
 
 
-def is_fall(terminated: bool, info: Mapping[str, Any]) -> bool:
-    """Return whether a step of a robot ended with a fall: it terminated, but not because the task is done."""
-    return bool(terminated) and not info.get("finished", False)
-
-
 @dataclass(frozen=True)
 class TrainingRecipe:
     """How a robot's policy is trained unless the command line says otherwise; `pdtui.training` reads it.
@@ -67,10 +63,10 @@ class TrainingRecipe:
 class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     """A Gymnasium environment with named attributes, link poses and snapshots.
 
-    `step` puts ``cost`` (float) into its info and, when the episode ends, ``reason`` (str). An episode that
-    terminates ends with a fall, unless ``finished`` (bool) in the info says that the robot's task is done. A
-    robot that has finished without terminating can go on: training and scores end there, a drive does not. An
-    episode that is truncated has run out of time. Nobody steps a robot past the end of its episode.
+    `step` puts ``cost`` (float) into its info and, when the episode ends, ``reason`` (str) and ``outcome``,
+    one of the words of `pdtui.core.outcome.Outcome`. A robot whose task is done says ``arrived`` although it
+    may go on: training and scores end there, a drive does not. `outcome_of` says what counts if there is no
+    word. Nobody steps a robot past the end of its episode.
 
     Attributes:
         name: Name in maps, in sessions and on the command line.
@@ -87,6 +83,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         episode_steps: Control steps after which training and scores end an episode.
         scenery: What stands still around the robot: roads, tree trunks, cones. The object stays the same as
             long as the world does, and another replaces it when that changes, as in `reset` and `restore`.
+        outcomes: How its episodes can end by themselves. Tables say so even if none ended that way.
         state_arrays: Names of the Python attributes, all of them arrays, that belong to a robot's state.
     """
 
@@ -103,6 +100,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     training_recipe: TrainingRecipe = TrainingRecipe()
     episode_steps: int = 1000
     scenery: Scenery = NO_SCENERY
+    outcomes: tuple[Outcome, ...] = (Outcome.FELL,)
     state_arrays: tuple[str, ...] = ()
 
     @property
@@ -153,6 +151,14 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     @abstractmethod
     def digest(self) -> int:
         """Return a 63-bit digest of the simulator's state: equal states have equal digests."""
+
+    def outcome_of(self, terminated: bool, truncated: bool, info: Mapping[str, Any]) -> Outcome | None:
+        """Return the outcome of the episode after a step that returned this; None while there is none.
+
+        Raises:
+            RobotError: The word in the info is no outcome.
+        """
+        return outcome_of_step(terminated, truncated, info, self.name)
 
     def set_commands(self, values: Mapping[str, float]) -> bool:
         """Command the policy, from its next observation on, and return whether that is new.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import MapError
+from pdtui.core.outcome import Outcome, is_failure
 
 
 @dataclass(frozen=True)
@@ -20,13 +21,13 @@ class TaskRunTrace:
         attributes: The robot's attributes.
         walked: Their values at each control step before the behavior was latched, shape (W, J).
         values: Their values from then on, shape (T, J), angles unwrapped, up to the end of the episode.
-        fell: Whether the robot fell.
+        outcome: How the episode ended, or that it arrived; None if it went on to the end of the task.
     """
 
     attributes: Sequence[Attribute]
     walked: Floats
     values: Floats
-    fell: bool
+    outcome: Outcome | None = None
 
     def before(self, name: str) -> Floats:
         """Return an attribute before the behavior, shape (W,)."""
@@ -51,8 +52,8 @@ class TaskRunTrace:
         return float(values.mean()) if len(values) else missing
 
     def stays_up(self, steps: int) -> bool:
-        """Return whether the run has that many steps and no fall."""
-        return not self.fell and len(self) >= steps
+        """Return whether the run has that many steps and did not fail."""
+        return not is_failure(self.outcome) and len(self) >= steps
 
 
 @dataclass(frozen=True)

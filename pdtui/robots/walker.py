@@ -11,6 +11,7 @@ from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
+from pdtui.core.outcome import fall_info
 from pdtui.robots.robot import TrainingRecipe, torque_attributes
 from pdtui.robots.simulators.mujoco_robot import (
     MujocoRobot,
@@ -142,7 +143,7 @@ class Walker(MujocoRobot, Walker2dEnv):
         if terminated:
             height, pitch = self.data.qpos[1:3].tolist()
             low, high = self._healthy_z_range
-            info["reason"] = (
+            info |= fall_info(
                 f"fell: leans by {pitch:.2f} rad"
                 if low < height < high
                 else f"fell: torso at {height:.2f} m, outside {low}–{high} m"

@@ -19,6 +19,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.confidence_intervals import PairedRatio, paired_ratio
 from pdtui.core.errors import MapError
+from pdtui.core.outcome import is_failure
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.search.evolutionary_search import Deadline, SharedTimeBudget
@@ -45,8 +46,8 @@ class GainsOnTrial:
 
     Attributes:
         pid: the controller.
-        tracking: its figures; a drive counts until its end or a fall.
-        ratio: its mean |error|, with falls penalised, over that of the controller that is kept, paired by
+        tracking: its figures; a drive counts until its end.
+        ratio: its mean |error|, with failures penalised, over that of the controller that is kept, paired by
             seed; None for that one.
     """
 
@@ -62,7 +63,7 @@ class TunedGains:
     Attributes:
         behavior: name of the behavior.
         trials: the map's controller, the best proportional one and the best one, on the same seeds.
-        kept: which of them fell least, and had the least error among those.
+        kept: which of them failed least, and had the least error among those.
         tried: number of controllers tried.
         ended_early: whether the search ran out of time.
     """
@@ -213,7 +214,10 @@ def _tune_behavior(
     driven, count = runner.run(jobs), len(seeds) - half
     results = {name: driven[row * count :][:count] for row, name in enumerate(pids)}
     costs = {name: np.array([_cost(one, fall) for one in each]) for name, each in results.items()}
-    kept = min(pids, key=lambda name: (sum(one.fell for one in results[name]), float(costs[name].mean())))
+    kept = min(
+        pids,
+        key=lambda name: (sum(is_failure(one.outcome) for one in results[name]), float(costs[name].mean())),
+    )
     trials = {
         name: GainsOnTrial(
             pid,
@@ -226,6 +230,9 @@ def _tune_behavior(
 
 
 def _cost(result: TrackingDriveResult, fall: float) -> float:
-    """Return the mean |error|, where each step after a fall counts as `fall`."""
+    """Return the mean |error|, where each step after a failure counts as `fall`."""
     errors: Floats = np.abs(result.errors)
-    return float(np.where(np.isfinite(errors), errors, fall).mean())
+    known = np.isfinite(errors)
+    if known.any() and not is_failure(result.outcome):
+        return float(errors[known].mean())
+    return float(np.where(known, errors, fall).mean())

@@ -9,9 +9,10 @@ import numpy as np
 
 from pdtui.core.attributes import Floats, unwrap_angles
 from pdtui.core.errors import SimulationDiverged
+from pdtui.core.outcome import Outcome
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy
-from pdtui.robots.robot import Robot, is_fall
+from pdtui.robots.robot import Robot
 from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 
 
@@ -59,7 +60,7 @@ def judge_stimulations(
 def _watch(
     robot: Robot, policy: Policy, task: Task, plan: StimulationWithDuration, walked: list[Floats]
 ) -> TaskRunTrace:
-    observation, fell = robot.observe(), False
+    observation, outcome = robot.observe(), None
     values: list[Floats] = []
     for step in range(task.steps):
         on = plan.steps is None or step < plan.steps
@@ -67,11 +68,11 @@ def _watch(
         try:
             observation, _, terminated, truncated, info = robot.step(acted.action)
         except SimulationDiverged:
-            fell = True
+            outcome = Outcome.DIVERGED
             break
         values.append(robot.read_attributes())
+        outcome = robot.outcome_of(terminated, truncated, info) or outcome
         if terminated or truncated:
-            fell = is_fall(terminated, info)
             break
     rows = np.array(values).reshape(-1, len(robot.attributes))
-    return TaskRunTrace(robot.attributes, np.array(walked), unwrap_angles(rows, robot.attributes), fell)
+    return TaskRunTrace(robot.attributes, np.array(walked), unwrap_angles(rows, robot.attributes), outcome)

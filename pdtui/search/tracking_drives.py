@@ -10,6 +10,7 @@ import numpy as np
 from pdtui.core.attributes import Attribute, Floats, wrap_angle, wrap_angles
 from pdtui.core.closable import Closable
 from pdtui.core.drive_events import DriveEvent
+from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
 from pdtui.core.worker_pool import WorkerPool
 from pdtui.driving.control_loop import ControlLoop
@@ -52,21 +53,21 @@ class TrackingDriveResult:
     Attributes:
         drive: the drive.
         values: the attribute after each control step, shape (targets, `STEPS_EACH`), with angles unwrapped;
-            NaN after a fall.
+            NaN after the end of the episode.
         errors: target − value, the shorter way round for an angle, of the same shape.
         responses: responses to each step of the target, of which the first target is none.
-        fell: whether the robot fell.
+        outcome: how the episode ended, or that the robot arrived; None if it lasted to the end of the drive.
     """
 
     drive: TrackingDriveJob
     values: Floats
     errors: Floats
     responses: tuple[StepResponse, ...]
-    fell: bool
+    outcome: Outcome | None
 
     @property
     def error(self) -> float:
-        """Mean |error| until the end or the fall; NaN if the robot fell before the first target."""
+        """Mean |error| until the end; NaN if the episode ended before the first target."""
         known = np.abs(self.errors[np.isfinite(self.errors)])
         return float(known.mean()) if known.size else float("nan")
 
@@ -138,16 +139,18 @@ def drive_through_targets(template: ControlLoop, drive: TrackingDriveJob) -> Tra
         record = advance()
         if record.ended:
             break
-    fell = record.fell
+    outcome = record.outcome
     if not record.ended:
         path[0] = loop.attributes[column]
         for number in range(len(path) - 1):
             record = advance(_events(loop.step, drive, number))
             path[number + 1] = record.attributes[column]
-            fell = record.fell
+            outcome = record.outcome or outcome
             if record.ended:
                 break
-    return _summarise(drive, path, fell, template.robot.attributes[column].wraps, template.robot.control_dt)
+    return _summarise(
+        drive, path, outcome, template.robot.attributes[column].wraps, template.robot.control_dt
+    )
 
 
 def _events(step: int, drive: TrackingDriveJob, number: int) -> list[DriveEvent]:
@@ -159,7 +162,7 @@ def _events(step: int, drive: TrackingDriveJob, number: int) -> list[DriveEvent]
 
 
 def _summarise(
-    drive: TrackingDriveJob, path: Floats, fell: bool, wraps: bool, dt: float
+    drive: TrackingDriveJob, path: Floats, outcome: Outcome | None, wraps: bool, dt: float
 ) -> TrackingDriveResult:
     smooth = np.unwrap(path) if wraps else path
     values = smooth[1:].reshape(len(drive.targets), STEPS_EACH)
@@ -174,4 +177,4 @@ def _summarise(
         way = drive.targets[row] - start
         aim = start + (wrap_angle(way) if wraps else way)
         responses.append(measure_step_response(start, values[row], aim, step, dt))
-    return TrackingDriveResult(drive, values, errors, tuple(responses), fell)
+    return TrackingDriveResult(drive, values, errors, tuple(responses), outcome)

@@ -10,6 +10,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.confidence_intervals import confidence_interval
 from pdtui.core.errors import MapError
+from pdtui.core.outcome import Outcome, OutcomeCounts, count_outcomes
 from pdtui.search.step_response import StepResponseSummary
 from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveResult, TrackingDriveRunner
 from pdtui.stimulation.stimulation_map import Behavior
@@ -34,7 +35,7 @@ class TargetErrorSummary:
 
 @dataclass(frozen=True)
 class TrackingSummary:
-    """How well a behavior tracks its targets. A drive counts until its end or a fall.
+    """How well a behavior tracks its targets. A drive counts until its end.
 
     Attributes:
         behavior: name of the behavior of mode ``pid``.
@@ -45,7 +46,7 @@ class TrackingSummary:
         error, low, high: mean |error| over seeds with its 95 % interval.
         settled: mean |error| over the last 25 steps of each target.
         responses: rise time and overshoot over all steps of the target and all seeds.
-        falls: number of seeds on which the robot fell.
+        outcomes: how drives ended before their time, and on how many seeds.
         default_error: mean |error| without the controller at the same targets; None if not measured.
     """
 
@@ -59,7 +60,7 @@ class TrackingSummary:
     high: float
     settled: float
     responses: StepResponseSummary
-    falls: int
+    outcomes: OutcomeCounts
     default_error: float | None = None
 
 
@@ -88,13 +89,13 @@ def summarise_tracking(
         high,
         mean_of_finite(table[:, :, -SETTLED:]),
         StepResponseSummary.of([response for one in results for response in one.responses]),
-        sum(one.fell for one in results),
+        count_outcomes((one.outcome for one in results), [Outcome.FELL]),
         default_error,
     )
 
 
 def mean_errors_by_seed(results: Sequence[TrackingDriveResult]) -> Floats:
-    """Return the mean |error| of each drive, shape (seeds,); NaN for a fall before the first target."""
+    """Return the mean |error| of each drive, shape (seeds,); NaN for an end before the first target."""
     return np.array([one.error for one in results])
 
 
@@ -126,7 +127,7 @@ def choose_tracking_targets(
     if not np.isfinite(natural):
         raise MapError(
             f"behavior '{behavior.name}': expected targets near the value without stimulation, but the robot "
-            f"falls before the first one on seeds {list(seeds)}"
+            f"ends its episode before the first one on seeds {list(seeds)}"
         )
     size = max(_PART * abs(natural), behavior.pid.step)
     return tuple(float(f"{natural + count * size:.4g}") for count in _SIZES)

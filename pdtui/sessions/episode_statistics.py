@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from pdtui.core.attributes import Floats
+    from pdtui.core.outcome import Outcome
     from pdtui.sessions.drive_info import DriveInfo
 
 
@@ -24,6 +25,7 @@ class EpisodeStatistics:
         involvement: number of control steps that count as human involvement (`involves_operator`).
         distance: latest value of the robot's attribute ``distance``, m; None if the robot lacks it.
         collisions: sum of the cost of all steps where there are obstacles, else None.
+        outcome: how it ended, or that its task was done; empty while there is no outcome.
     """
 
     episode: int = 0
@@ -31,6 +33,7 @@ class EpisodeStatistics:
     involvement: int = 0
     distance: float | None = None
     collisions: float | None = None
+    outcome: str = ""
 
     @property
     def share(self) -> float:
@@ -84,6 +87,10 @@ class EpisodeStatisticsCounter:
                 if before.collisions is None
                 else before.collisions + float(costs[start:stop].sum()),
             )
+
+    def add_outcome(self, episode: int, outcome: Outcome) -> None:
+        """Note the outcome of an episode; the last word counts."""
+        self._statistics[episode] = replace(self.of(episode), outcome=outcome.value)
 
     def of(self, episode: int) -> EpisodeStatistics:
         """Return the statistics of an episode."""

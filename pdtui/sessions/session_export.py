@@ -113,11 +113,13 @@ def _action_columns(block: StepBlock, _: SessionHeader) -> Columns:
 
 def _reward_columns(block: StepBlock, _: SessionHeader) -> Columns:
     ended = [block.endings.get(step, "") for step in block.steps.tolist()]
+    outcomes = [str(block.outcomes.get(step, "")) for step in block.steps.tolist()]
     return {
         "reward": block.rewards,
         "cost": block.costs,
         "episode": block.episodes,
         "ended": pa.array(ended, pa.utf8()),
+        "outcome": pa.array(outcomes, pa.utf8()),
     }
 
 
@@ -179,7 +181,7 @@ def _name_columns(block: NDArray[Any], names: list[str]) -> Columns:
 STREAMS: dict[str, ExportStream] = {
     "attributes": ExportStream("kinematic attributes after each step", _attribute_columns),
     "actions": ExportStream("what the policy, or during a takeover the operator, commanded", _action_columns),
-    "gains": ExportStream("reward, cost, episode, and why it ended", _reward_columns),
+    "gains": ExportStream("reward, cost, episode, and why and how it ended", _reward_columns),
     "digests": ExportStream("digest of the simulator's state after each step", _digest_columns),
     "activations": ExportStream(
         "output of every hidden unit, as the next layer received it", _activation_columns, activations=True

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import SessionError
+from pdtui.core.outcome import Outcome, OutcomeCounts, count_outcomes
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.rrd.end_index import read_end_index
 from pdtui.sessions.session_header_index import decode_session_index
@@ -28,6 +29,8 @@ class SessionHeader:
         outcome: how the drive ended; empty if the recording was cut off.
         gaps: ranges of control steps that a repair could not rescue, each without its end; the events of a
             session with gaps may be incomplete.
+        outcomes: how episodes ended, or that their task was done and they went on, by the control step. In
+            a session that is older than these words, they are taken from `endings`, where those tell.
     """
 
     path: Path
@@ -39,6 +42,12 @@ class SessionHeader:
     endings: dict[int, str] = field(repr=False)
     outcome: str = ""
     gaps: tuple[tuple[int, int], ...] = ()
+    outcomes: dict[int, Outcome] = field(default_factory=dict, repr=False)
+
+    @property
+    def outcome_counts(self) -> OutcomeCounts:
+        """How often each outcome came about."""
+        return count_outcomes(self.outcomes.values())
 
     @property
     def missing(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import SessionError
+from pdtui.core.outcome import Outcome
 from pdtui.sessions.drive_info import decode_drive_info
+from pdtui.sessions.recorded_outcomes import decode_outcomes
 from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_header import SessionHeader, count_missing
 from pdtui.sessions.session_header_index import decode_event, decode_gaps
-from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, REPAIR, VERSIONS
+from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, OUTCOMES, REPAIR, VERSIONS
 from pdtui.sessions.streams.step_numbers import number_steps
 
 
@@ -26,7 +28,7 @@ def scan_session_header(path: Path) -> SessionHeader:
     Raises:
         SessionError: as `read_session_header`.
     """
-    file = RrdContents(path, entities=(EVENTS, ENDINGS))
+    file = RrdContents(path, entities=(EVENTS, ENDINGS, OUTCOMES))
     try:
         return decode_session_header(file, path, file.skipped_rows[DRIVE])
     except SessionError as error:
@@ -34,7 +36,7 @@ def scan_session_header(path: Path) -> SessionHeader:
 
 
 def decode_session_header(file: RrdContents, path: Path, rows: int) -> SessionHeader:
-    """Return the header of a session of which properties, events and endings were read.
+    """Return the header of a session of which properties, events, endings and outcomes were read.
 
     `rows` is the number of control steps that are there.
     """
@@ -43,8 +45,9 @@ def decode_session_header(file: RrdContents, path: Path, rows: int) -> SessionHe
     gaps = read_gaps(file)
     events = read_events(file.table(EVENTS), complete=not file.properties(REPAIR))
     endings, outcome = read_episode_endings(file.table(ENDINGS)), read_drive_outcome(file)
+    outcomes = read_episode_outcomes(file.table(OUTCOMES), endings)
     steps = rows + count_missing(gaps)
-    return SessionHeader(path, info, versions, created, events, steps, endings, outcome, gaps)
+    return SessionHeader(path, info, versions, created, events, steps, endings, outcome, gaps, outcomes)
 
 
 def find_gaps(steps: NDArray[np.int64], total: int = 0) -> tuple[tuple[int, int], ...]:
@@ -99,6 +102,15 @@ def read_episode_endings(table: EntityTable) -> dict[int, str]:
     if not len(table.steps):
         return {}
     return dict(zip(table.steps.tolist(), table.read_texts("TextLog:text"), strict=True))
+
+
+def read_episode_outcomes(table: EntityTable, endings: Mapping[int, str]) -> dict[int, Outcome]:
+    """Return the outcomes of episodes by control step; a word that is none is a `SessionError`."""
+    words = table.read_texts("outcome") if len(table.steps) else []
+    try:
+        return decode_outcomes(zip(table.steps.tolist(), words, strict=True), endings)
+    except ValueError as error:
+        raise SessionError(f"stream '{OUTCOMES}/outcome': {error}") from error
 
 
 def read_drive_outcome(file: RrdContents) -> str:

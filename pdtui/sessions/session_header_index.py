@@ -9,8 +9,10 @@ from typing import Any
 
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import SessionError
+from pdtui.core.outcome import Outcome
 from pdtui.core.reserved_keys import EVENT_WORDINGS
 from pdtui.sessions.drive_info import decode_drive_info
+from pdtui.sessions.recorded_outcomes import decode_outcomes
 
 _MAX_STEPS = 1 << 40
 
@@ -22,6 +24,7 @@ def build_session_index(
     steps: int,
     events: Sequence[DriveEvent],
     endings: Mapping[int, str],
+    outcomes: Mapping[int, Outcome],
     outcome: str,
     gaps: Sequence[tuple[int, int]] = (),
     summary: Mapping[str, Any] | None = None,
@@ -34,6 +37,7 @@ def build_session_index(
         steps: number of control steps.
         events: the events, in the order in which they were applied.
         endings: why episodes ended by themselves, by the control step that ended each.
+        outcomes: how episodes ended, or that their task was done, by the control step.
         outcome: how the drive ended.
         gaps: ranges of control steps that a repair could not rescue, each without its end.
         summary: the fields of a `SessionSummary`, if it was computed.
@@ -44,6 +48,7 @@ def build_session_index(
         "steps": steps,
         "events": [list(astuple(event)) for event in events],
         "endings": [[step, reason] for step, reason in endings.items()],
+        "outcomes": [[step, outcome.value] for step, outcome in outcomes.items()],
         "outcome": outcome,
         "gaps": [list(gap) for gap in gaps],
         "summary": dict(summary) if summary is not None else None,
@@ -61,13 +66,16 @@ def decode_session_index(index: Mapping[str, Any]) -> dict[str, Any]:
         }
         info, created = decode_drive_info(drive)
         versions = {str(name): str(value) for name, value in index["versions"].items()}
+        endings = {_check_step(step): _check_text(reason) for step, reason in index["endings"]}
+        outcomes = [(_check_step(step), word) for step, word in index.get("outcomes", ())]
         return {
             "info": info,
             "created": created,
             "versions": versions,
             "steps": _check_step(index["steps"]),
             "events": tuple(decode_event(*event) for event in index["events"]),
-            "endings": {_check_step(step): _check_text(reason) for step, reason in index["endings"]},
+            "endings": endings,
+            "outcomes": decode_outcomes(outcomes, endings),
             "outcome": _check_text(index["outcome"]),
             "gaps": decode_gaps(index["gaps"]),
         }

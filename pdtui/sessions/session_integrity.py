@@ -21,11 +21,21 @@ from pdtui.sessions.session_header_decoding import (
     find_gaps,
     read_drive_outcome,
     read_episode_endings,
+    read_episode_outcomes,
     read_events,
     read_gaps,
 )
 from pdtui.sessions.session_header_index import decode_session_index
-from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, ENDINGS, EVENTS, INFO, REPAIR, VERSIONS
+from pdtui.sessions.session_schema import (
+    DIGEST_EPISODE,
+    DRIVE,
+    ENDINGS,
+    EVENTS,
+    INFO,
+    OUTCOMES,
+    REPAIR,
+    VERSIONS,
+)
 
 
 @dataclass(frozen=True)
@@ -143,6 +153,7 @@ def _rescue_header(
     if index:
         versions = versions or index["versions"]
         events, lost_events = index["events"], 0
+    endings = read_episode_endings(file.table(ENDINGS))
     header = SessionHeader(
         path,
         info,
@@ -150,8 +161,9 @@ def _rescue_header(
         created,
         tuple(event for event in events if event.step < total),
         total,
-        read_episode_endings(file.table(ENDINGS)),
+        endings,
         read_drive_outcome(file) or index.get("outcome", ""),
         find_gaps(steps, total),
+        read_episode_outcomes(file.table(OUTCOMES), endings),
     )
     return header, lost_events

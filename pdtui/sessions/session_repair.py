@@ -94,6 +94,7 @@ def _rewrite(path: Path, output: Path, found: SessionIntegrity) -> None:
             steps=header.steps,
             events=header.events,
             endings=header.endings,
+            outcomes=header.outcomes,
             outcome=header.outcome,
             gaps=header.gaps,
         )

@@ -14,6 +14,9 @@ bytes."""
 
 EVENTS = "/events"
 ENDINGS = "/endings"
+OUTCOMES = "/outcomes"
+"""One row per outcome of an episode; a word that ends none has a line for the viewer, too."""
+
 BEHAVIORS = "/behaviors"
 VIEWS = "/view/"
 ROBOT = "/view/robot"

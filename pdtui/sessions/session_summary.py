@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, get_type_hints
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
+from pdtui.core.outcome import Outcome, OutcomeCounts, count_outcomes
 from pdtui.core.step_record import involves_operator
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.episode_statistics import EpisodeStatistics, EpisodeStatisticsCounter
@@ -41,7 +43,7 @@ class SessionSummary:
         steps: number of control steps.
         seconds: simulated time, s.
         episodes: number of episodes that began.
-        falls: number of episodes that ended by themselves.
+        outcomes: how episodes ended, or that their task was done, and how often.
         involvement: number of control steps that count as human involvement (`involves_operator`).
         total_reward, total_cost: sums over all steps, including those that were rewound.
         stimulated: number of control steps in which units were overwritten.
@@ -53,7 +55,7 @@ class SessionSummary:
     steps: int
     seconds: float
     episodes: int
-    falls: int
+    outcomes: OutcomeCounts
     involvement: int
     total_reward: float
     total_cost: float
@@ -79,6 +81,7 @@ class SessionSummaryCounter:
         self._pending: list[tuple[NDArray[Any], ...]] = []
         self._rows = 0
         self._steps = self._involvement = self._stimulated = self._taken_over = 0
+        self._outcomes: list[tuple[int, Outcome]] = []
         self._last_episode = -1
         self._reward = self._cost = 0.0
 
@@ -92,6 +95,7 @@ class SessionSummaryCounter:
         involved: NDArray[np.bool_],
         stimulated: NDArray[np.bool_],
         taken_over: NDArray[np.bool_],
+        outcomes: Iterable[tuple[int, Outcome]] = (),
     ) -> None:
         """Add n control steps in their order. The counter keeps the arrays, which must not be changed.
 
@@ -101,21 +105,25 @@ class SessionSummaryCounter:
             involved: whether each step counts as human involvement, shape (n,).
             stimulated: whether units were overwritten in each step, shape (n,).
             taken_over: whether the operator set a component of the action of each step, shape (n,).
+            outcomes: the outcomes that came about, each after the number of its episode.
         """
+        self._outcomes += outcomes
         self._pending.append((attributes, rewards, costs, episodes, involved, stimulated, taken_over))
         self._rows += len(rewards)
         if self._rows >= _COUNTED_AT_ONCE:
             self._count_pending()
 
-    def summary(self, falls: int) -> SessionSummary:
-        """Return the statistics so far, of which `falls` episodes ended by themselves."""
+    def summary(self) -> SessionSummary:
+        """Return the statistics so far."""
         self._count_pending(all_rows=True)
+        for episode, outcome in self._outcomes:
+            self._statistics.add_outcome(episode, outcome)
         rows = zip(self._info.attributes, self._moments.mean, self._moments.deviation, strict=True)
         return SessionSummary(
             steps=self._steps,
             seconds=self._steps * self._info.dt,
             episodes=self._last_episode + 1,
-            falls=falls,
+            outcomes=count_outcomes(outcome for _, outcome in self._outcomes),
             involvement=self._involvement,
             total_reward=self._reward,
             total_cost=self._cost,
@@ -169,7 +177,7 @@ def read_session_summary(session: SessionHeader) -> SessionSummary:
     index = read_end_index(session.path) or {}
     try:
         return _decode_summary(index["summary"])
-    except (KeyError, TypeError):
+    except (KeyError, TypeError, AttributeError):
         return summarise_session(session)
 
 
@@ -194,18 +202,30 @@ def summarise_session(session: SessionHeader) -> SessionSummary:
             involved=involves_operator(np.isin(block.steps, keyed), taken_over),
             stimulated=block.stimulated_counts > 0,
             taken_over=taken_over,
+            outcomes=[
+                (int(block.episodes[np.searchsorted(block.steps, step)]), outcome)
+                for step, outcome in block.outcomes.items()
+            ],
         )
-    return counter.summary(len(session.endings))
+    return counter.summary()
+
+
+def _decode_counts(counts: dict[str, Any]) -> OutcomeCounts:
+    known = {outcome.value: outcome for outcome in Outcome}
+    if not all(isinstance(count, int) for count in counts.values()):
+        raise TypeError("outcomes are not as expected")
+    return {known[word]: count for word, count in counts.items()}
 
 
 def _decode_summary(fields: dict[str, Any]) -> SessionSummary:
     """Return a summary from the index; fields that are not as expected are a `KeyError` or a `TypeError`."""
     tallies = tuple(EpisodeStatistics(**tally) for tally in fields["tallies"])
     attributes = tuple(AttributeSummary(**attribute) for attribute in fields["attributes"])
-    summary = SessionSummary(**{**fields, "tallies": tallies, "attributes": attributes})
+    parts = {"tallies": tallies, "attributes": attributes, "outcomes": _decode_counts(fields["outcomes"])}
+    summary = SessionSummary(**{**fields, **parts})
     for item in (summary, *tallies, *attributes):
         for name, value in vars(item).items():
             wanted = get_type_hints(type(item))[name]
-            if name not in ("tallies", "attributes") and not isinstance(value, _ALLOWED[wanted]):
+            if name not in parts and not isinstance(value, _ALLOWED[wanted]):
                 raise TypeError(f"{name} is not as expected")
     return summary

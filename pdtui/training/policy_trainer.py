@@ -15,10 +15,11 @@ import torch
 from numpy.typing import NDArray
 
 from pdtui.core.errors import SimulationDiverged
+from pdtui.core.outcome import Outcome, is_failure
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import save_network
 from pdtui.robots import make_robot
-from pdtui.robots.robot import Robot, is_fall
+from pdtui.robots.robot import Robot
 from pdtui.training.multilayer_perceptron import ACTIVATIONS, MlpParameters, apply_mlp
 from pdtui.training.robot_batch import RobotBatch
 from pdtui.training.training_checkpoint import load_checkpoint, save_checkpoint
@@ -33,13 +34,14 @@ Config = TypeVar("Config", bound=TrainingConfig)
 
 @dataclass(frozen=True)
 class ActorScore:
-    """What an actor reaches: means over episodes, and the number of falls."""
+    """What an actor reaches: means over episodes, and how many failed (falls, for a walker) and arrived."""
 
     episodes: int
     mean_return: float
     std_return: float
     mean_speed: float
     falls: int
+    arrivals: int = 0
 
     @property
     def steadiness(self) -> float:
@@ -51,20 +53,27 @@ def score_actor(robots: Sequence[Robot], actor: Actor, seeds: range, steps: int)
     """Run one episode per seed with an actor, one on every robot at a time."""
     groups = [seeds[first : first + len(robots)] for first in range(0, len(seeds), len(robots))]
     runs = [_run_episodes(robots[: len(group)], actor, group, steps) for group in groups]
-    returns, speeds, fallen = (np.concatenate(column) for column in zip(*runs, strict=True))
+    returns, speeds = (np.concatenate(column) for column in list(zip(*runs, strict=True))[:2])
+    outcomes = [outcome for _, _, group in runs for outcome in group]
     return ActorScore(
-        len(seeds), float(returns.mean()), float(returns.std()), float(speeds.mean()), int(fallen.sum())
+        len(seeds),
+        float(returns.mean()),
+        float(returns.std()),
+        float(speeds.mean()),
+        sum(map(is_failure, outcomes)),
+        outcomes.count(Outcome.ARRIVED),
     )
 
 
 def _run_episodes(
     robots: Sequence[Robot], actor: Actor, seeds: range, steps: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return return, mean speed and whether the robot fell for the episode of each seed."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], list[Outcome | None]]:
+    """Return return, mean speed and outcome of the episode of each seed."""
     observations = np.array([robot.reset(seed=s)[0] for robot, s in zip(robots, seeds, strict=True)])
     speed_column = robots[0].attribute_index("speed")
     returns, speeds, lengths = np.zeros(len(robots)), np.zeros(len(robots)), np.zeros(len(robots))
-    fallen, over = np.zeros(len(robots), bool), np.zeros(len(robots), bool)
+    outcomes: list[Outcome | None] = [None] * len(robots)
+    over = np.zeros(len(robots), bool)
     for _ in range(steps):
         if over.all():
             break
@@ -74,15 +83,15 @@ def _run_episodes(
             try:
                 observation, reward, terminated, truncated, info = robot.step(actions[index])
             except SimulationDiverged:
-                fallen[index] = over[index] = True
+                outcomes[index], over[index] = Outcome.DIVERGED, True
                 continue
             observations[index] = observation
             returns[index] += float(reward)
             speeds[index] += float(robot.read_attributes()[speed_column])
             lengths[index] += 1
-            fallen[index] = is_fall(terminated, info)
-            over[index] = terminated or truncated or info.get("finished", False)
-    return returns, speeds / np.maximum(lengths, 1), fallen
+            outcomes[index] = robot.outcome_of(terminated, truncated, info)
+            over[index] = outcomes[index] is not None
+    return returns, speeds / np.maximum(lengths, 1), outcomes
 
 
 def make_numpy_actor(
@@ -236,4 +245,5 @@ class PolicyTrainer(ABC, Generic[Config]):
     def _best_score(self) -> ActorScore | None:
         if self.best is None:
             return None
-        return ActorScore(**{name: self.best[name] for name in ActorScore.__dataclass_fields__})
+        known = ActorScore.__dataclass_fields__.keys() & self.best.keys()  # older ones lack the arrivals
+        return ActorScore(**{name: self.best[name] for name in known})

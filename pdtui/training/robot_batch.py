@@ -72,8 +72,8 @@ class RobotBatch:
                 terminated, truncated = True, False
             self.ages[index] += 1
             after[index], reward[index], discount[index] = observation, float(gained), float(not terminated)
-            over = self.ages[index] >= robot.episode_steps or info.get("finished", False)
-            self.restarted[index] = terminated or truncated or over
+            outcome = robot.outcome_of(terminated, truncated, info)
+            self.restarted[index] = outcome is not None or self.ages[index] >= robot.episode_steps
             if self.restarted[index]:
                 observation, self.ages[index] = robot.reset()[0], 0
             self.observations[index] = observation

@@ -10,6 +10,7 @@ import pytest
 
 from pdtui.core.drive_events import DriveEvent, group_events_by_step
 from pdtui.core.errors import KeystrokeError
+from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.policies.runtime.policy import Policy
@@ -87,7 +88,7 @@ def test_a_fall_starts_the_next_episode_and_clears_the_behaviors(
     qpos[3:7] = 0, 1, 0, 0
     robot.set_state(qpos, np.zeros(14))  # type: ignore[attr-defined]
     fallen = loop.advance()
-    assert fallen.ended == "fell: on its back"
+    assert (fallen.ended, fallen.outcome) == ("fell: on its back", Outcome.FELL)
     following = loop.advance()
     assert (fallen.episode, following.episode) == (0, 1)
     assert following.behaviors == ()
@@ -99,7 +100,7 @@ def test_a_divergence_leaves_a_record(policy: Policy, small_map: StimulationMap)
     loop.advance()
     loop.robot.data.qvel[:] = 1e9  # type: ignore[attr-defined]
     records = _drive(loop, 1)
-    while not records[-1].diverged:
+    while records[-1].outcome is not Outcome.DIVERGED:
         records += _drive(loop, 1)
         assert len(records) < 20
     assert "the simulation diverged" in records[-1].ended

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.attributes import AimDirection, Attribute, BehaviorAim
+from pdtui.core.outcome import Outcome, is_failure
 from pdtui.evaluation.behavior_criteria import JudgedRun, choose_criterion
 from pdtui.evaluation.held_run import HeldRunTrace
 from pdtui.evaluation.protocol_settings import RunTimes
@@ -27,7 +28,8 @@ def _run(
     vy: float = 0.0,
     turn: float = 0.0,
     turns_for: float = 99.0,
-    fell_at: int | None = None,
+    ended_at: int | None = None,
+    outcome: Outcome = Outcome.FELL,
 ) -> HeldRunTrace:
     """A run at a constant velocity that turns for a while."""
     seconds = (np.arange(TIMES.bins) + 0.5) * TIMES.bin_seconds
@@ -35,7 +37,8 @@ def _run(
     yaw = turn * np.minimum(seconds, turns_for)
     ones = np.ones(TIMES.bins)
     values = np.column_stack([vx * ones, vy * ones, np.hypot(vx, vy) * ones, yaw, rate, 0.6 * ones])
-    return HeldRunTrace(values, np.column_stack([vx * seconds, vy * seconds]), fell_at)
+    places = np.column_stack([vx * seconds, vy * seconds])
+    return HeldRunTrace(values, places, None if ended_at is None else outcome, ended_at)
 
 
 def _met(name: str, attribute: str, direction: AimDirection, run: HeldRunTrace) -> bool:
@@ -47,8 +50,11 @@ def test_a_spin_is_two_full_turns_and_need_not_last() -> None:
     assert _met("spin left", "yaw rate", "increase", _run(turn=0.6, turns_for=22.0))
     assert not _met("spin left", "yaw rate", "increase", _run(turn=0.6, turns_for=20.0))
     assert not _met("spin right", "yaw rate", "decrease", _run(turn=0.6))
-    assert not _met("spin left", "yaw rate", "increase", _run(turn=0.6, fell_at=999))
-    assert _met("spin left", "yaw rate", "increase", _run(turn=0.6, fell_at=1000))
+    assert not _met("spin left", "yaw rate", "increase", _run(turn=0.6, ended_at=999))
+    assert _met("spin left", "yaw rate", "increase", _run(turn=0.6, ended_at=1000))
+    for outcome in Outcome:
+        ended = _run(turn=0.6, ended_at=999, outcome=outcome)
+        assert _met("spin left", "yaw rate", "increase", ended) == (not is_failure(outcome))
 
 
 def test_left_is_a_heading_that_goes_on_turning() -> None:

@@ -12,6 +12,7 @@ from scipy import stats
 
 from pdtui.core.confidence_intervals import confidence_interval
 from pdtui.core.errors import MapError, WorkerError
+from pdtui.core.outcome import Outcome
 from pdtui.core.printable_text import to_json
 from pdtui.core.text_tables import format_mean_with_interval
 from pdtui.core.units import Stimulation
@@ -80,10 +81,11 @@ def test_effects_are_paired_differences_while_the_behavior_is_held(
         assert window.default == pytest.approx(default[:, part].mean())
         assert window.low <= window.effect <= window.high
         assert window.p_value >= 2 / 2**3
+    assert row.outcomes == row.default_outcomes == {Outcome.FELL: 0}
     assert not row.holds  # three seeds cannot tell
     assert (row.attribute, row.unit, row.condition) == ("vy", "m/s", "undisturbed")
     assert result.measured_effects()["push"] == MeasuredEffect(
-        row.last.effect, row.last.low, row.last.high, row.falls, 3
+        row.last.effect, row.last.low, row.last.high, 0, 3
     )
 
 
@@ -175,4 +177,4 @@ def test_walking_sums_up_whole_episodes(config: DriveConfig, policy: Policy) -> 
     assert result.mean_return == pytest.approx(total)
     assert result.mean_speed == pytest.approx(np.mean(speeds))
     assert result.net_speed == pytest.approx(np.linalg.norm(robot.read_poses()[0, :2] - start) / 2.5)
-    assert result.finished == 1
+    assert result.outcomes == {Outcome.FELL: 0, Outcome.OUT_OF_TIME: 1}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.attributes import Attribute, BehaviorAim, Floats
+from pdtui.core.outcome import Outcome
 from pdtui.evaluation.effect_figures import (
     count_back_to_gait,
     measure_side_effects,
@@ -21,12 +22,14 @@ TIMES = RunTimes(press=100, held=1000, after=100, window=100, bin=5, dt=0.05)
 ATTRIBUTES = (Attribute("speed", "m/s"), Attribute("yaw", "rad", wraps=True), Attribute("height", "m"))
 
 
-def _trace(speed: Floats, fell_at: int | None = None) -> HeldRunTrace:
+def _trace(speed: Floats, ended_at: int | None = None) -> HeldRunTrace:
     bins = np.arange(TIMES.bins)
     values = np.column_stack([speed, 0.1 * bins, 0.6 + 0.01 * np.sin(bins)])
-    if fell_at is not None:
-        values[max(0, fell_at // TIMES.bin) :] = np.nan
-    return HeldRunTrace(values, np.zeros((TIMES.bins, 2)), fell_at)
+    if ended_at is not None:
+        values[max(0, ended_at // TIMES.bin) :] = np.nan
+    return HeldRunTrace(
+        values, np.zeros((TIMES.bins, 2)), None if ended_at is None else Outcome.FELL, ended_at
+    )
 
 
 def _step(effect: float, start: float, end: float) -> Floats:
@@ -75,7 +78,7 @@ def test_windows_compare_the_same_seeds_and_a_fall_counts_as_no_effect() -> None
     assert first.default == pytest.approx(5.5)
     assert first.p_value == 2 / 2**4
     assert (last.effect, last.p_value) == (0.0, 1.0)
-    fallen = [_trace(np.full(TIMES.bins, 1.0), fell_at=0), *slowed[1:]]
+    fallen = [_trace(np.full(TIMES.bins, 1.0), ended_at=0), *slowed[1:]]
     assert window_effect(fallen, usual, 0, TIMES.first_bins).effect == pytest.approx(-3.0 * 3 / 4)
 
 
@@ -89,7 +92,7 @@ def test_side_effects_are_in_standard_deviations_of_the_walk() -> None:
 
 def test_a_run_is_back_if_its_last_two_seconds_look_like_the_usual_gait() -> None:
     usual = [_trace(5.0 + 0.3 * np.sin(np.arange(TIMES.bins) + seed)) for seed in range(5)]
-    slow = [_trace(np.full(TIMES.bins, 3.0)), _trace(np.full(TIMES.bins, 5.0), fell_at=1050)]
+    slow = [_trace(np.full(TIMES.bins, 3.0)), _trace(np.full(TIMES.bins, 5.0), ended_at=1050)]
     assert count_back_to_gait(usual, usual, ATTRIBUTES, 0) == 5
     assert count_back_to_gait(slow, usual, ATTRIBUTES, 0) == 0
 

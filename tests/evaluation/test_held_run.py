@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
+from pdtui.core.outcome import Outcome
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
@@ -51,7 +52,8 @@ def test_a_trace_has_means_over_bins_from_the_press_on(loop: ControlLoop) -> Non
     column = loop.robot.attribute_index("vy")
     assert trace.values[:, column] == pytest.approx(rows[20:, column].reshape(6, 5).mean(axis=1))
     assert trace.places[2] == pytest.approx(records[34].poses[0, :2])
-    assert not trace.fell
+    assert trace.outcome is None
+    assert trace.ended_at is None
 
 
 def test_a_recorded_run_is_the_run_and_replays(loop: ControlLoop, tmp_path: Path) -> None:
@@ -82,13 +84,14 @@ class _Tipping(Vehicle):
         return observation, reward, self.steps == self.tips_in, truncated, info
 
 
-@pytest.mark.parametrize(("step", "fell_at"), [(11, -10), (21, 0), (50, 29), (51, None)])
-def test_a_fall_is_counted_from_the_press_and_ends_the_trace(step: int, fell_at: int | None) -> None:
+@pytest.mark.parametrize(("step", "ended_at"), [(11, -10), (21, 0), (50, 29), (51, None)])
+def test_a_fall_is_counted_from_the_press_and_ends_the_trace(step: int, ended_at: int | None) -> None:
     standing = turning_loop()
     tipping = ControlLoop(_Tipping(step), standing.policy, standing.map, 0)
     for name in ("turn", ""):
         trace = run_held_behavior(tipping, HeldRunPlan(name, 1, TIMES))
-        assert trace.fell_at == fell_at
+        assert trace.ended_at == ended_at
+        assert trace.outcome == (None if ended_at is None else Outcome.FELL)
         assert np.isfinite(trace.values[:, 0]).sum() == max(0, min(50, step) - 20) // 5
 
 

@@ -152,7 +152,7 @@ def require_all_but(path: Path, original: OriginalSession, messages: Sequence[in
         raise FalseReport(f"{before.steps} steps were recorded; {total} are said, without a gap at the end")
     if session.events != tuple(event for event in before.events if event.step < total):
         raise StepsLost("events are missing")
-    for name in ("info", "versions", "created") + (() if cut else ("outcome", "endings")):
+    for name in ("info", "versions", "created") + (() if cut else ("outcome", "endings", "outcomes")):
         if getattr(session, name) != getattr(before, name):
             raise StepsLost(f"{name} is {getattr(session, name)}, was {getattr(before, name)}")
     return before.steps - len(left)

@@ -23,7 +23,7 @@ def test_anymal_follows_what_a_seed_draws() -> None:
     assert result.exit_code == 0, result.output
     data = json.loads(result.output)
     assert [row["command"] for row in data["commands"]] == ["forward", "lateral", "yaw rate"]
-    assert data["finished"] == 1
+    assert data["outcomes"] == {"fell": 0, "out of time": 1}
     for row, (low, high) in zip(data["commands"], ((-0.3, 1.4), (-0.3, 0.3), (-1.0, 1.0)), strict=True):
         assert low <= row["asked"][0] <= high
         assert 0 < row["bias"] <= row["error"] < 0.25

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from pdtui.cli import main
 from pdtui.core.errors import MapError
+from pdtui.core.outcome import Outcome
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.paper.heading_precision import compare_heading_precision, paired_error_ratio
 from pdtui.paper.tracking_experiment import heading_precision_table
@@ -58,9 +59,8 @@ pid = {{attribute = "yaw", kp = 20.0, ki = 0.01, kd = 0.0, limit = 3.5, step = 0
 
 def _followed(seed: int, errors: list[float]) -> TrackingDriveResult:
     table = np.array([errors])
-    return TrackingDriveResult(
-        TrackingDriveJob("yaw", "hold", seed, (0.0,)), -table, table, (), bool(np.isnan(table).any())
-    )
+    outcome = Outcome.FELL if np.isnan(table).any() else None
+    return TrackingDriveResult(TrackingDriveJob("yaw", "hold", seed, (0.0,)), -table, table, (), outcome)
 
 
 @pytest.mark.skipif(not REFERENCE.is_file(), reason="the paper authors' weights (../shared) are not here")
@@ -80,7 +80,7 @@ def test_a_unit_steers_the_authors_policy_as_its_command_does(tmp_path: Path) ->
     assert unit.ratio is not None
     assert unit.ratio.value == pytest.approx(unit.tracking.error / command.tracking.error)
     for row in result.rows:
-        assert row.tracking.falls == 0
+        assert row.tracking.outcomes == {Outcome.FELL: 0}
         assert row.headings.shape == (1, 2 * STEPS_EACH)
         assert row.headings[0, -1] == pytest.approx(0.4, abs=0.1)
         assert row.tracking.error == pytest.approx(
@@ -113,8 +113,7 @@ def test_a_drive_counts_until_its_fall() -> None:
         fell, held = runner.run(
             [TrackingDriveJob("yaw", name, 100, (0.0, 1.2, 0.0)) for name in ("hold heading", "")]
         )
-    assert fell.fell
-    assert not held.fell
+    assert (fell.outcome, held.outcome) == (Outcome.FELL, None)
     known = np.isfinite(fell.errors.ravel())
     assert 0 < known.sum() < 3 * STEPS_EACH
     assert not known[known.sum() :].any()

@@ -9,6 +9,7 @@ import pytest
 
 from pdtui.api import dissect
 from pdtui.core.errors import RobotError
+from pdtui.core.outcome import Outcome
 from pdtui.core.units import Stimulation
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_journal import RolloutJournal
@@ -65,8 +66,9 @@ def test_starts_that_differ_only_in_their_random_generator_are_two(policy_file: 
         assert len(journal) == pool.rollouts == 4
 
 
-def test_outcomes_keep_every_bit(tmp_path: Path) -> None:
-    outcome = RolloutOutcome(np.array([1 / 3, np.nan, -0.0]), float("nan"), 7, True)
+@pytest.mark.parametrize("end", [None, *Outcome])
+def test_outcomes_keep_every_bit(tmp_path: Path, end: Outcome | None) -> None:
+    outcome = RolloutOutcome(np.array([1 / 3, np.nan, -0.0]), float("nan"), 7, end)
     with RolloutJournal(tmp_path / "rollouts", "one") as journal:
         journal.write([b"key"], [outcome])
     with RolloutJournal(tmp_path / "rollouts", "one") as journal:
@@ -75,7 +77,7 @@ def test_outcomes_keep_every_bit(tmp_path: Path) -> None:
     assert known is not None
     assert known.means.tobytes() == outcome.means.tobytes()
     assert np.isnan(known.error)
-    assert (known.steps_survived, known.fell) == (7, True)
+    assert (known.steps_survived, known.outcome) == (7, end)
 
 
 def test_a_file_that_is_no_journal_is_named(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.errors import MapError
+from pdtui.core.outcome import Outcome
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.search.gain_search import TuningSettings, gains_from_point, point_from_gains, sample_gain_points
 from pdtui.search.gain_tuning import ANGLE_STEPS, FARTHEST_ANGLE, draw_angle_targets, tune_gains
@@ -33,7 +34,7 @@ def test_bad_gains_get_better_and_the_same_arguments_give_the_same_ones() -> Non
     assert after.tracking.error < 0.6 * before.tracking.error
     assert after.tracking.responses.unrisen < before.tracking.responses.unrisen
     assert {trial.tracking.seeds for trial in result.trials.values()} == {(2002, 2003)}
-    assert after.tracking.falls == 0
+    assert after.tracking.outcomes == {Outcome.FELL: 0}
     assert before.ratio is not None
     assert before.ratio.value == pytest.approx(before.tracking.error / after.tracking.error)
     (again,) = tune_gains(turning_loop(kp=0.3), ["hold heading"], SEEDS, settings=SMALL)
@@ -55,8 +56,8 @@ def test_where_a_proportional_controller_wins_it_is_kept_and_the_verdict_says_so
 
 def test_gains_that_make_it_fall_are_limited() -> None:
     (result,) = tune_gains(turning_loop(kp=20.0, limit=4.0), ["hold heading"], SEEDS, settings=SMALL)
-    assert result.trials["map"].tracking.falls == 2
-    assert result.trials[result.kept].tracking.falls == 0
+    assert result.trials["map"].tracking.outcomes == {Outcome.FELL: 2}
+    assert result.trials[result.kept].tracking.outcomes == {Outcome.FELL: 0}
     assert result.better
     assert result.gains.limit < 3.0
 

@@ -7,6 +7,7 @@ import pytest
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import MapError
+from pdtui.core.outcome import Outcome
 from pdtui.core.units import Stimulation
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
@@ -24,7 +25,9 @@ A1_FEET = tuple(f"{leg} contact" for leg in ("front right", "front left", "rear 
 def _trace(
     names: tuple[str, ...], walked: list[list[float]], values: Floats, *, fell: bool = False
 ) -> TaskRunTrace:
-    return TaskRunTrace([Attribute(name, "") for name in names], np.array(walked), values, fell)
+    return TaskRunTrace(
+        [Attribute(name, "") for name in names], np.array(walked), values, Outcome.FELL if fell else None
+    )
 
 
 def _walker(vx: Floats, right: Floats, left: Floats, *, fell: bool = False) -> TaskRunTrace:

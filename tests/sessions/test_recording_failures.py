@@ -15,6 +15,7 @@ import pytest
 import rerun as rr
 
 from pdtui.core.errors import SessionError
+from pdtui.core.outcome import Outcome
 from pdtui.sessions.drive_info import decode_drive_info, encode_drive_info
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
@@ -85,13 +86,14 @@ def test_a_diverged_step_is_kept_with_its_reason(recorded: Recorded, tmp_path: P
         attributes=np.full_like(records[1].attributes, np.nan),
         poses=np.full_like(records[1].poses, np.nan),
         ended="the simulation diverged at 0.05 s",
-        diverged=True,
+        outcome=Outcome.DIVERGED,
     )
     with SessionRecorder(tmp_path / "a.rrd", loop.info) as recorder:
         recorder.write(records[0])
         recorder.write(lost)
     session = read_session(tmp_path / "a.rrd")
     assert session.endings == {1: "the simulation diverged at 0.05 s"}
+    assert session.outcomes == {1: Outcome.DIVERGED}
     assert np.isnan(session.attributes[1]).all()
 
 

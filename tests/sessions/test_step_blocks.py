@@ -126,7 +126,7 @@ def test_the_summary_does_not_depend_on_the_size_of_the_blocks(recorded: Recorde
                 stimulated=np.array([bool(one.stimulation.units) for one in rows]),
                 taken_over=np.zeros(len(rows), bool),
             )
-        summaries.append(counter.summary(falls=0))
+        summaries.append(counter.summary())
     assert all(asdict(one) == asdict(summaries[0]) for one in summaries)
     session, summary = read_session(path), summarise_session(read_session_header(path))
     assert summary.involvement == len(keyed)

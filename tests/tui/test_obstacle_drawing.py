@@ -99,3 +99,17 @@ async def test_counters_are_whole_at_every_size(
         await pilot.pause(0.05)
         assert f"{snapshots[1].involvement} steps with a key" in notice(app)
         assert "collisions" not in shown(app.query_one("#notice"))
+
+
+async def test_arrivals_and_cost_are_in_the_status_line_of_a_robot_that_has_them(
+    make_app: MakeApp, drive: Drive
+) -> None:
+    facts, snapshots = drive
+    app, connection = make_app([facts, replace(snapshots[0], arrivals=2, cost=3.5)])
+    async with app.run_test(size=(120, 30)) as pilot:
+        await played(pilot, connection)
+        assert "arrived 2  cost 3.5  involvement" in shown(app.query_one("#status"))
+        connection.messages.append(snapshots[1])
+        await played(pilot, connection)
+        assert "arrived" not in shown(app.query_one("#status"))
+        assert "cost" not in shown(app.query_one("#status"))

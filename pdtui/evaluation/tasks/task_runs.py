@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pdtui.core.attributes import unwrap_angles
+from pdtui.core.outcome import Outcome
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.evaluation.disturbance_conditions import UNDISTURBED, find_condition
 from pdtui.evaluation.evaluation_plan import MEASURED_SEEDS, EvaluationPlan, SubstituteKind
@@ -62,13 +63,13 @@ class TaskRunResult:
 
     Attributes:
         verdict: The verdict on the task.
-        fell: Whether the robot fell.
+        outcome: How the episode ended, or that it arrived; None if it lasted as long as planned.
         still: The verdict on the end of a long hold; None for a run without.
         began: Whether the run came as far as the press, with what is done before done.
     """
 
     verdict: TaskVerdict
-    fell: bool
+    outcome: Outcome | None
     still: TaskVerdict | None = None
     began: bool = True
 
@@ -101,7 +102,7 @@ def list_task_runs(plan: EvaluationPlan) -> list[TaskRunKey]:
 
 
 def count_task_steps(plan: EvaluationPlan, run: TaskRunKey) -> int:
-    """Return how many control steps a run of a task has; a fall makes it fewer."""
+    """Return how many control steps a run of a task has; an episode that ends early makes it fewer."""
     return _press_step(plan.loop, run) + run.steps
 
 
@@ -179,21 +180,21 @@ def run_task_episode(built: ControlLoop, episode: TaskEpisode) -> TaskRunResult:
         before = loop.attributes
         records = list(driven)
     rows = np.array([before, *(record.attributes for record in records)])
-    fell = records[-1].fell
+    outcome = next((record.outcome for record in reversed(records) if record.outcome), None)
     if len(rows) <= press + 1:
-        return TaskRunResult(TaskVerdict(False, 0.0, {}), fell, began=not run.after)
+        return TaskRunResult(TaskVerdict(False, 0.0, {}), outcome, began=not run.after)
     if run.after:
         walk = episode.plan.earlier[0][0]
         done = unwrap_angles(rows[walk + 1 : press + 1], attributes)
-        first = _task_of(built, run.after).judge(TaskRunTrace(attributes, rows[: walk + 1], done, fell=False))
+        first = _task_of(built, run.after).judge(TaskRunTrace(attributes, rows[: walk + 1], done))
         if not first.success:
-            return TaskRunResult(TaskVerdict(False, 0.0, {}), fell, began=False)
+            return TaskRunResult(TaskVerdict(False, 0.0, {}), outcome, began=False)
     after = unwrap_angles(rows[press + 1 :], attributes)
     at_once = after[: task.steps]
-    fell_at_once = fell and len(after) <= task.steps
-    verdict = task.judge(TaskRunTrace(attributes, rows[: press + 1], at_once, fell_at_once))
+    outcome_at_once = outcome if len(after) <= task.steps else None
+    verdict = task.judge(TaskRunTrace(attributes, rows[: press + 1], at_once, outcome_at_once))
     if run.steps == task.steps:
-        return TaskRunResult(verdict, fell)
-    whole = not fell and len(after) == run.steps
-    still = task.judge(TaskRunTrace(attributes, rows[: press + 1], after[-task.steps :], not whole))
-    return TaskRunResult(verdict, fell, still)
+        return TaskRunResult(verdict, outcome)
+    # An episode that ended early without failing is judged by its last part.
+    still = task.judge(TaskRunTrace(attributes, rows[: press + 1], after[-task.steps :], outcome))
+    return TaskRunResult(verdict, outcome, still)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
+from pdtui.core.outcome import OutcomeCounts, count_outcomes
 from pdtui.evaluation.disturbance_conditions import UNDISTURBED
 from pdtui.evaluation.evaluation_plan import EvaluationPlan
 from pdtui.evaluation.paired_statistics import holm_correction, share_interval, sign_flip_p_value
@@ -29,7 +31,7 @@ class TaskSubstituteSuccess:
         low, high: 95 % interval of the share `as_good` of `draws` (Clopper and Pearson).
         done: Runs with success, of `draws` × `seeds`.
         own_done: Number of these seeds on which the behavior succeeds.
-        falls: Runs in which the robot fell, of `draws` × `seeds`.
+        outcomes: How runs ended before their time, of `draws` × `seeds`.
     """
 
     kind: str
@@ -40,7 +42,7 @@ class TaskSubstituteSuccess:
     high: float
     done: int
     own_done: int
-    falls: int
+    outcomes: OutcomeCounts
 
 
 @dataclass(frozen=True)
@@ -61,8 +63,8 @@ class TaskEvaluation:
         holds: Whether it succeeds more often than by itself, and `corrected` is below the level.
         still_done: Number of seeds on which it also succeeds at the end of a long hold; None for a behavior
             with a period, and for a disturbed condition.
-        falls: Number of seeds on which the robot fell with the behavior, in the task or in the long hold.
-        falls_by_itself: Number of seeds on which it fell without it.
+        outcomes: How runs with the behavior ended before their time, in the task or in the long hold.
+        outcomes_by_itself: How those without it did.
         seed_done: Whether each seed succeeds with the behavior, in the order of the seeds.
         seed_scores: How near each seed comes to that, by the task's judge.
         figures: The task's measures with the behavior, means over seeds.
@@ -85,8 +87,8 @@ class TaskEvaluation:
     corrected: float
     holds: bool
     still_done: int | None
-    falls: int
-    falls_by_itself: int
+    outcomes: OutcomeCounts
+    outcomes_by_itself: OutcomeCounts
     seed_done: tuple[bool, ...]
     seed_scores: tuple[float, ...]
     figures: dict[str, float]
@@ -147,17 +149,23 @@ def _summarise(
         corrected=p_value,
         holds=False,
         still_done=_count_still_done(pressed),
-        falls=sum(one.fell for one in pressed),
-        falls_by_itself=sum(one.fell for one in untouched),
+        outcomes=_count(plan, pressed),
+        outcomes_by_itself=_count(plan, untouched),
         seed_done=tuple(done),
         seed_scores=tuple(one.verdict.score for one in pressed),
         figures=average_figures(one.verdict for one in pressed),
         figures_by_itself=average_figures(one.verdict for one in untouched),
-        substitutes=_summarise_substitutes(done, own),
+        substitutes=_summarise_substitutes(plan, done, own),
     )
 
 
-def _summarise_substitutes(done: Sequence[bool], own: TaskResults) -> tuple[TaskSubstituteSuccess, ...]:
+def _count(plan: EvaluationPlan, results: Iterable[TaskRunResult]) -> OutcomeCounts:
+    return count_outcomes((one.outcome for one in results), plan.loop.robot.outcomes)
+
+
+def _summarise_substitutes(
+    plan: EvaluationPlan, done: Sequence[bool], own: TaskResults
+) -> tuple[TaskSubstituteSuccess, ...]:
     kinds: dict[str, dict[int, list[TaskRunResult]]] = {}
     for run, one in own.items():
         if run.kind != "units":
@@ -169,10 +177,10 @@ def _summarise_substitutes(done: Sequence[bool], own: TaskResults) -> tuple[Task
         own_done = sum(done[:seeds])
         as_good = sum(count >= own_done for count in successes)
         low, high = share_interval(as_good, len(draws))
-        falls = sum(one.fell for drawn in draws.values() for one in drawn)
+        outcomes = _count(plan, chain.from_iterable(draws.values()))
         figures.append(
             TaskSubstituteSuccess(
-                kind, len(draws), seeds, as_good, low, high, sum(successes), own_done, falls
+                kind, len(draws), seeds, as_good, low, high, sum(successes), own_done, outcomes
             )
         )
     return tuple(figures)

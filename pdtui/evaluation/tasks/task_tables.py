@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
+from pdtui.core.outcome import describe_outcomes, failure_noun, format_failures
 from pdtui.core.text_tables import format_p_value, new_table
 from pdtui.evaluation.disturbance_conditions import UNDISTURBED
 from pdtui.evaluation.protocol_settings import ProtocolSettings
@@ -34,7 +35,7 @@ def _success_table(title: str, rows: Sequence[TaskEvaluation]) -> Table:
             "p",
             "holds",
             "after a long hold",
-            "falls (without)",
+            f"{failure_noun(rows[0].outcomes)} (without)",
             "measured (without it)",
         ),
         left=left,
@@ -51,7 +52,7 @@ def _success_table(title: str, rows: Sequence[TaskEvaluation]) -> Table:
             f"{row.done}/{row.runs} [{row.low:.0%}, {row.high:.0%}]",
             *_comparison(row),
             "–" if row.still_done is None else f"{row.still_done}/{row.runs}",
-            _falls(row),
+            _failures(row),
             measured,
         )
     table.caption = (
@@ -62,16 +63,17 @@ def _success_table(title: str, rows: Sequence[TaskEvaluation]) -> Table:
 
 
 def _substitutes_table(rows: Sequence[TaskEvaluation], settings: ProtocolSettings) -> Table:
-    kinds = ("random units", "random directions", "actions")
+    kinds, noun = ("random units", "random directions", "actions"), failure_noun(rows[0].outcomes)
     table = new_table(
         "Tasks: would something else do as well?",
-        *("behavior", "random units: as good, success, falls", "random directions", "on the actions"),
+        *("behavior", f"random units: as good, success, {noun}", "random directions", "on the actions"),
     )
     for row in (one for one in rows if not one.after):
         cells = {}
         for one in row.substitutes:
             runs = one.draws * one.seeds
-            cells[one.kind] = f"{one.as_good}/{one.draws}, {one.done}/{runs}, {one.falls}/{runs}"
+            failures = format_failures(one.outcomes, runs)
+            cells[one.kind] = f"{one.as_good}/{one.draws}, {one.done}/{runs}, {failures}"
         table.add_row(row.behavior, *(cells.get(kind, "–") for kind in kinds))
     table.caption = (
         f"{settings.draws} draws of as many random units of the same layers at the same |v|, and of random "
@@ -85,7 +87,15 @@ def _substitutes_table(rows: Sequence[TaskEvaluation], settings: ProtocolSetting
 def _conditions_table(rows: Sequence[TaskEvaluation]) -> Table:
     table = new_table(
         "Tasks, disturbed; p is corrected over the disturbed rows",
-        *("behavior", "condition", "success", "without", "p", "holds", "falls (without)"),
+        *(
+            "behavior",
+            "condition",
+            "success",
+            "without",
+            "p",
+            "holds",
+            f"{failure_noun(rows[0].outcomes)} (without)",
+        ),
         left=["behavior", "condition"],
     )
     for name in dict.fromkeys(row.behavior for row in rows):
@@ -94,7 +104,7 @@ def _conditions_table(rows: Sequence[TaskEvaluation]) -> Table:
             if row.behavior == name and not row.after:
                 first = name if row.condition == UNDISTURBED.name else ""
                 done = f"{row.done}/{row.runs}"
-                table.add_row(first, row.condition, done, *_comparison(row), _falls(row))
+                table.add_row(first, row.condition, done, *_comparison(row), _failures(row))
     return table
 
 
@@ -103,5 +113,7 @@ def _comparison(row: TaskEvaluation) -> tuple[str, str, str]:
     return without, format_p_value(row.corrected), holds
 
 
-def _falls(row: TaskEvaluation) -> str:
-    return f"{row.falls}/{row.runs} ({row.falls_by_itself})"
+def _failures(row: TaskEvaluation) -> str:
+    with_it, by_itself = format_failures(row.outcomes, row.runs), row.outcomes_by_itself
+    words = describe_outcomes(by_itself).removeprefix("falls ")
+    return f"{with_it} ({words})"

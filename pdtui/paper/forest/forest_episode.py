@@ -11,6 +11,7 @@ import numpy as np
 from pdtui.core.atomic_file import write_file
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import SessionError
+from pdtui.core.outcome import Outcome
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import events_of_pressed_keys, run_episode
 from pdtui.driving.keystrokes import format_keystrokes
@@ -35,7 +36,7 @@ class ForestEpisodeScore:
     Attributes:
         distance: distance along x, m.
         collisions: number of trees that the robot ran into.
-        crossed: whether it ended at the far end of the forest.
+        outcome: whether it arrived at the far end of the forest, fell, or ran out of time.
         keys: the keys pressed, in their order.
         pressed_steps: number of control steps before which a key was pressed.
     """
@@ -44,8 +45,7 @@ class ForestEpisodeScore:
     reward: float
     distance: float
     collisions: float
-    fell: bool
-    crossed: bool
+    outcome: Outcome
     steps: int
     keys: tuple[str, ...]
     pressed_steps: int
@@ -80,7 +80,7 @@ def drive_forest_episode(
         events += record.events
         if distances[-1] >= AHEAD:
             break
-    return _score(loop.seed, rewards, costs, distances, events, record.fell), tuple(events)
+    return _score(loop.seed, rewards, costs, distances, events, record.outcome), tuple(events)
 
 
 def record_forest_episode(
@@ -128,7 +128,7 @@ def read_forest_episode(path: Path, robot: str, steps: int) -> tuple[ForestEpiso
         session.costs[:count].tolist(),
         distances[:count].tolist(),
         [event for event in session.events if event.step < count],
-        count - 1 in session.endings,
+        session.outcomes.get(count - 1),
     )
     return run, info.policy
 
@@ -139,7 +139,7 @@ def _score(
     costs: Sequence[float],
     distances: Sequence[float],
     events: Sequence[DriveEvent],
-    fell: bool,
+    ended: Outcome | None,
 ) -> ForestEpisodeScore:
     pressed = [event for event in events if event.key]
     return ForestEpisodeScore(
@@ -147,8 +147,7 @@ def _score(
         float(np.sum(rewards)),
         distances[-1],
         float(np.sum(costs)),
-        fell,
-        not fell and distances[-1] >= AHEAD,
+        ended or (Outcome.ARRIVED if distances[-1] >= AHEAD else Outcome.OUT_OF_TIME),
         len(rewards),
         tuple(event.key for event in pressed),
         len({event.step for event in pressed}),
@@ -176,5 +175,5 @@ def drive_with_random_keys(loop: ControlLoop, steps: int) -> ObservedDrive:
         places.append(read_place())
         choices.append(latched)
         if record.ended:
-            return ObservedDrive(np.array(places), np.array(choices), record.fell)
-    return ObservedDrive(np.array(places), np.array(choices), False)
+            return ObservedDrive(np.array(places), np.array(choices), record.outcome)
+    return ObservedDrive(np.array(places), np.array(choices), None)

@@ -12,6 +12,7 @@ from rich.console import Group
 from rich.table import Table
 
 from pdtui.core.confidence_intervals import PairedRatio, paired_ratio
+from pdtui.core.outcome import Outcome, is_failure
 from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.paper.forest.forest_episode import ForestEpisodeScore
@@ -114,7 +115,7 @@ def summarise_condition(
         values = np.array([float(getattr(run, name)) for run in runs]).reshape(repeats, -1).mean(axis=1)
         return RepeatStatistics(float(values.mean()), float(values.std(ddof=1)) if repeats > 1 else math.nan)
 
-    falls = sum(run.fell for run in runs)
+    falls = sum(is_failure(run.outcome) for run in runs)
     return ForestConditionSummary(
         condition,
         policy,
@@ -125,7 +126,7 @@ def summarise_condition(
         spread("pressed_steps"),
         falls,
         share_interval(falls, len(runs)),
-        sum(run.crossed for run in runs),
+        sum(run.outcome is Outcome.ARRIVED for run in runs),
         len(runs),
         tuple(runs),
     )

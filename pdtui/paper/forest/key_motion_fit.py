@@ -15,6 +15,7 @@ from scipy.optimize import least_squares
 
 from pdtui.core.attributes import Floats, wrap_angle
 from pdtui.core.errors import RobotError
+from pdtui.core.outcome import is_failure
 from pdtui.paper.forest.key_motion_model import (
     STEPS_OBSERVED,
     KeyMotionModel,
@@ -125,7 +126,7 @@ def _falls(drives: Sequence[ObservedDrive], number: int) -> tuple[int, int]:
     for drive in drives:
         latched = drive.choices == number
         presses += int((latched & np.diff(drive.choices, prepend=-1).astype(bool)).sum())
-        falls += bool(drive.fell and latched[-1])
+        falls += bool(is_failure(drive.outcome) and latched[-1])
     return falls, presses
 
 

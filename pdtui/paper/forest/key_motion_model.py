@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats, wrap_angle
+from pdtui.core.outcome import Outcome
 
 STEPS_OBSERVED = 16
 """Control steps over which the motion is estimated: about one stride."""
@@ -52,11 +53,12 @@ class ObservedDrive:
     Attributes:
         places: x and y in m and heading in rad before each step and after the last, shape (S + 1, 3).
         choices: index of the key that was latched in each step, shape (S,).
+        outcome: how the episode ended; None if it did not.
     """
 
     places: Floats
     choices: NDArray[np.int64]
-    fell: bool
+    outcome: Outcome | None
 
 
 @dataclass(frozen=True)

@@ -129,11 +129,11 @@ class GymnasiumRobot(Robot):
         """Step the environment.
 
         If the environment truncates an episode by itself, the episode ends; the time limits of registrations
-        do not apply (see `make_environment`). The robot has finished if the info says so by ``finished`` or,
-        as in many environments, by ``is_success``.
+        do not apply (see `make_environment`). The outcome is the environment's ``outcome`` if it says one;
+        see `Robot.outcome_of`.
 
         Raises:
-            RobotError: The action is not one of the environment's.
+            RobotError: The action is not one of the environment's, or its outcome is not known.
             SimulationDiverged: The observation or the reward is not finite.
         """
         if self._repeats:
@@ -144,7 +144,9 @@ class GymnasiumRobot(Robot):
         self._see(observation)
         self._check_finite()
         details = {**info, "cost": gymnasium_spaces.to_number(info.get("cost", 0.0)) or 0.0}
-        details["finished"] = bool(info.get("finished", info.get("is_success", False)))
+        outcome = self.outcome_of(terminated, truncated, info)
+        if outcome is not None:
+            details["outcome"] = outcome
         if terminated or truncated:
             details["reason"] = str(info.get("reason", "the environment ended the episode"))
         return self.observe(), self.reward, bool(terminated), bool(truncated), details

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
+from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import Scenery, Traffic
 from pdtui.robots.road.metadrive_repairs import (
     LIDAR_RANGE,
@@ -28,13 +29,13 @@ MAX_STEPS = 1000
 _RULES_SPEED = 35.0
 _QUARTER_TURN = math.sqrt(0.5)
 _WORDS = (
-    ("arrive_dest", "arrived"),
-    ("out_of_road", "left the road"),
-    ("crash_vehicle", "crashed"),
-    ("crash_object", "crashed"),
-    ("crash_building", "crashed"),
-    ("crash_human", "crashed"),
-    ("max_step", "out of time"),
+    ("arrive_dest", Outcome.ARRIVED),
+    ("out_of_road", Outcome.LEFT_ROAD),
+    ("crash_vehicle", Outcome.CRASHED),
+    ("crash_object", Outcome.CRASHED),
+    ("crash_building", Outcome.CRASHED),
+    ("crash_human", Outcome.CRASHED),
+    ("max_step", Outcome.OUT_OF_TIME),
 )
 
 
@@ -45,7 +46,7 @@ class CarState:
     Attributes:
         observation: What the policy observes, shape (275,).
         reward, cost: Reward and cost of the step.
-        outcome: How the episode ended; empty if it goes on.
+        outcome: How the episode ended; None if it goes on.
         motion: Speed (m/s), offset from the middle of the lane to the left (m), distances to the left and the
             right edge of the road (m), heading relative to the lane's (rad), yaw rate (rad/s), steering and
             throttle in [−1, 1], distance to what is next in the lane (m) and the driven share of the route.
@@ -56,7 +57,7 @@ class CarState:
     observation: NDArray[np.float32]
     reward: float
     cost: float
-    outcome: str
+    outcome: Outcome | None
     motion: Floats
     pose: Floats
     digest: int
@@ -169,7 +170,7 @@ class RoadWorld:
 
     def _state(self, observed: NDArray[np.float32], reward: float, info: dict[str, Any]) -> CarState:
         car, self._observation = self._env.agent, repair_observation(observed)
-        outcome = next((word for key, word in _WORDS if info.get(key)), "")
+        outcome = next((word for key, word in _WORDS if info.get(key)), None)
         return CarState(
             self._observation,
             reward,

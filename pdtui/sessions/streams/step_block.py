@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
+from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import ActiveBehavior, ReplacedAction, StepRecord
 from pdtui.core.units import Stimulation
 from pdtui.sessions.drive_info import DriveInfo
@@ -46,6 +47,7 @@ class StepBlock:
         poses: those poses as in `place_link_shapes`, shape (p, shapes, vector length) each, float32; empty if
             they were not asked for.
         endings: why episodes ended by themselves, by the control step that ended each.
+        outcomes: the outcomes of episodes, by control step.
     """
 
     steps: NDArray[np.int64]
@@ -66,6 +68,7 @@ class StepBlock:
     pose_steps: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     poses: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     endings: Mapping[int, str] = field(default_factory=dict)
+    outcomes: Mapping[int, Outcome] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.steps)
@@ -145,6 +148,7 @@ class StepBlock:
             pose_steps=self.pose_steps[drawn],
             poses={name: vectors[drawn] for name, vectors in self.poses.items()},
             endings={step: text for step, text in self.endings.items() if low <= step <= high},
+            outcomes={step: word for step, word in self.outcomes.items() if low <= step <= high},
         )
 
 
@@ -216,6 +220,7 @@ def step_block_of_records(
         pose_steps=drawn,
         poses=place_link_shapes(info.links, np.array(poses)) if poses else {},
         endings={record.step: record.ended for record in records if record.ended},
+        outcomes={record.step: record.outcome for record in records if record.outcome is not None},
     )
 
 

@@ -153,8 +153,10 @@ def _decode(
     table: EntityTable, header: SessionHeader, activations: bool, queue: RecordedPoses | None, at_end: bool
 ) -> StepBlock:
     low, high = (int(table.steps[0]), int(table.steps[-1])) if len(table.steps) else (0, -1)
-    ended = [step for step in header.endings if low <= step <= high and step in table.steps]
-    others: dict[str, Any] = {"endings": {step: header.endings[step] for step in ended}}
+    others: dict[str, Any] = {
+        name: {step: said for step, said in found.items() if low <= step <= high and step in table.steps}
+        for name, found in (("endings", header.endings), ("outcomes", header.outcomes))
+    }
     if queue is not None:
         others["pose_steps"], others["poses"] = queue.take(low, high, at_end=at_end)
     return decode_step_block(table, header.info, activations=activations, **others)

@@ -86,6 +86,7 @@ def _first_differences(
             drawn,
         )
     yield _ending_difference(here, recorded)
+    yield _outcome_difference(here, recorded)
     if tolerance is None:
         yield each_step("digests", here.digests, recorded.digests)
 
@@ -103,6 +104,15 @@ def _ending_difference(here: StepBlock, recorded: StepBlock) -> StreamDifference
         texts = here.endings.get(step, "none"), recorded.endings.get(step, "none")
         if texts[0] != texts[1]:
             return StreamDifference(step, "endings", "", *texts)
+    return None
+
+
+def _outcome_difference(here: StepBlock, recorded: StepBlock) -> StreamDifference | None:
+    """Compare the outcomes that were recorded: older sessions lack some of them."""
+    for step, outcome in recorded.outcomes.items():
+        found = here.outcomes.get(step, "none")
+        if found != outcome and not (found == "none" and step in here.endings):
+            return StreamDifference(step, "outcomes", "", str(found), str(outcome))
     return None
 
 

@@ -76,7 +76,7 @@ def session_blueprint(info: DriveInfo, content: BlueprintContent = BEGUN) -> rrb
 
 def _lay_out_robot(info: DriveInfo, content: BlueprintContent) -> rrb.Vertical:
     keys = rrb.TextLogView(
-        contents=[schema.EVENTS, schema.ENDINGS],
+        contents=[schema.EVENTS, schema.ENDINGS, schema.OUTCOMES],
         name="Keys and events",
         columns=rrb.TextLogColumns(timeline_columns=[schema.STEP], text_log_columns=[TextLogColumnKind.Body]),
     )

@@ -9,24 +9,28 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
-
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import RecordingEnded, SessionError
+from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
 from pdtui.sessions.drive_info import DriveInfo, encode_drive_info
 from pdtui.sessions.environment_versions import collect_versions
 from pdtui.sessions.session_header_index import build_session_index
-from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, VERSIONS
+from pdtui.sessions.session_schema import DRIVE, ENDINGS, EVENTS, INFO, OUTCOME, OUTCOMES, VERSIONS
 from pdtui.sessions.session_summary import SessionSummaryCounter
 from pdtui.sessions.viewer.session_blueprint import session_blueprint
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
 from pdtui.sessions.viewer.viewer_data_writer import ViewerDataWriter
-from pdtui.sessions.writer.arrow_columns import stack_rows
 from pdtui.sessions.writer.disk_space import DiskReserve
 from pdtui.sessions.writer.session_file import ExistingFile, SessionFile, SyncMode
 from pdtui.sessions.writer.session_outputs import SessionOutputs
-from pdtui.sessions.writer.step_record_columns import episode_end_columns, event_columns, step_record_columns
+from pdtui.sessions.writer.step_record_columns import (
+    count_records,
+    episode_end_columns,
+    event_columns,
+    outcome_columns,
+    step_record_columns,
+)
 
 _VIEW_ROWS, _LIVE_ROWS = 128, 8
 _SAFE_ROWS = 16
@@ -92,6 +96,7 @@ class SessionRecorder:
         self._summary = SessionSummaryCounter(info)
         self._events: list[DriveEvent] = []
         self._endings: dict[int, str] = {}
+        self._episode_outcomes: dict[int, Outcome] = {}
         self._closed = self._failed = False
         self.notice = ""
         batches = 1 if self._waits_for_batches else _BATCHES_ON_THEIR_WAY
@@ -130,7 +135,7 @@ class SessionRecorder:
             raise SessionError(f"{self.path}: the session is closed")
         self._rows.append(record)
         self._steps += 1
-        if record.events or record.ended:
+        if record.events or record.ended or record.outcome:
             self._require_space()
             self.flush()
         elif len(self._rows) >= self._rows_per_write:
@@ -184,8 +189,9 @@ class SessionRecorder:
             steps=self._steps,
             events=self._events,
             endings=self._endings,
+            outcomes=self._episode_outcomes,
             outcome=outcome,
-            summary=asdict(self._summary.summary(len(self._endings))),
+            summary=asdict(self._summary.summary()),
         )
 
     def _require_space(self) -> None:
@@ -202,7 +208,7 @@ class SessionRecorder:
         if not records:
             return
         self._write_events(records)
-        self._count(records)
+        count_records(self._summary, records)
         steps = [record.step for record in records]
         self._outputs.send_columns(DRIVE, steps, step_record_columns(records, self.info.activations))
         self._viewer_data.add(records)
@@ -215,17 +221,6 @@ class SessionRecorder:
             self._flush_rows()  # so that the first steps are in what the new file is created with
             self._recording.create_file()
 
-    def _count(self, records: Sequence[StepRecord]) -> None:
-        self._summary.add(
-            attributes=stack_rows([record.attributes for record in records]),
-            rewards=np.array([record.reward for record in records]),
-            costs=np.array([record.cost for record in records]),
-            episodes=np.array([record.episode for record in records]),
-            involved=np.array([record.involved for record in records]),
-            stimulated=np.array([bool(record.stimulation.units) for record in records]),
-            taken_over=np.array([bool(record.replaced) for record in records]),
-        )
-
     def _write_events(self, records: Sequence[StepRecord]) -> None:
         events = [event for record in records for event in record.events]
         if events:
@@ -236,6 +231,10 @@ class SessionRecorder:
         if ended:
             self._outputs.send_columns(ENDINGS, [record.step for record in ended], episode_end_columns(ended))
             self._endings |= {record.step: record.ended for record in ended}
+        outcomes = {record.step: record.outcome for record in records if record.outcome is not None}
+        if outcomes:
+            self._outputs.send_columns(OUTCOMES, list(outcomes), outcome_columns(outcomes, self._endings))
+            self._episode_outcomes |= outcomes
 
     def _flush_rows(self, *, wait: bool = True) -> None:
         try:

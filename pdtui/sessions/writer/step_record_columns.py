@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import Any
 
@@ -13,8 +13,10 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from pdtui.core.drive_events import DriveEvent, describe_event
+from pdtui.core.outcome import Outcome, is_failure
 from pdtui.core.step_record import ActiveBehavior, StepRecord
 from pdtui.sessions.session_schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION, ActivationsKept
+from pdtui.sessions.session_summary import SessionSummaryCounter
 from pdtui.sessions.writer.arrow_columns import (
     ComponentColumn,
     nested_list_column,
@@ -73,6 +75,20 @@ def _to_half(activations: NDArray[np.float32]) -> NDArray[np.float16]:
         return activations.astype(np.float16)
 
 
+def count_records(summary: SessionSummaryCounter, records: Sequence[StepRecord]) -> None:
+    """Add control steps to the statistics of their session."""
+    summary.add(
+        attributes=stack_rows([record.attributes for record in records]),
+        rewards=np.array([record.reward for record in records]),
+        costs=np.array([record.cost for record in records]),
+        episodes=np.array([record.episode for record in records]),
+        involved=np.array([record.involved for record in records]),
+        stimulated=np.array([bool(record.stimulation.units) for record in records]),
+        taken_over=np.array([bool(record.replaced) for record in records]),
+        outcomes=[(record.episode, record.outcome) for record in records if record.outcome is not None],
+    )
+
+
 def event_columns(events: Sequence[DriveEvent], first: int) -> list[ComponentColumn]:
     """Return columns with one row per event, in the order in which they were applied.
 
@@ -92,11 +108,24 @@ def event_columns(events: Sequence[DriveEvent], first: int) -> list[ComponentCol
 
 def episode_end_columns(records: Sequence[StepRecord]) -> list[ComponentColumn]:
     """Return columns with one row per episode that ended by itself."""
-    levels = ["ERROR" if record.diverged else "WARN" for record in records]
+    levels = [_log_level(record.outcome) for record in records]
     return [
         text_column(rr.TextLog.descriptor_text(), [record.ended for record in records]),
         text_column(rr.TextLog.descriptor_level(), levels),
     ]
+
+
+def outcome_columns(outcomes: Mapping[int, Outcome], endings: Mapping[int, str]) -> list[ComponentColumn]:
+    """Return columns with one row per outcome; the viewer reads of those that ended an episode elsewhere."""
+    lines = [[] if step in endings else [f"{word}, and goes on"] for step, word in outcomes.items()]
+    return [
+        text_column("outcome", [outcome.value for outcome in outcomes.values()]),
+        ragged_list_column(rr.TextLog.descriptor_text(), lines, pa.utf8()),
+    ]
+
+
+def _log_level(outcome: Outcome | None) -> str:
+    return "ERROR" if outcome is Outcome.DIVERGED else "WARN" if is_failure(outcome) else "INFO"
 
 
 def _log_line(event: DriveEvent) -> str:

@@ -51,24 +51,28 @@ class StatusLine(SnapshotWidget):
                 (0, "loading the policy…", STYLES.warn),
             ]
         policy = (4, make_printable(PurePath(facts.policy).name), STYLES.muted)
-        seed = (6, f"seed {facts.seed}", STYLES.muted)
+        seed = (8, f"seed {facts.seed}", STYLES.muted)
         if snapshot is None:
             return [policy, seed]
         recording = []
         if facts.recording:
             name = _shorten(make_printable(PurePath(facts.recording).name), _NAME)
             size = filesize.decimal(snapshot.recorded_bytes)
-            recording = [(8, name, STYLES.muted), (3, f"● {size}", STYLES.bad)]
+            recording = [(10, name, STYLES.muted), (3, f"● {size}", STYLES.bad)]
         manual = "  ".join(
             f"{make_printable(name)} {format_number(value)}" for name, value in snapshot.manual
         )
+        arrivals = [] if snapshot.arrivals is None else [(5, f"arrived {snapshot.arrivals}", STYLES.muted)]
+        cost = [(6, f"cost {snapshot.cost:g}", STYLES.muted)] if snapshot.cost else []
         return [
             *([(-1, f"manual: {manual}", STYLES.warn)] if manual else []),
             policy,
             *recording[:1],
-            (7, f"episode {snapshot.episode}", STYLES.muted),
+            (9, f"episode {snapshot.episode}", STYLES.muted),
             seed,
-            (5, f"involvement {snapshot.involvement}", STYLES.muted),
+            *arrivals,
+            *cost,
+            (7, f"involvement {snapshot.involvement}", STYLES.muted),
             (1, f"step {snapshot.step}", STYLES.text),
             (2, f"{snapshot.time:.1f} s", STYLES.text),
             *recording[1:],

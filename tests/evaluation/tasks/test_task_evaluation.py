@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from pdtui.core.outcome import Outcome
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.behavior_evaluation import MapEvaluation, evaluate_behaviors, plan_evaluation
@@ -86,7 +87,7 @@ def test_a_held_task_is_judged_twice_and_a_flick_once(
     plan: EvaluationPlan, rows: list[TaskEvaluation]
 ) -> None:
     veer, flick = rows
-    assert (veer.done, veer.by_itself, veer.still_done, veer.falls) == (8, 0, 8, 0)
+    assert (veer.done, veer.by_itself, veer.still_done, veer.outcomes) == (8, 0, 8, {Outcome.FELL: 0})
     assert (flick.done, flick.still_done) == (0, None)  # half a second turns it by too little
     assert veer.figures["turned (rad)"] > 0.3
     assert 0.2 < flick.figures["turned (rad)"] < 0.25
@@ -112,7 +113,7 @@ def test_substitutes_are_judged_by_the_same_task(rows: list[TaskEvaluation]) -> 
     assert (units.kind, units.draws, units.seeds, units.as_good, units.done) == ("random units", 24, 2, 0, 0)
     # The unit is the action, so a push on the actions is the behavior itself.
     assert (actions.kind, actions.draws, actions.as_good, actions.done) == ("actions", 1, 1, 2)
-    assert (actions.own_done, actions.falls) == (2, 0)
+    assert (actions.own_done, actions.outcomes) == (2, {Outcome.FELL: 0})
     size = InterventionSize({0: 0.5}, ())
     drawn = [draw_random_direction(size, (2,), "veer", draw).added[0] for draw in range(24)]
     enough = 0.5 * 0.3 / rows[0].figures["turned (rad)"]  # it turns in proportion to its first action
@@ -199,7 +200,7 @@ def test_a_task_of_the_a1_is_planned_in_every_world_and_runs_there() -> None:
         assert episode is not None
         result = run_task_episode(plan.loop, episode)
         figures.append(tuple(result.verdict.figures.values()))
-        assert not result.fell
+        assert result.outcome is None
     assert len(set(figures)) == 3
 
 

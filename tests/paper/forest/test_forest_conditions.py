@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 
 from pdtui.cli import main
 from pdtui.core.errors import MapError, PdtuiError, SessionError, WorkerError
+from pdtui.core.outcome import Outcome
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import drive_headless
@@ -130,7 +131,7 @@ def test_a_recorded_drive_scores_what_it_did(recorded: Path, built: ControlLoop)
     driven, events = drive_forest_episode(loop, 120, OperatorPresser(loop, KEY_MODELS))
     assert read_forest_episode(recorded, "a1", 1000) == (driven, "stands")
     assert driven.presses == len(events) == driven.pressed_steps > 0
-    assert (driven.seed, driven.steps, driven.fell, driven.crossed) == (505, 120, False, False)
+    assert (driven.seed, driven.steps, driven.outcome) == (505, 120, Outcome.OUT_OF_TIME)
     session = read_session(recorded)
     shorter, _ = read_forest_episode(recorded, "a1", 50)
     assert shorter.steps == 50
@@ -209,7 +210,7 @@ def test_a_placebo_presses_the_same_keys_without_looking() -> None:
 def test_ratios_pair_the_same_forests() -> None:
     def runs(distances: list[float], collisions: list[float]) -> list[ForestEpisodeScore]:
         return [
-            ForestEpisodeScore(seed, 0.0, far, hits, False, False, 10, (), 0)
+            ForestEpisodeScore(seed, 0.0, far, hits, Outcome.OUT_OF_TIME, 10, (), 0)
             for seed, (far, hits) in enumerate(zip(distances, collisions, strict=True))
         ]
 

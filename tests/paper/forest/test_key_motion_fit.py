@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.errors import RobotError
+from pdtui.core.outcome import Outcome
 from pdtui.paper.forest.key_motion_fit import fit_key_motion_models
 from pdtui.paper.forest.key_motion_model import (
     KeyMotionModel,
@@ -30,7 +31,7 @@ def _drive(rng: np.random.Generator) -> ObservedDrive:
     held = rng.integers(20, 80, 15)
     choices = np.repeat(np.arange(15) % 3, held)
     there, _ = predict_motion(list(KEY_MODELS.values()), RobotMotion(0, 0, 0, 1.0), choices[None], DT)
-    return ObservedDrive(np.vstack([[0.0, 0.0, 0.0], there[0]]), choices, False)
+    return ObservedDrive(np.vstack([[0.0, 0.0, 0.0], there[0]]), choices, None)
 
 
 def test_responses_are_found_again_and_predict_another_drive() -> None:
@@ -53,7 +54,7 @@ def test_responses_are_found_again_and_predict_another_drive() -> None:
 
 def test_falls_count_for_each_press_of_what_was_latched() -> None:
     rng = np.random.default_rng(1)
-    drives = [_drive(rng), replace(_drive(rng), fell=True)]
+    drives = [_drive(rng), replace(_drive(rng), outcome=Outcome.FELL)]
     found = fit_key_motion_models(drives, NAMES, DT)
     assert [found[name].falls for name in NAMES] == pytest.approx([0.0, 0.0, 0.1])
 
