@@ -14,6 +14,7 @@ from contextlib import suppress
 from functools import cache, partial
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from multiprocessing.util import Finalize
 from typing import Any, Generic, TypeVar
 
 from pdtui.core.closable import Closable
@@ -42,7 +43,7 @@ class WorkerProcess(Closable):
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process = context.Process(
-            target=_serve_calls, args=(theirs, build, arguments), name=f"pdtui {name}", daemon=True
+            target=_serve_calls, args=(theirs, build, arguments), name=f"pdtui {name}"
         )
         # Ctrl-C reaches the whole process group. The worker inherits a mask that blocks it from its first
         # instruction on, so that only this process answers and no worker prints a traceback.
@@ -52,6 +53,8 @@ class WorkerProcess(Closable):
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
             theirs.close()
+        # A daemon would be ended in the same way, but could not start processes itself.
+        Finalize(self, self.process.kill, exitpriority=0)
 
     def send(self, function: Callable[..., Any], *arguments: Any) -> None:
         """Call a function of a module with the state and arguments; `WorkerError` if the process is dead."""

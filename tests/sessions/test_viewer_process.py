@@ -18,7 +18,8 @@ from pdtui.sessions.viewer.viewer_process import CANNOT_START, run_viewer
 from tests.real_viewer import free_port
 
 SAMPLE = Path(__file__).parents[2] / "sessions" / "samples" / "ant.rrd"
-PATIENCE = 30.0
+# A machine that runs the whole suite may take a minute to start the viewer.
+PATIENCE = 120.0
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 
