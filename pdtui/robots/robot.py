@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import RobotError
 from pdtui.core.robot_links_and_state import NO_OBSTACLES, CommandRange, Link, ManualControl, RobotState
+from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions, format_robot_options
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
 from pdtui.robots.task import Task, find_task
 
@@ -87,6 +88,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         obstacles: Upright cylinders in the robot's way, shape (N, 3): x, y and radius, m. The array stays the
             same until the next `reset` or `restore`, which may replace it by another array.
         state_arrays: Names of the Python attributes, all of them arrays, that belong to a robot's state.
+        build_options: Options with which `make_robot` built it; those that it does not name have defaults.
     """
 
     name: str
@@ -103,6 +105,12 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     episode_steps: int = 1000
     obstacles: Floats = NO_OBSTACLES
     state_arrays: tuple[str, ...] = ()
+    build_options: RobotOptions = NO_ROBOT_OPTIONS
+
+    @property
+    def full_title(self) -> str:
+        """The name for people, with the options that the robot was built with."""
+        return ", ".join(filter(None, (self.title, format_robot_options(self.build_options))))
 
     @property
     @abstractmethod
