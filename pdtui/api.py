@@ -27,12 +27,13 @@ from pdtui.policies.torchscript import build_torchscript
 from pdtui.policies.weights import policy_loading
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.weights_file import find_weights_file
-from pdtui.robots import open_robot
+from pdtui.robots import RobotSpec, open_robot
 from pdtui.robots.robot import Robot
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_policy_lookup import resolve_map_policy
 from pdtui.stimulation.map_reader import load_map
+from pdtui.stimulation.map_robot_options import map_robot, put_robot_options
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "DriveArrays",
     "ImportOptions",
     "Policy",
+    "RobotSpec",
     "dissect",
     "drive",
     "load_policy",
@@ -71,7 +73,7 @@ def _takes_fields_of(
 
 def load_policy(
     policy: str | Path | nn.Module,
-    robot: str | Robot | None = None,
+    robot: str | RobotSpec | Robot | None = None,
     *,
     import_options: ImportOptions = NO_OPTIONS,
     observations: int | Sequence[int] | None = None,
@@ -165,7 +167,7 @@ def dissect(config: DissectionConfig) -> Dissection:
 
 
 def drive(
-    robot: str | Robot,
+    robot: str | RobotSpec | Robot,
     stimulation_map: str | Path | StimulationMap | None = None,
     *,
     policy: str | Path | nn.Module | Policy | None = None,
@@ -189,7 +191,8 @@ def drive(
     True
 
     Args:
-        robot: The robot's name, or a `Robot`.
+        robot: The robot's name, its name with options, or a `Robot`. Options that are given take precedence
+            over the map's; a `Robot` stays as it is.
         stimulation_map: A map, or its name or file. By default, the map that has the robot's name.
         policy: The policy to use instead of the map's; a network in memory has to be the map's own.
         import_options: Answers to what the weights file does not state, in preference to the map's.
@@ -206,11 +209,15 @@ def drive(
         PdtuiError: The robot, the map or the policy cannot be loaded, they do not fit each other, or a key
             means nothing.
     """
-    name = robot.name if isinstance(robot, Robot) else robot
+    name = robot if isinstance(robot, str) else robot.name
     if not isinstance(stimulation_map, StimulationMap):
         stimulation_map = load_map(find_map(str(stimulation_map or name)))
     named = str(policy) if isinstance(policy, str | Path) else ""
     stimulation_map = resolve_map_policy(stimulation_map, named, import_options)
+    if not isinstance(robot, Robot):
+        options = robot.options if isinstance(robot, RobotSpec) else {}
+        stimulation_map = put_robot_options(stimulation_map, options)
+        robot = map_robot(stimulation_map, name)
     config = DriveConfig(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
     with open_robot(robot) as world:
         loop = build_control_loop(config, world, None if isinstance(policy, str | Path) else policy)

@@ -85,6 +85,7 @@ class ControlLoop:
             links=self.robot.links,
             layers=self.policy.layers,
             obstacles=len(self.robot.obstacles) > 0,
+            robot_options=dict(self.robot.build_options),
         )
 
     @property

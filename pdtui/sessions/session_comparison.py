@@ -95,7 +95,17 @@ def _describe_first_event(a: Sequence[DriveEvent], b: Sequence[DriveEvent], step
 def _list_circumstances(a: SessionHeader, b: SessionHeader) -> tuple[str, ...]:
     lines = [
         f"{name}: {getattr(a.info, name)} and {getattr(b.info, name)}"
-        for name in ("robot", "seed", "policy", "policy_hash", "stochastic", "start", "dt", "layers")
+        for name in (
+            "robot",
+            "robot_options",
+            "seed",
+            "policy",
+            "policy_hash",
+            "stochastic",
+            "start",
+            "dt",
+            "layers",
+        )
         if getattr(a.info, name) != getattr(b.info, name)
     ]
     if a.info.map_text != b.info.map_text:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pdtui.core.errors import TrainingError
 from pdtui.robots import list_robot_names, make_robot
+from pdtui.robots.options.robot_option import OptionValue, format_option_value
 from pdtui.training.training_config import PpoConfig, SacConfig
 
 
@@ -19,6 +20,7 @@ def train_policy(
     steps: int | None,
     learning_rate: float | None,
     forward: str | None,
+    robot_options: Mapping[str, OptionValue],
     folder: Path,
     progress: Callable[..., None] | None,
     *,
@@ -46,7 +48,7 @@ def train_policy(
         from pdtui.training.sac_trainer import SacTrainer
     except ImportError as error:
         raise TrainingError(f"training needs the extra: pip install 'pdtui[train]' ({error})") from error
-    options = dict(recipe.options) | ({"forward": forward} if forward else {})
+    options = {**recipe.options, **({"forward": forward} if forward else {}), **robot_options}
     defaults = PpoConfig() if algorithm == "ppo" else SacConfig()
     choices: dict[str, Any] = {"layers": layers, "activation": activation, "initial_policy": initial_policy}
     if algorithm == "sac" and (activation not in (None, "tanh") or initial_policy):
@@ -58,6 +60,8 @@ def train_policy(
     command = (
         f"pdtui train {robot} --algorithm {algorithm} --seed {seed} --steps {config.total_steps} "
         f"--learning-rate {config.learning_rate:g}" + (f" --forward {forward}" if forward else "")
+    ) + "".join(
+        f" --robot-option {name}={format_option_value(value)}" for name, value in robot_options.items()
     )
     command += f" --layers {','.join(map(str, layers))}" if layers else ""
     command += f" --activation {activation}" if activation else ""

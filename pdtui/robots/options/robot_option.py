@@ -60,10 +60,9 @@ class RobotOption:
             raise ValueError(f"expected {self.expected}, found {_describe(value)}")
         if self.choices and value not in self.choices:
             raise ValueError(f"expected {self.expected}, found {_describe(value)}")
-        require_usable_value(value)
         if isinstance(value, str) and not self.takes_paths and _is_path(value):
             raise ValueError(f"expected text that is no path, found {_describe(value)}")
-        return value
+        return require_usable_value(value)
 
     def parse(self, text: str) -> OptionValue:
         """Return the value that somebody typed.
@@ -87,15 +86,16 @@ class RobotOption:
         return f"{self.name} ({self.expected}{default})"
 
 
-def require_usable_value(value: OptionValue) -> None:
-    """Check that a text is printable and short and that a number is finite; otherwise a `ValueError`."""
+def require_usable_value(value: OptionValue) -> OptionValue:
+    """Return a text that is printable and short, or a number that is finite; others are a `ValueError`."""
     if isinstance(value, str):
         if len(value) > MAX_OPTION_TEXT:
             raise ValueError(f"expected at most {MAX_OPTION_TEXT} characters, found {len(value)}")
         if not value.isprintable():
             raise ValueError("expected printable text, found a control character")
     elif not abs(value) <= MAX_OPTION_NUMBER:  # NaN is not
-        raise ValueError(f"expected a finite number, at most {MAX_OPTION_NUMBER:g}, found {value}")
+        raise ValueError(f"expected a finite number, at most {MAX_OPTION_NUMBER:g}")
+    return value
 
 
 def check_robot_options(

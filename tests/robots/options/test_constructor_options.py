@@ -32,12 +32,12 @@ class _World(_Base):
         cars: How many.
     """
 
-    def __init__(
+    def __init__(  # type: ignore[no-untyped-def]
         self,
         road: Literal["asphalt", "dirt"] = "asphalt",
         cars: int = 3,
         night: bool = False,
-        wind=0.5,  # type: ignore[no-untyped-def]
+        wind=0.5,
         places: tuple[float, ...] = (),
         **options: Any,
     ) -> None:
