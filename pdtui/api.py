@@ -33,7 +33,7 @@ from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_policy_lookup import resolve_map_policy
 from pdtui.stimulation.map_reader import load_map
-from pdtui.stimulation.map_robot_options import map_robot, put_robot_options
+from pdtui.stimulation.map_robot_options import combine_map_and_robot
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 __all__ = [
@@ -103,8 +103,7 @@ def load_policy(
     Args:
         policy: A weights file, the name of a shipped policy, a TorchScript file, which is read as data (see
             `pdtui.policies.torchscript`), or a `torch.nn.Module`, which is copied.
-        robot: The robot that the policy drives. It gives the shapes and the bounds of actions that a file
-            may lack.
+        robot: The robot that the policy drives; it gives shapes and bounds that a file may lack.
         import_options: Answers to what the weights file does not state; see `pdtui.policies.importers`.
         observations, hidden, decode, batched, initial_state, name: For a network in memory or a TorchScript
             file; see `pdtui.policies.runtime.live_network.policy_from_network`.
@@ -191,8 +190,7 @@ def drive(
     True
 
     Args:
-        robot: The robot's name, its name with options, or a `Robot`. Options that are given take precedence
-            over the map's; a `Robot` stays as it is.
+        robot: The robot's name, its name with options, which override the map's, or a `Robot`.
         stimulation_map: A map, or its name or file. By default, the map that has the robot's name.
         policy: The policy to use instead of the map's; a network in memory has to be the map's own.
         import_options: Answers to what the weights file does not state, in preference to the map's.
@@ -206,8 +204,7 @@ def drive(
         force: Drive even if the map was made for another policy.
 
     Raises:
-        PdtuiError: The robot, the map or the policy cannot be loaded, they do not fit each other, or a key
-            means nothing.
+        PdtuiError: Robot, map or policy cannot be loaded or do not fit each other, or a key means nothing.
     """
     name = robot if isinstance(robot, str) else robot.name
     if not isinstance(stimulation_map, StimulationMap):
@@ -215,9 +212,7 @@ def drive(
     named = str(policy) if isinstance(policy, str | Path) else ""
     stimulation_map = resolve_map_policy(stimulation_map, named, import_options)
     if not isinstance(robot, Robot):
-        options = robot.options if isinstance(robot, RobotSpec) else {}
-        stimulation_map = put_robot_options(stimulation_map, options)
-        robot = map_robot(stimulation_map, name)
+        stimulation_map, robot = combine_map_and_robot(stimulation_map, robot)
     config = DriveConfig(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
     with open_robot(robot) as world:
         loop = build_control_loop(config, world, None if isinstance(policy, str | Path) else policy)

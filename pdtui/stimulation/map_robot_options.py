@@ -42,3 +42,18 @@ def map_robot(stimulation_map: StimulationMap, robot: str) -> RobotSpec:
         available = list_robot_options(robot)
         options = check_robot_options(robot, available, options, reader.error)
     return RobotSpec(robot, options)
+
+
+def combine_map_and_robot(
+    stimulation_map: StimulationMap, robot: str | RobotSpec
+) -> tuple[StimulationMap, RobotSpec]:
+    """Return a map that names the options with which the robot is built, and that robot.
+
+    Options of the robot take precedence over the map's.
+
+    Raises:
+        PdtuiError: As `put_robot_options` and `map_robot` do.
+    """
+    spec = RobotSpec(robot) if isinstance(robot, str) else robot
+    combined = put_robot_options(stimulation_map, spec.options)
+    return combined, map_robot(combined, spec.name)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pdtui.core.errors import TrainingError
 from pdtui.robots import list_robot_names, make_robot
-from pdtui.robots.options.robot_option import OptionValue, format_option_value
+from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions, format_option_value
 from pdtui.training.training_config import PpoConfig, SacConfig
 
 
@@ -20,15 +20,17 @@ def train_policy(
     steps: int | None,
     learning_rate: float | None,
     forward: str | None,
-    robot_options: Mapping[str, OptionValue],
     folder: Path,
     progress: Callable[..., None] | None,
     *,
     layers: tuple[int, ...] | None = None,
     activation: str | None = None,
     initial_policy: str | None = None,
+    robot_options: RobotOptions = NO_ROBOT_OPTIONS,
 ) -> Path:
     """Train a policy in a folder, or continue there, and return the path of the best weights.
+
+    The robot is built with the options of its recipe, except for those that are given.
 
     Raises:
         TrainingError: The extra ``train`` is not installed, the robot is an environment of Gymnasium or has

@@ -77,7 +77,7 @@ def load_policy(
     if robot is not None and spec.robot not in ("", robot):
         raise PolicyError(
             f"{path}: expected a policy for robot '{robot}', found one for '{spec.robot}'; "
-            f"if it fits, `pdtui convert {path} --robot {robot} -o FILE.safetensors` makes it one for '{robot}'"
+            f"`pdtui convert {path} --robot {robot} -o FILE.safetensors` makes one for it, if the shapes fit"
         )
     _check_shapes(path, spec, spaces)
     return Policy(

@@ -38,8 +38,13 @@ def read_constructor_options(build: Callable[..., Any], *, of_bases: bool = True
 
 
 def option_of_default(name: str, default: object) -> RobotOption | None:
-    """Return the option that a default value alone describes; None if it is not of an option's type."""
-    return RobotOption(name, (type(default),), default=default) if isinstance(default, OptionValue) else None
+    """Return the option that a default value alone describes; None if it is not of an option's type.
+
+    A whole number may stand for any number.
+    """
+    if not isinstance(default, OptionValue):
+        return None
+    return RobotOption(name, (int, float) if type(default) is int else (type(default),), default=default)
 
 
 def _walk_initialisers(

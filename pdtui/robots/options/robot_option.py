@@ -46,7 +46,8 @@ class RobotOption:
         """What the option expects, in words."""
         if self.choices:
             return f"one of {', '.join(map(format_option_value, self.choices))}"
-        return " or ".join(_WORDS[one] for one in self.types)
+        types = [one for one in self.types if one is not int or float not in self.types]
+        return " or ".join(_WORDS[one] for one in types)
 
     def check(self, value: object) -> OptionValue:
         """Return a value in the option's type; a whole number is also a number.
@@ -56,9 +57,8 @@ class RobotOption:
         """
         if float in self.types and type(value) is int and int not in self.types:
             value = float(value) if abs(value) <= MAX_OPTION_NUMBER else math.inf
-        if not isinstance(value, OptionValue) or type(value) not in self.types:
-            raise ValueError(f"expected {self.expected}, found {_describe(value)}")
-        if self.choices and value not in self.choices:
+        typed = isinstance(value, OptionValue) and type(value) in self.types
+        if not typed or (self.choices and value not in self.choices):
             raise ValueError(f"expected {self.expected}, found {_describe(value)}")
         if isinstance(value, str) and not self.takes_paths and _is_path(value):
             raise ValueError(f"expected text that is no path, found {_describe(value)}")
