@@ -144,9 +144,8 @@ def load_policy(
 def dissect(config: DissectionConfig) -> Dissection:
     """Find out which hidden units move what: monitor, match, probe, and search for behaviors.
 
-    The arguments are the fields of `pdtui.dissection.dissection_config.DissectionConfig`. A robot and a
-    policy given by name are dissected by `workers` processes, which load them again. An object stays in this
-    process; the result is the same.
+    The arguments are the fields of `pdtui.dissection.dissection_config.DissectionConfig`. `workers` processes
+    load a robot and a policy given by name; an object stays in this process, with the same result.
 
     >>> import pdtui
     >>> from torch import nn
@@ -211,8 +210,7 @@ def drive(
         stimulation_map = load_map(find_map(str(stimulation_map or name)))
     named = str(policy) if isinstance(policy, str | Path) else ""
     stimulation_map = resolve_map_policy(stimulation_map, named, import_options)
-    if not isinstance(robot, Robot):
-        stimulation_map, robot = combine_map_and_robot(stimulation_map, robot)
+    stimulation_map, robot = combine_map_and_robot(stimulation_map, robot)
     config = DriveConfig(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
     with open_robot(robot) as world:
         loop = build_control_loop(config, world, None if isinstance(policy, str | Path) else policy)

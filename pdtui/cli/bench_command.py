@@ -145,9 +145,8 @@ def bench_screen_command(
     from pdtui.benchmarks.benchmark_tables import screen_benchmark_table
     from pdtui.benchmarks.screen_benchmark import bench_screen
 
-    build_drive_config(
-        robot, map_name, "", robot_options=robot_options
-    )  # an error shows before the screen starts
+    # An error shows before the screen starts.
+    build_drive_config(robot, map_name, "", robot_options=robot_options)
     arguments = [robot, "--no-record", *(["--map", map_name] if map_name else [])]
     arguments += [part for text in robot_options for part in ("--robot-option", text)]
     result = bench_screen(arguments, seconds)

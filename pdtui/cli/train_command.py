@@ -80,10 +80,11 @@ def train_command(
 
     An interrupted run continues from its last checkpoint when the same command is run again.
     """
+    from pdtui.robots import robot_file_stem
     from pdtui.training.train_policy import train_policy
 
     typed = parse_robot_options(robot, robot_options)
-    named = (robot, algorithm, forward, *sorted(robot_options), str(seed))
+    named = (robot, algorithm, forward, *sorted(map(robot_file_stem, robot_options)), str(seed))
     folder = folder or Path("runs") / "-".join(filter(None, named))
     with progress_bar("training") as advance:
         path = train_policy(

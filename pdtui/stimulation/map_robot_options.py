@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from pdtui.robots import RobotSpec, list_robot_options
 from pdtui.robots.options.robot_option import RobotOptions, check_robot_options
@@ -10,6 +11,9 @@ from pdtui.stimulation.map_reader import ROBOT_OPTIONS
 from pdtui.stimulation.map_table_reader import MapTableReader
 from pdtui.stimulation.map_writer import compose_map, replace_robot_options
 from pdtui.stimulation.stimulation_map import StimulationMap
+
+if TYPE_CHECKING:
+    from pdtui.robots.robot import Robot
 
 
 def put_robot_options(stimulation_map: StimulationMap, options: RobotOptions) -> StimulationMap:
@@ -45,15 +49,17 @@ def map_robot(stimulation_map: StimulationMap, robot: str) -> RobotSpec:
 
 
 def combine_map_and_robot(
-    stimulation_map: StimulationMap, robot: str | RobotSpec
-) -> tuple[StimulationMap, RobotSpec]:
-    """Return a map that names the options with which the robot is built, and that robot.
+    stimulation_map: StimulationMap, robot: str | RobotSpec | Robot
+) -> tuple[StimulationMap, RobotSpec | Robot]:
+    """Return a map that names the options with which the robot is to be built, and that robot.
 
-    Options of the robot take precedence over the map's.
+    Options of the robot take precedence over the map's. A robot that is built already stays as it is.
 
     Raises:
         PdtuiError: As `put_robot_options` and `map_robot` do.
     """
+    if not isinstance(robot, str | RobotSpec):
+        return stimulation_map, robot
     spec = RobotSpec(robot) if isinstance(robot, str) else robot
     combined = put_robot_options(stimulation_map, spec.options)
     return combined, map_robot(combined, spec.name)

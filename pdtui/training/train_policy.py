@@ -62,9 +62,9 @@ def train_policy(
     command = (
         f"pdtui train {robot} --algorithm {algorithm} --seed {seed} --steps {config.total_steps} "
         f"--learning-rate {config.learning_rate:g}" + (f" --forward {forward}" if forward else "")
-    ) + "".join(
-        f" --robot-option {name}={format_option_value(value)}" for name, value in robot_options.items()
     )
+    for name, value in robot_options.items():
+        command += f" --robot-option {name}={format_option_value(value)}"
     command += f" --layers {','.join(map(str, layers))}" if layers else ""
     command += f" --activation {activation}" if activation else ""
     command += f" --initial-policy {Path(initial_policy).stem}" if initial_policy else ""
