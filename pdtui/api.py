@@ -27,12 +27,13 @@ from pdtui.policies.torchscript import build_torchscript
 from pdtui.policies.weights import policy_loading
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.weights_file import find_weights_file
-from pdtui.robots import open_robot
+from pdtui.robots import RobotSpec, open_robot
 from pdtui.robots.robot import Robot
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_policy_lookup import resolve_map_policy
 from pdtui.stimulation.map_reader import load_map
+from pdtui.stimulation.map_robot_options import combine_map_and_robot
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "DriveArrays",
     "ImportOptions",
     "Policy",
+    "RobotSpec",
     "dissect",
     "drive",
     "load_policy",
@@ -71,7 +73,7 @@ def _takes_fields_of(
 
 def load_policy(
     policy: str | Path | nn.Module,
-    robot: str | Robot | None = None,
+    robot: str | RobotSpec | Robot | None = None,
     *,
     import_options: ImportOptions = NO_OPTIONS,
     observations: int | Sequence[int] | None = None,
@@ -101,8 +103,7 @@ def load_policy(
     Args:
         policy: A weights file, the name of a shipped policy, a TorchScript file, which is read as data (see
             `pdtui.policies.torchscript`), or a `torch.nn.Module`, which is copied.
-        robot: The robot that the policy drives. It gives the shapes and the bounds of actions that a file
-            may lack.
+        robot: The robot that the policy drives; it gives shapes and bounds that a file may lack.
         import_options: Answers to what the weights file does not state; see `pdtui.policies.importers`.
         observations, hidden, decode, batched, initial_state, name: For a network in memory or a TorchScript
             file; see `pdtui.policies.runtime.live_network.policy_from_network`.
@@ -143,9 +144,8 @@ def load_policy(
 def dissect(config: DissectionConfig) -> Dissection:
     """Find out which hidden units move what: monitor, match, probe, and search for behaviors.
 
-    The arguments are the fields of `pdtui.dissection.dissection_config.DissectionConfig`. A robot and a
-    policy given by name are dissected by `workers` processes, which load them again. An object stays in this
-    process; the result is the same.
+    The arguments are the fields of `pdtui.dissection.dissection_config.DissectionConfig`. `workers` processes
+    load a robot and a policy given by name; an object stays in this process, with the same result.
 
     >>> import pdtui
     >>> from torch import nn
@@ -165,7 +165,7 @@ def dissect(config: DissectionConfig) -> Dissection:
 
 
 def drive(
-    robot: str | Robot,
+    robot: str | RobotSpec | Robot,
     stimulation_map: str | Path | StimulationMap | None = None,
     *,
     policy: str | Path | nn.Module | Policy | None = None,
@@ -189,7 +189,7 @@ def drive(
     True
 
     Args:
-        robot: The robot's name, or a `Robot`.
+        robot: The robot's name, its name with options, which override the map's, or a `Robot`.
         stimulation_map: A map, or its name or file. By default, the map that has the robot's name.
         policy: The policy to use instead of the map's; a network in memory has to be the map's own.
         import_options: Answers to what the weights file does not state, in preference to the map's.
@@ -203,14 +203,14 @@ def drive(
         force: Drive even if the map was made for another policy.
 
     Raises:
-        PdtuiError: The robot, the map or the policy cannot be loaded, they do not fit each other, or a key
-            means nothing.
+        PdtuiError: Robot, map or policy cannot be loaded or do not fit each other, or a key means nothing.
     """
-    name = robot.name if isinstance(robot, Robot) else robot
+    name = robot if isinstance(robot, str) else robot.name
     if not isinstance(stimulation_map, StimulationMap):
         stimulation_map = load_map(find_map(str(stimulation_map or name)))
     named = str(policy) if isinstance(policy, str | Path) else ""
     stimulation_map = resolve_map_policy(stimulation_map, named, import_options)
+    stimulation_map, robot = combine_map_and_robot(stimulation_map, robot)
     config = DriveConfig(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
     with open_robot(robot) as world:
         loop = build_control_loop(config, world, None if isinstance(policy, str | Path) else policy)

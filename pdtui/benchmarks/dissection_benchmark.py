@@ -22,6 +22,7 @@ from pdtui.core.units import Stimulation
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
 from pdtui.probing.stimulated_rollout import RolloutJob
+from pdtui.robots import RobotSpec
 from pdtui.spectra.episode_monitor import MonitoredEpisode, monitor_episodes
 from pdtui.spectra.matching import UnitDiscrepancies, match_units
 from pdtui.spectra.matching_presets import MatchingPreset, find_matching_preset
@@ -104,7 +105,10 @@ class DissectionBenchmark:
 
 
 def bench_dissection(
-    robot: str, policy: str, settings: DissectionBenchmarkSettings, progress: Progress | None = None
+    robot: str | RobotSpec,
+    policy: str,
+    settings: DissectionBenchmarkSettings,
+    progress: Progress | None = None,
 ) -> DissectionBenchmark:
     """Record episodes, then measure matching, its growth and memory, and probing with one and two workers.
 

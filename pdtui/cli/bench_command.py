@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.shared_options import (
     build_drive_config,
     integer_option,
@@ -30,15 +31,18 @@ def bench_command() -> None:
 
 @bench_command.command("loop")
 @click.argument("robot")
+@robot_option_flag
 @map_option
 @integer_option("--steps", least=100, default=5000, help="Number of control steps per round.")
 @json_option
-def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bool) -> None:
+def bench_loop_command(
+    robot: str, robot_options: tuple[str, ...], map_name: str | None, steps: int, as_json: bool
+) -> None:
     """Measure control steps per second: bare, with policy, stimulated, recorded."""
     from pdtui.benchmarks.benchmark_tables import loop_benchmark_table
     from pdtui.benchmarks.control_loop_benchmark import bench_loop
 
-    config = build_drive_config(robot, map_name, "")
+    config = build_drive_config(robot, map_name, "", robot_options=robot_options)
     with progress_bar("measuring", quiet=as_json) as advance:
         result = bench_loop(config, steps=steps, progress=advance)
     print_result(asdict(result), as_json, lambda: loop_benchmark_table(result))
@@ -46,6 +50,7 @@ def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bo
 
 @bench_command.command("dissect")
 @click.argument("robot", default="ant")
+@robot_option_flag
 @own_policy_option
 @integer_option("--episodes", most=100, default=5, help="Number of episodes to record.")
 @integer_option("--steps", least=64, default=1000, help="Number of control steps per episode.")
@@ -57,27 +62,34 @@ def bench_loop_command(robot: str, map_name: str | None, steps: int, as_json: bo
 )
 @integer_option("--probes", least=2, default=240, help="Number of roll-outs per round.")
 @json_option
-def bench_dissect_command(robot: str, policy: str, as_json: bool, **sizes: Any) -> None:
+def bench_dissect_command(
+    robot: str, robot_options: tuple[str, ...], policy: str, as_json: bool, **sizes: Any
+) -> None:
     """Measure matching against a loop over librosa, and probing on two workers."""
     from pdtui.benchmarks.benchmark_tables import dissection_benchmark_table
     from pdtui.benchmarks.dissection_benchmark import DissectionBenchmarkSettings, bench_dissection
+    from pdtui.robots import RobotSpec
 
+    world = RobotSpec(robot, parse_robot_options(robot, robot_options))
     with progress_bar("measuring", quiet=as_json) as advance:
-        result = bench_dissection(robot, policy or robot, DissectionBenchmarkSettings(**sizes), advance)
+        result = bench_dissection(world, policy or robot, DissectionBenchmarkSettings(**sizes), advance)
     print_result(asdict(result), as_json, lambda: dissection_benchmark_table(result))
 
 
 @bench_command.command("record")
 @click.argument("robot")
+@robot_option_flag
 @map_option
 @integer_option("--steps", least=100, default=6000, help="Number of control steps per drive.")
 @json_option
-def bench_record_command(robot: str, map_name: str | None, steps: int, as_json: bool) -> None:
+def bench_record_command(
+    robot: str, robot_options: tuple[str, ...], map_name: str | None, steps: int, as_json: bool
+) -> None:
     """Measure the CPU time and disk space of recording at 50 Hz."""
     from pdtui.benchmarks.benchmark_tables import recording_benchmark_table
     from pdtui.benchmarks.recording_benchmark import bench_record
 
-    config = build_drive_config(robot, map_name, "")
+    config = build_drive_config(robot, map_name, "", robot_options=robot_options)
     with progress_bar("measuring", quiet=as_json) as advance:
         result = bench_record(config, steps=steps, progress=advance)
     print_result(asdict(result), as_json, lambda: recording_benchmark_table(result))
@@ -85,6 +97,7 @@ def bench_record_command(robot: str, map_name: str | None, steps: int, as_json: 
 
 @bench_command.command("memory")
 @click.argument("robot")
+@robot_option_flag
 @map_option
 @integer_option(
     "--steps",
@@ -95,13 +108,18 @@ def bench_record_command(robot: str, map_name: str | None, steps: int, as_json: 
 @record_activations_option
 @json_option
 def bench_memory_command(
-    robot: str, map_name: str | None, steps: int, activations: ActivationsKept, as_json: bool
+    robot: str,
+    robot_options: tuple[str, ...],
+    map_name: str | None,
+    steps: int,
+    activations: ActivationsKept,
+    as_json: bool,
 ) -> None:
     """Measure memory while a long drive is recorded and replayed."""
     from pdtui.benchmarks.benchmark_tables import memory_benchmark_table
     from pdtui.benchmarks.recording_benchmark import bench_memory
 
-    config = build_drive_config(robot, map_name, "", activations=activations)
+    config = build_drive_config(robot, map_name, "", robot_options=robot_options, activations=activations)
     with progress_bar("driving", quiet=as_json) as advance:
         result = bench_memory(config, steps=steps, progress=advance)
     print_result(asdict(result), as_json, lambda: memory_benchmark_table(result))
@@ -109,6 +127,7 @@ def bench_memory_command(
 
 @bench_command.command("screen")
 @click.argument("robot")
+@robot_option_flag
 @map_option
 @click.option(
     "--seconds",
@@ -119,12 +138,16 @@ def bench_memory_command(
     help="How long to measure.",
 )
 @json_option
-def bench_screen_command(robot: str, map_name: str | None, seconds: float, as_json: bool) -> None:
+def bench_screen_command(
+    robot: str, robot_options: tuple[str, ...], map_name: str | None, seconds: float, as_json: bool
+) -> None:
     """Measure the time to the first frame and the screen's CPU time."""
     from pdtui.benchmarks.benchmark_tables import screen_benchmark_table
     from pdtui.benchmarks.screen_benchmark import bench_screen
 
-    build_drive_config(robot, map_name, "")  # an error shows before the screen starts
+    # An error shows before the screen starts.
+    build_drive_config(robot, map_name, "", robot_options=robot_options)
     arguments = [robot, "--no-record", *(["--map", map_name] if map_name else [])]
+    arguments += [part for text in robot_options for part in ("--robot-option", text)]
     result = bench_screen(arguments, seconds)
     print_result(asdict(result), as_json, lambda: screen_benchmark_table(result))

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.shared_options import (
     FILE_PATH,
     import_option_flags,
@@ -31,6 +32,7 @@ from pdtui.cli.shared_options import (
     help="Instead of ROBOT, an environment registered with Gymnasium, such as Hopper-v5. A module in front "
     "of it (package.module:Name-v0) is imported first.",
 )
+@robot_option_flag
 @own_policy_option
 @import_option_flags
 @preset_option
@@ -81,6 +83,7 @@ from pdtui.cli.shared_options import (
 def dissect_command(
     robot: str | None,
     env: str | None,
+    robot_options: tuple[str, ...],
     policy: str,
     output: Path | None,
     quick: bool,
@@ -100,13 +103,13 @@ def dissect_command(
     from pdtui.dissection.dissection_config import QUICK_DISSECTION, DissectionConfig, DissectionSettings
     from pdtui.dissection.null_dissection import NullDissection, count_false_confirmations
     from pdtui.pictures.dissection_report import PictureOutputs
-    from pdtui.robots import require_robot_name, robot_file_stem, trust_module
+    from pdtui.robots import RobotSpec, require_robot_name, robot_file_stem, trust_module
 
     if (robot is None) == (env is None):
         raise click.UsageError("expected either ROBOT or --env ID")
     name = str(robot or env)
     trust_module(name)
-    require_robot_name(name)
+    world = RobotSpec(name, parse_robot_options(require_robot_name(name), robot_options))
     output = output or Path("maps") / f"{robot_file_stem(name)}-dissected.toml"
     outputs = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite)
     if not null:
@@ -118,7 +121,7 @@ def dissect_command(
                 advance(done, total, stage)
 
         config = DissectionConfig(
-            name,
+            world,
             policy or name,
             settings=QUICK_DISSECTION if quick else DissectionSettings(),
             budget_minutes=budget,

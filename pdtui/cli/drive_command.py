@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pdtui.cli.options.robot_option_flag import robot_option_flag
 from pdtui.cli.shared_options import (
     FILE_PATH,
     build_drive_config,
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("robot")
+@robot_option_flag
 @map_option
 @map_policy_option
 @import_option_flags

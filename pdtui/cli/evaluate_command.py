@@ -17,6 +17,7 @@ from pdtui.cli.evaluate.paper_experiments import (
     run_experiment,
 )
 from pdtui.cli.evaluate.run_watching import watch_runs
+from pdtui.cli.options.robot_option_flag import robot_option_flag
 from pdtui.cli.shared_options import (
     FILE_PATH,
     SeedList,
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("robot")
 @click.argument("others", nargs=-1, metavar="[MAP.toml]...")
+@robot_option_flag
 @map_option
 @map_policy_option
 @import_option_flags
@@ -94,6 +96,7 @@ if TYPE_CHECKING:
 def evaluate_command(
     robot: str,
     others: tuple[str, ...],
+    robot_options: tuple[str, ...],
     map_name: str | None,
     policy: str,
     import_options: ImportOptions,
@@ -126,11 +129,24 @@ def evaluate_command(
         raise click.UsageError("--start needs --policy-only; tasks and experiments have their own starts")
     if update and force:
         raise MapError("--update cannot be used with --force: the map would get another policy's figures")
-    if others and (map_name or policy):
-        raise click.UsageError("--map and --policy work with one map only; compared maps name their policies")
+    if update and robot_options:
+        raise MapError(
+            "--update cannot be used with --robot-option: the map would get another world's figures"
+        )
+    if others and (map_name or policy or robot_options):
+        raise click.UsageError(
+            "--map, --policy and --robot-option work with one map only; compared maps name what they need"
+        )
     check_experiment(experiment, others, pictures, own_options)
     config = build_drive_config(
-        robot, map_name, policy, import_options, force=force, start=start, without_map=policy_only
+        robot,
+        map_name,
+        policy,
+        import_options,
+        force=force,
+        start=start,
+        without_map=policy_only,
+        robot_options=robot_options,
     )
     if not policy_only:
         check_judging_seeds(config, seeds)

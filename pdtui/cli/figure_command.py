@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.shared_options import (
     FILE_PATH,
     import_option_flags,
@@ -26,6 +27,7 @@ def figure_command() -> None:
 
 @figure_command.command("episode")
 @click.argument("robot")
+@robot_option_flag
 @own_policy_option
 @import_option_flags
 @click.option(
@@ -60,22 +62,29 @@ def figure_command() -> None:
 @click.option("-o", "--output", type=FILE_PATH, required=True, metavar="FILE.png", help="File to write.")
 @overwrite_option
 def episode_command(
-    robot: str, policy: str, start: float, seconds: float, output: Path, overwrite: bool, **selection: Any
+    robot: str,
+    robot_options: tuple[str, ...],
+    policy: str,
+    start: float,
+    seconds: float,
+    output: Path,
+    overwrite: bool,
+    **selection: Any,
 ) -> None:
     """Draw attributes and their matching units over one episode.
 
     As in figure 2 of the paper. ROBOT is a robot's name or the ID of a Gymnasium environment.
     """
     from pdtui.pictures.matplotlib_page import check_figure_path
-    from pdtui.robots import require_robot_name, trust_module
+    from pdtui.robots import RobotSpec, require_robot_name, trust_module
 
     trust_module(robot)
-    require_robot_name(robot)
+    world = RobotSpec(robot, parse_robot_options(require_robot_name(robot), robot_options))
     check_figure_path(output, overwrite)
     from pdtui.pictures.unit_attribute_pairs import draw_unit_attribute_pairs, pair_units_with_attributes
 
     with progress_bar("rolling out") as advance:
-        curves = pair_units_with_attributes(robot, policy or robot, progress=advance, **selection)
+        curves = pair_units_with_attributes(world, policy or robot, progress=advance, **selection)
     draw_unit_attribute_pairs(output, curves, start=start, seconds=seconds)
     for pair in curves.pairs:
         click.echo(

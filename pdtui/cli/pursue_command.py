@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.shared_options import (
     FILE_PATH,
     import_option_flags,
@@ -23,6 +24,7 @@ from pdtui.cli.shared_options import (
 @click.command()
 @click.argument("robot")
 @click.argument("task")
+@robot_option_flag
 @own_policy_option
 @import_option_flags
 @search_seed_option
@@ -38,19 +40,27 @@ from pdtui.cli.shared_options import (
 @workers_option
 @json_option
 def pursue_command(
-    robot: str, task: str, policy: str, quick: bool, output: Path | None, as_json: bool, **search: Any
+    robot: str,
+    task: str,
+    robot_options: tuple[str, ...],
+    policy: str,
+    quick: bool,
+    output: Path | None,
+    as_json: bool,
+    **search: Any,
 ) -> None:
     """Search for a stimulation that makes ROBOT accomplish TASK, and write it into a map.
 
     For example, `pdtui pursue walker hop`.
     """
     from pdtui.dissection.search_task_into_map import search_task_into_map
-    from pdtui.robots import robot_file_stem
+    from pdtui.robots import RobotSpec, robot_file_stem
     from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearchSettings
 
+    world = RobotSpec(robot, parse_robot_options(robot, robot_options))
     with progress_bar("pursuing", quiet=as_json) as advance:
         found = search_task_into_map(
-            robot,
+            world,
             task,
             policy or robot,
             output or Path("maps") / f"{robot_file_stem(robot)}-dissected.toml",

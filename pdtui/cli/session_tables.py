@@ -15,6 +15,7 @@ from pdtui.core.drive_events import describe_event
 from pdtui.core.outcome import describe_outcomes
 from pdtui.core.printable_text import make_printable
 from pdtui.core.text_tables import new_facts_table, new_table
+from pdtui.robots.options.robot_option import format_robot_options
 
 if TYPE_CHECKING:
     from pdtui.sessions.episode_statistics import EpisodeStatistics
@@ -67,6 +68,7 @@ def session_details(session: SessionHeader, summary: SessionSummary) -> Any:
     facts = [
         ("session", session.path),
         ("robot", info.robot),
+        *([("robot options", format_robot_options(info.robot_options))] if info.robot_options else []),
         ("policy", f"{info.policy}, SHA-256 {info.policy_hash}"),
         ("layers", " ".join(map(str, info.layers))),
         ("activations", _KEPT[info.activations]),

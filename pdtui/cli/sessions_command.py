@@ -17,6 +17,7 @@ from pdtui.core.printable_text import make_printable, to_json
 
 BROKEN, DIFFERS = 1, 3
 """Exit codes."""
+_SHOWN = ("robot", "policy", "seed", "stochastic", "start", "layers", "activations")
 _file_argument = click.argument("file", type=FILE_PATH)
 
 
@@ -75,14 +76,9 @@ def show_command(file: Path, as_json: bool) -> None:
     summary = read_session_summary(session)
     data = {
         "path": str(file),
-        "robot": session.info.robot,
-        "policy": session.info.policy,
+        "robot_options": dict(session.info.robot_options),
         "policy_sha256": session.info.policy_hash,
-        "seed": session.info.seed,
-        "stochastic": session.info.stochastic,
-        "start": session.info.start,
-        "layers": session.info.layers,
-        "activations": session.info.activations,
+        **{name: getattr(session.info, name) for name in _SHOWN},
         "map": session.info.map_text,
         "created": session.created,
         "outcome": session.outcome,

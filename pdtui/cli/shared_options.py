@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pdtui.cli.options.robot_option_flag import apply_robot_options, parse_robot_options
 from pdtui.core.errors import MapError, SeedError
 from pdtui.core.printable_text import make_printable, to_json
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, NO_OPTIONS, SQUASH_NAMES, ImportOptions
@@ -153,6 +154,7 @@ def build_drive_config(
     *,
     seed: int = 0,
     without_map: bool = False,
+    robot_options: Sequence[str] = (),
     **options: Any,
 ) -> DriveConfig:
     """Return the drive that the options describe.
@@ -164,10 +166,11 @@ def build_drive_config(
         import_options: answers to what the weights file does not state.
         seed: seed of the drive.
         without_map: whether the policy drives alone where the robot has no map of its own for it.
+        robot_options: options of the robot as they were typed; they take precedence over the map's.
         options: further fields of `DriveConfig`.
     """
     from pdtui.driving.drive_config import DriveConfig
-    from pdtui.robots import require_robot_name, robot_file_stem, trust_module
+    from pdtui.robots import RobotSpec, require_robot_name, robot_file_stem, trust_module
     from pdtui.stimulation.map_library import find_map, map_without_behaviors
     from pdtui.stimulation.map_policy_lookup import is_of_another_policy, resolve_map_policy
     from pdtui.stimulation.map_reader import load_map
@@ -175,10 +178,11 @@ def build_drive_config(
     if map_name is None and robot.endswith(".toml"):
         stimulation_map = load_map(find_map(robot))
         robot = require_robot_name(stimulation_map.robot)
+        typed = parse_robot_options(robot, robot_options)
     else:
         # Typed by the user, unlike the name inside a map.
         trust_module(robot)
-        require_robot_name(robot)
+        typed = parse_robot_options(require_robot_name(robot), robot_options)
         try:
             path = find_map(map_name or robot_file_stem(robot))
         except MapError as error:
@@ -189,10 +193,12 @@ def build_drive_config(
         else:
             stimulation_map = load_map(path)
             drives_alone = map_name is None and without_map and policy and not options.get("force")
-            if drives_alone and is_of_another_policy(stimulation_map, robot, policy, import_options):
+            world = RobotSpec(robot, {**stimulation_map.robot_options, **typed})
+            if drives_alone and is_of_another_policy(stimulation_map, world, policy, import_options):
                 told = f"{path}: made for another policy than {policy}; driving without behaviors"
                 click.echo(make_printable(told), err=True)
                 stimulation_map = map_without_behaviors(robot, policy)
+    stimulation_map = apply_robot_options(stimulation_map, typed)
     stimulation_map = resolve_map_policy(stimulation_map, policy, import_options)
     return DriveConfig(robot, stimulation_map, seed, **options)
 

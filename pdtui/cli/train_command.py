@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.shared_options import FILE_PATH, integer_option, progress_bar
 
 
@@ -21,6 +22,7 @@ def _parse_layers(text: str | None) -> tuple[int, ...] | None:
 
 @click.command()
 @click.argument("robot")
+@robot_option_flag
 @integer_option("--seed", least=0, most=2**31 - 1, default=0, help="Seed of every random choice.")
 @integer_option(
     "--steps", help="Number of control steps, over all worlds; default: that of the robot's recipe."
@@ -66,17 +68,33 @@ def _parse_layers(text: str | None) -> tuple[int, ...] | None:
     help="Folder of the checkpoints; default: runs/ROBOT-ALGORITHM-SEED.",
 )
 def train_command(
-    robot: str, algorithm: str, seed: int, forward: str | None, folder: Path | None, **options: Any
+    robot: str,
+    robot_options: tuple[str, ...],
+    algorithm: str,
+    seed: int,
+    forward: str | None,
+    folder: Path | None,
+    **options: Any,
 ) -> None:
     """Train a policy for ROBOT.
 
     An interrupted run continues from its last checkpoint when the same command is run again.
     """
+    from pdtui.robots import robot_file_stem
     from pdtui.training.train_policy import train_policy
 
-    folder = folder or Path("runs") / "-".join(filter(None, (robot, algorithm, forward, str(seed))))
+    typed = parse_robot_options(robot, robot_options)
+    named = (robot, algorithm, forward, *sorted(map(robot_file_stem, robot_options)), str(seed))
+    folder = folder or Path("runs") / "-".join(filter(None, named))
     with progress_bar("training") as advance:
         path = train_policy(
-            robot, algorithm, seed, forward=forward, folder=folder, progress=advance, **options
+            robot,
+            algorithm,
+            seed,
+            forward=forward,
+            robot_options=typed,
+            folder=folder,
+            progress=advance,
+            **options,
         )
     click.echo(f"best weights: {path}")

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.options.robot_option_flag import robot_option_flag
 from pdtui.cli.shared_options import (
     SeedList,
     build_drive_config,
@@ -27,6 +28,7 @@ from pdtui.policies.weights.import_options import ImportOptions
 @click.argument("map_name", metavar="MAP")
 @click.argument("behaviors", nargs=-1, metavar="[BEHAVIOR]...")
 @click.option("--all", "every", is_flag=True, help="Tune every behavior of mode pid.")
+@robot_option_flag
 @map_policy_option
 @import_option_flags
 @force_option
@@ -48,6 +50,7 @@ def tune_command(
     map_name: str,
     behaviors: tuple[str, ...],
     every: bool,
+    robot_options: tuple[str, ...],
     policy: str,
     import_options: ImportOptions,
     force: bool,
@@ -65,6 +68,8 @@ def tune_command(
     """
     if bool(behaviors) == every:
         raise click.UsageError("expected either a BEHAVIOR or --all")
+    if robot_options and not dry_run:
+        raise MapError("--robot-option needs --dry-run: the map would get gains tuned for another world")
     if force and not dry_run:
         raise MapError("--force needs --dry-run: the map would get gains tuned for another policy")
     from pdtui.evaluation.evaluation_tables import tuning_table
@@ -74,7 +79,9 @@ def tune_command(
     from pdtui.stimulation.map_writer import add_seeds, replace_gains, rewrite_map
 
     path = find_map(map_name)
-    config = build_drive_config(str(path), None, policy, import_options, force=force)
+    config = build_drive_config(
+        str(path), None, policy, import_options, force=force, robot_options=robot_options
+    )
     with progress_bar("tuning", quiet=as_json) as advance:
         results = tune_gains(
             config, behaviors, seeds, settings=TuningSettings(**settings), workers=workers, progress=advance

@@ -67,7 +67,8 @@ def dissect(config: DissectionConfig) -> Dissection:
         robot, network, journal = pool.robot, pool.policy, None
         if config.journal is not None:
             # What the outcome of a roll-out depends on besides its start and plan.
-            identity = json.dumps([robot.name, network.sha256, collect_versions()])
+            options = [dict(robot.build_options)] if robot.build_options else []
+            identity = json.dumps([robot.name, network.sha256, collect_versions(), *options])
             journal = stack.enter_context(RolloutJournal(config.journal, identity))
         prober = EffectProbe(pool, journal)
         known = _fixed_behaviors(first_map, network) if first_map is not None else ()
@@ -126,7 +127,7 @@ def dissect(config: DissectionConfig) -> Dissection:
         behaviors, controllers = searches.run(screen, refined, starts.searches)
         tasks = searches.search_tasks(refined.units)
         return Dissection(
-            robot=config.robot if isinstance(config.robot, str) else robot.name,
+            robot=robot.name,
             policy=network.name if isinstance(config.policy, Policy) else str(config.policy),
             policy_hash=network.sha256,
             layers=network.layers,
@@ -152,6 +153,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             minutes=(time.monotonic() - began) / 60,
             import_options=config.import_options,
             shortened=starts.shortened,
+            robot_options=dict(robot.build_options),
         )
 
 

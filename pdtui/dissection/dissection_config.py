@@ -12,6 +12,7 @@ from torch import nn
 
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
+from pdtui.robots import RobotSpec
 from pdtui.robots.robot import Robot
 from pdtui.search.behavior_search import BehaviorSearchSettings
 from pdtui.search.controller_search import ControllerSearchSettings
@@ -138,7 +139,7 @@ class DissectionConfig:
     Without a time budget, the result depends on neither the machine's speed nor the number of workers.
 
     Attributes:
-        robot: The robot's name, or a robot.
+        robot: The robot's name, its name with options, or a robot.
         policy: A weights file, the name of a shipped policy, a network in memory, or a policy.
         import_options: Answers to what the weights file does not state.
         preset: Preset of the matching, ``paper`` or ``authors``.
@@ -160,7 +161,7 @@ class DissectionConfig:
         SeedError: The seed is reserved for judging.
     """
 
-    robot: str | Robot
+    robot: str | RobotSpec | Robot
     policy: str | Path | nn.Module | Policy
     _: KW_ONLY
     import_options: ImportOptions = NO_OPTIONS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.primitive_judging import PrimitiveJudgement
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.measured_effects import UnitEffects
+from pdtui.robots.options.robot_option import RobotOptions
 from pdtui.robots.robot_goals import RobotGoals
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
@@ -56,6 +57,7 @@ class Dissection:
         rollouts, control_steps, minutes: What the dissection took.
         import_options: Answers to what the weights file does not state.
         shortened: A sentence on roll-outs that were shortened because walks end early; empty if none was.
+        robot_options: Options that the robot was built with.
     """
 
     robot: str
@@ -84,6 +86,7 @@ class Dissection:
     minutes: float
     import_options: ImportOptions = NO_OPTIONS
     shortened: str = ""
+    robot_options: RobotOptions = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return (

@@ -26,6 +26,7 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
     matching, layers = dissection.matching, dissection.layers
     return {
         "robot": dissection.robot,
+        "robot_options": dict(dissection.robot_options),
         "policy": dissection.policy,
         "sha256": dissection.policy_hash,
         "preset": dissection.preset.name,

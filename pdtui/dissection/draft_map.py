@@ -60,6 +60,7 @@ def draft_map(dissection: Dissection) -> str:
                 *(seeds for found in dissection.tasks for seeds in found.seeds),
             ]
         ),
+        robot_options=dict(dissection.robot_options),
     )
     return compose_map(stimulation_map, _comments(dissection, {one.attribute for one in primitives}))
 

@@ -15,11 +15,14 @@ from pdtui.core.errors import MapError
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.robots import RobotSpec
+from pdtui.robots.options.robot_option import format_robot_options
 from pdtui.robots.task import average_figures
 from pdtui.search.evolutionary_search import SharedTimeBudget
 from pdtui.search.task_rollout import StimulationWithDuration
 from pdtui.search.task_search import TaskSearch, TaskSearchResult, TaskSearchSettings
 from pdtui.stimulation.map_reader import load_map
+from pdtui.stimulation.map_robot_options import map_robot
 from pdtui.stimulation.map_writer import add_behavior, add_seeds, compose_map, rewrite_map
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
@@ -69,7 +72,7 @@ class WrittenBehavior:
 
 
 def search_task_into_map(
-    robot: str,
+    robot: RobotSpec,
     task: str,
     policy: str,
     output: Path,
@@ -83,24 +86,35 @@ def search_task_into_map(
 ) -> WrittenBehavior:
     """Search for a stimulation that does a task, and write it into a new map or one of the same policy.
 
+    The robot has the map's options, if there is a map.
     If the map has a behavior for the task, the search also begins from it, and it is replaced.
     After `minutes` it ends with the best found so far.
 
     Raises:
-        MapError: There is no such task, or the map is of another policy or cannot be written.
+        MapError: There is no such task, or the map is of another policy or other options of the robot, or
+            cannot be written.
         PdtuiError: The robot or the policy cannot be loaded.
     """
     known = load_map(output) if output.exists() else None
     check_writable(output, MapError)
+    if known is not None:
+        robot = _robot_of_map(known, robot)
     with RolloutPool(robot, policy, workers, import_options) as pool:
         goal, layers, dt = pool.robot.find_task(task), pool.policy.layers, pool.robot.control_dt
         if known is not None:
-            known.check(robot, layers, pool.policy.sha256)
+            known.check(robot.name, layers, pool.policy.sha256)
         begin = [] if known is None else _known_plans(known, task, pool)
         search = TaskSearch(pool, goal, seed, settings, begin)
         result = search.run(SharedTimeBudget(minutes).share(), progress)
         new_map = StimulationMap(
-            robot, policy, pool.policy.sha256, "space", {}, {}, import_options=import_options
+            robot.name,
+            policy,
+            pool.policy.sha256,
+            "space",
+            {},
+            {},
+            import_options=import_options,
+            robot_options=dict(pool.robot.build_options),
         )
     behavior = draft_task_behavior(result, layers, dt)
 
@@ -120,6 +134,18 @@ def draft_task_behavior(result: TaskSearchResult, layers: tuple[int, ...], dt: f
     period = None if steps is None else round(steps * dt, 6)
     units = result.plan.stimulation.by_address(layers)
     return Behavior(task.name, task.key, task.says, units, period=period, task=task.name)
+
+
+def _robot_of_map(known: StimulationMap, robot: RobotSpec) -> RobotSpec:
+    """Return the robot with the options of the map that gets the behavior."""
+    found = map_robot(known, robot.name)
+    if {**found.options, **robot.options} != found.options:
+        own, typed = (format_robot_options(one.options) or "none" for one in (found, robot))
+        raise MapError(
+            f"{known.source}: expected the map's robot options ({own}), found {typed}; "
+            "-o writes into another map"
+        )
+    return found
 
 
 def _known_plans(

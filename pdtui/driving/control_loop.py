@@ -88,6 +88,7 @@ class ControlLoop:
             # On a road, a step costs something also where nothing is hit.
             obstacles=len(self.robot.scenery.cylinders) > 0 and not self.robot.scenery.lines,
             roads=bool(self.robot.scenery.lines),
+            robot_options=dict(self.robot.build_options),
         )
 
     @property

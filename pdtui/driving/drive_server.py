@@ -79,7 +79,7 @@ class DriveServer:
         loop, recorder = self._loop, self._recorder
         self._sent = self._send(
             DriveFacts(
-                title=loop.robot.title,
+                title=loop.robot.full_title,
                 policy=loop.policy.name,
                 seed=loop.seed,
                 dt=loop.robot.control_dt,

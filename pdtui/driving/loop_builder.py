@@ -14,6 +14,7 @@ from pdtui.policies.weights.import_options import ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot
+from pdtui.stimulation.map_robot_options import map_robot
 
 
 def build_control_loop(
@@ -23,7 +24,8 @@ def build_control_loop(
 
     Those that cannot be loaded, or do not fit each other or the map, raise a `PdtuiError`.
     """
-    robot, stimulation_map = robot or make_robot(config.robot), config.stimulation_map
+    stimulation_map = config.stimulation_map
+    robot = robot or make_robot(map_robot(stimulation_map, config.robot))
     if isinstance(policy, nn.Module):
         policy = policy_from_network(policy, robot.observation_space, robot.action_space)
     policy = policy or load_policy(

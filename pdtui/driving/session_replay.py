@@ -27,6 +27,7 @@ from pdtui.sessions.streams.step_block_reader import read_step_blocks
 from pdtui.sessions.streams.value_differences import StreamDifference
 from pdtui.stimulation.map_policy_lookup import locate_map_policy
 from pdtui.stimulation.map_reader import parse_map
+from pdtui.stimulation.map_robot_options import map_robot
 
 TOLERANCE = 5e-6
 """Tolerance in the first `REQUIRED_STEPS`, in standard deviations of each attribute over the session.
@@ -52,8 +53,10 @@ def config_from_session(session: SessionHeader, source: str, policy: str = "") -
     parts = {part.name: getattr(session, part.name) for part in fields(SessionHeader)}
     stimulation_map = parse_map(info.map_text, f"{source} (map)")
     stimulation_map = locate_map_policy(stimulation_map, policy)
-    # A forced drive had other weights than its map was made for; a replay needs the session's own.
-    stimulation_map = replace(stimulation_map, policy_hash=info.policy_hash)
+    # A drive may have had other weights or another world than its map; a replay needs the session's own.
+    stimulation_map = replace(
+        stimulation_map, policy_hash=info.policy_hash, robot_options=dict(info.robot_options)
+    )
     return DriveConfig(
         robot=info.robot,
         stimulation_map=stimulation_map,
@@ -110,7 +113,7 @@ def replay_session(
     here = collect_versions()
     elsewhere = bool(list_version_differences(header.versions, here, numeric=True)) and not strict
     comparison = ReplayComparison(header.info, required_steps)
-    with open_robot(robot or config.robot) as world:
+    with open_robot(robot or map_robot(config.stimulation_map, config.robot)) as world:
         loop = build_control_loop(replace(config, force=force), world, given)
         if world.attributes != header.info.attributes:
             raise SessionError(f"{path}: the robot has other attributes than the session")

@@ -20,6 +20,7 @@ from pdtui.pictures.matplotlib_page import open_figure_page
 from pdtui.pictures.plot_colors import CYCLE, color_to_hex
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.robots import RobotSpec
 from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_matching_preset
@@ -73,7 +74,7 @@ class UnitAttributePairs:
 
 
 def pair_units_with_attributes(
-    robot: str,
+    robot: str | RobotSpec,
     policy: str,
     *,
     attributes: Sequence[str] = (),
@@ -128,7 +129,7 @@ def pair_units_with_attributes(
             for column, unit in zip(columns, flats, strict=True)
         ]
         times = (np.arange(shown.steps, dtype=np.float64) + 1) * world.control_dt
-        return UnitAttributePairs(robot, network.name, shown.seed, times, tuple(pairs))
+        return UnitAttributePairs(world.name, network.name, shown.seed, times, tuple(pairs))
 
 
 def draw_unit_attribute_pairs(

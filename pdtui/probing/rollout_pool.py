@@ -15,7 +15,7 @@ from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, Obs
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, run_rollout
-from pdtui.robots import make_robot, open_robot
+from pdtui.robots import RobotSpec, make_robot, open_robot
 from pdtui.robots.robot import Robot
 
 # Control steps that a worker is sent at once: enough to make the cost of sending them negligible, few enough
@@ -29,7 +29,7 @@ _Chunk = tuple[Sequence[RolloutJob], dict[int, StartState], int, int]
 """Jobs, their starts by index, the steps of each roll-out, and the first step that is measured."""
 
 
-def _build_pair(robot: str, policy: str, import_options: ImportOptions) -> _Pair:
+def _build_pair(robot: RobotSpec, policy: str, import_options: ImportOptions) -> _Pair:
     world = make_robot(robot)
     world.allow_near_restores()
     return world, _load(policy, world, import_options)
@@ -65,7 +65,7 @@ class RolloutPool(Closable):
 
     def __init__(
         self,
-        robot: str | Robot,
+        robot: str | RobotSpec | Robot,
         policy: str | Path | Policy,
         workers: int = 2,
         import_options: ImportOptions = NO_OPTIONS,
@@ -76,15 +76,16 @@ class RolloutPool(Closable):
             self.policy = policy if isinstance(policy, Policy) else _load(policy, self.robot, import_options)
             check_policy_fit(self.policy, self.robot, self.robot.name)
             self._resources = stack.pop_all()
-        if isinstance(robot, str):
+        by_name = isinstance(robot, str | RobotSpec)
+        if by_name:
             self.robot.allow_near_restores()
-        named = isinstance(robot, str) and not isinstance(policy, Policy)
+        named = by_name and not isinstance(policy, Policy)
         self._pool = WorkerPool(
             f"roll-outs of {self.robot.name}",
             workers if named else 1,
             (self.robot, self.policy),
             _build_pair,
-            *(robot, str(policy), import_options),
+            *(RobotSpec(self.robot.name, dict(self.robot.build_options)), str(policy), import_options),
         )
         self.rollouts = self.control_steps = 0
 

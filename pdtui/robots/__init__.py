@@ -1,7 +1,9 @@
 """Robots by name. Importing this room loads no simulator."""
 
+from pdtui.robots.options.robot_spec import RobotSpec
 from pdtui.robots.robot_registry import (
     list_robot_names,
+    list_robot_options,
     make_robot,
     open_robot,
     require_robot_name,
@@ -10,7 +12,9 @@ from pdtui.robots.robot_registry import (
 )
 
 __all__ = [
+    "RobotSpec",
     "list_robot_names",
+    "list_robot_options",
     "make_robot",
     "open_robot",
     "require_robot_name",

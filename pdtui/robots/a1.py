@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium
 import numpy as np
@@ -97,7 +97,7 @@ class A1(BulletRobot):
 
     def __init__(
         self,
-        terrain: str = "plane",
+        terrain: Literal["plane", "rough", "forest"] = "plane",
         roughness: float = 0.05,
         density: float = 0.15,
         top_speed: float = math.inf,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Literal
 
 import gymnasium
 import numpy as np
@@ -61,7 +62,7 @@ class A1Vision(A1):
         initial_policy="a1",
     )
 
-    def __init__(self, terrain: str = "forest", **options: float) -> None:
+    def __init__(self, terrain: Literal["plane", "rough", "forest"] = "forest", **options: float) -> None:
         super().__init__(terrain, **options)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93 + len(_RAYS),), np.float64)
 

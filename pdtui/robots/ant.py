@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from gymnasium.envs.mujoco.ant_v5 import AntEnv
@@ -39,7 +39,7 @@ class Ant(MujocoRobot, AntEnv):
     title = "Ant (MuJoCo)"
     training_recipe = TrainingRecipe(options={"forward": "x"})
 
-    def __init__(self, forward: str = "either") -> None:
+    def __init__(self, forward: Literal["either", "x"] = "either") -> None:
         super().__init__(include_cfrc_ext_in_observation=False)
         self._forward = forward
         self.links = read_model_links(self.model)

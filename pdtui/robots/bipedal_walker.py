@@ -14,6 +14,7 @@ from gymnasium.envs.box2d import bipedal_walker as stock
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
+from pdtui.core.errors import RobotError
 from pdtui.core.outcome import Outcome, fall_info
 from pdtui.core.robot_links_and_state import Link
 from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
@@ -23,6 +24,7 @@ from pdtui.robots.robot import TrainingRecipe, torque_attributes
 FINISH = (stock.TERRAIN_LENGTH - stock.TERRAIN_GRASS) * stock.TERRAIN_STEP
 _GROUND_LENGTH = 2000.0  # m
 _JOINTS = ("hip 1", "knee 1", "hip 2", "knee 2")
+_MAX_TORQUE = 10_000.0  # N m, beyond which the bodies are too light for the simulator
 _LEG_OFFSET = 0.2  # of a drawn leg from the middle, m: the world is flat, its picture need not be
 # Angles of a split (rad): hips and knees are at their limits, leg 1 in front on its foot, leg 2 behind on its
 # knee. A flip may end like this, and the shipped policy does not get up by itself.
@@ -123,6 +125,9 @@ class BipedalWalker(GymnasiumRobot):
 
     Args:
         torque: Torque of the strongest motor command, N m. Gymnasium's is 80, which is too weak for flips.
+
+    Raises:
+        RobotError: The torque is not from 1 to 10,000 N m.
     """
 
     name = "bipedal_walker"
@@ -135,6 +140,8 @@ class BipedalWalker(GymnasiumRobot):
     starts = ("split",)
 
     def __init__(self, torque: float = 300.0) -> None:
+        if not 1.0 <= torque <= _MAX_TORQUE:
+            raise RobotError(f"{self.name}: expected a torque of 1 to {_MAX_TORQUE:g} N m, found {torque:g}")
         self._torque, self._scales = torque, (1.0, 1.0)
         super().__init__(self.name, self.title)
         self.links = _links()

@@ -18,6 +18,7 @@ from pdtui.core.errors import RobotError
 from pdtui.core.outcome import Outcome, outcome_of_step
 from pdtui.core.robot_links_and_state import CommandRange, Link, ManualControl, RobotState
 from pdtui.core.scenery import NO_SCENERY, NO_TRAFFIC, Scenery, Traffic
+from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions, format_robot_options
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
 from pdtui.robots.task import Task, find_task
 
@@ -85,6 +86,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
             long as the world does, and another replaces it when that changes, as in `reset` and `restore`.
         outcomes: How its episodes can end by themselves. Tables say so even if none ended that way.
         state_arrays: Names of the Python attributes, all of them arrays, that belong to a robot's state.
+        build_options: Options with which `make_robot` built it; those that it does not name have defaults.
     """
 
     name: str
@@ -102,6 +104,12 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     scenery: Scenery = NO_SCENERY
     outcomes: tuple[Outcome, ...] = (Outcome.FELL,)
     state_arrays: tuple[str, ...] = ()
+    build_options: RobotOptions = NO_ROBOT_OPTIONS
+
+    @property
+    def full_title(self) -> str:
+        """The name for people, with the options that the robot was built with."""
+        return ", ".join(filter(None, (self.title, format_robot_options(self.build_options))))
 
     @property
     @abstractmethod

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from difflib import get_close_matches
 from importlib import import_module
@@ -20,6 +20,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pdtui.core.errors import RobotError
+from pdtui.robots.options.constructor_options import read_constructor_options
+from pdtui.robots.options.robot_option import OptionValue, RobotOption, check_robot_options
+from pdtui.robots.options.robot_spec import RobotSpec
 
 if TYPE_CHECKING:
     from pdtui.robots.robot import Robot
@@ -69,32 +72,56 @@ def require_robot_name(name: str) -> str:
     return name
 
 
-def make_robot(name: str, **options: Any) -> Robot:
-    """Build a robot in its own simulator.
-
-    Args:
-        name: Name of one of pdtui's own robots, of an entry point of group `GROUP`, or of an environment that
-            is registered with Gymnasium, in this order.
-        options: Arguments of the robot's class; environments have none.
+def list_robot_options(name: str) -> tuple[RobotOption, ...]:
+    """Return the options with which a robot can be built.
 
     Raises:
         RobotError: No robot has that name, or what it needs is not installed.
     """
     module = find_own_robots().get(name)
     if module is not None:
-        return _build_own(name, module, options)
+        return read_constructor_options(_import_own(name, module))
     entry = _find_entry_point(name)
-    return _build_environment(name) if entry is None else _build_from_entry(entry, options)
+    if entry is not None:
+        return read_constructor_options(_load_entry(entry))
+    from pdtui.robots.environments.environment_options import read_environment_options
+
+    return read_environment_options(_find_environment(name))
+
+
+def make_robot(robot: str | RobotSpec, **options: OptionValue) -> Robot:
+    """Build a robot in its own simulator.
+
+    Args:
+        robot: Name of one of pdtui's own robots, of an entry point of group `GROUP`, or of an environment
+            that is registered with Gymnasium, in this order; or a name with options.
+        options: Options by name (see `list_robot_options`), in preference to those of a `RobotSpec`.
+
+    Raises:
+        RobotError: No robot has that name, it has no such option, or what it needs is not installed.
+    """
+    name, given = (robot, options) if isinstance(robot, str) else (robot.name, {**robot.options, **options})
+    checked = check_robot_options(name, list_robot_options(name), given) if given else {}
+    module = find_own_robots().get(name)
+    entry = None if module is not None else _find_entry_point(name)
+    if module is not None:
+        built: Robot = _import_own(name, module)(**checked)
+    elif entry is not None:
+        built = _build_from_entry(entry, checked)
+    else:
+        built = _build_environment(name, checked)
+    built.build_options = checked
+    return built
 
 
 @contextmanager
-def open_robot(robot: str | Robot) -> Iterator[Robot]:
+def open_robot(robot: str | RobotSpec | Robot) -> Iterator[Robot]:
     """Yield a robot; if it is given by name, it is built here and closed when the block ends.
 
     Raises:
         RobotError: As `make_robot` does.
     """
-    if not isinstance(robot, str):
+    if not isinstance(robot, str | RobotSpec):
         yield robot
         return
     with closing(make_robot(robot)) as built:
@@ -106,27 +133,42 @@ def robot_file_stem(name: str) -> str:
     return re.sub(r"[^\w.-]", "-", name)
 
 
-def _build_own(name: str, module: str, options: dict[str, Any]) -> Robot:
+def _import_own(name: str, module: str) -> type[Robot]:
     try:
         classes = vars(import_module(module)).values()
     except ImportError as error:
         raise RobotError(f"robot '{name}' needs a package that is not installed: {error}") from error
-    kind = next(one for one in classes if isinstance(one, type) and vars(one).get("name") == name)
-    robot: Robot = kind(**options)
-    return robot
+    kind: type[Robot] = next(
+        one for one in classes if isinstance(one, type) and vars(one).get("name") == name
+    )
+    return kind
 
 
 def _find_entry_point(name: str) -> EntryPoint | None:
     return next(iter(entry_points(group=GROUP, name=name)), None)
 
 
-def _build_from_entry(entry: EntryPoint, options: dict[str, Any]) -> Robot:
+def _entry_label(entry: EntryPoint) -> str:
+    package = f" of {entry.dist.name}" if entry.dist is not None else ""
+    return f"robot '{entry.name}' (entry point {entry.value}{package})"
+
+
+def _load_entry(entry: EntryPoint) -> Callable[..., Any]:
+    try:
+        build: Callable[..., Any] = entry.load()
+    except Exception as error:  # whatever a third party's module raises
+        raise RobotError(
+            f"{_entry_label(entry)}: cannot be built: {type(error).__name__}: {error}"
+        ) from error
+    return build
+
+
+def _build_from_entry(entry: EntryPoint, options: Mapping[str, OptionValue]) -> Robot:
     from pdtui.robots.robot import Robot
 
-    package = f" of {entry.dist.name}" if entry.dist is not None else ""
-    label = f"robot '{entry.name}' (entry point {entry.value}{package})"
+    label, build = _entry_label(entry), _load_entry(entry)
     try:
-        robot = entry.load()(**options)
+        robot = build(**options)
     except RobotError:
         raise
     except Exception as error:  # whatever a third party's module raises
@@ -138,16 +180,16 @@ def _build_from_entry(entry: EntryPoint, options: dict[str, Any]) -> Robot:
     return robot
 
 
-def _build_environment(name: str) -> Robot:
+def _build_environment(name: str, options: Mapping[str, OptionValue]) -> Robot:
     from pdtui.robots.environments.gymnasium_robot import make_environment
     from pdtui.robots.environments.mujoco_gymnasium_robot import MujocoGymnasiumRobot, is_mujoco
     from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
     from pdtui.robots.simulators.mujoco_robot import suppress_warnings
 
     environment = _find_environment(name)
-    with suppress_warnings(), closing(make_environment(environment)) as env:
+    with suppress_warnings(), closing(make_environment(environment, options)) as env:
         kind = MujocoGymnasiumRobot if is_mujoco(env) else PlainGymnasiumRobot
-    return kind(name, environment=environment)
+    return kind(name, environment=environment, options=options)
 
 
 def _find_environment(name: str) -> str:

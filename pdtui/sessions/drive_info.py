@@ -12,6 +12,7 @@ from pdtui.core.attributes import Attribute
 from pdtui.core.errors import SessionError
 from pdtui.core.robot_links_and_state import Link
 from pdtui.core.untrusted_file import MAP_BUDGET
+from pdtui.robots.options.robot_option import OptionValue, RobotOptions, require_usable_value
 from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, SCHEMA, ActivationsKept
 
 
@@ -34,6 +35,7 @@ class DriveInfo:
         obstacles: whether there are obstacles, and no roads, where the first episode starts: all costs are
             collisions then.
         roads: whether there are roads where the first episode starts.
+        robot_options: options that the robot was built with, by name.
     """
 
     robot: str
@@ -50,11 +52,12 @@ class DriveInfo:
     start: str = ""
     obstacles: bool = False
     roads: bool = False
+    robot_options: RobotOptions = field(default_factory=dict)
 
 
 T = TypeVar("T")
 _SIZES = {"capsule": 2, "sphere": 1, "box": 3}
-_MAX_LINKS, _MAX_UNITS, _MAX_TEXT = 10_000, 4_000_000, 1000
+_MAX_LINKS, _MAX_UNITS, _MAX_TEXT, _MAX_OPTIONS = 10_000, 4_000_000, 1000, 100
 
 
 def encode_drive_info(info: DriveInfo, created: str) -> dict[str, Any]:
@@ -76,6 +79,7 @@ def encode_drive_info(info: DriveInfo, created: str) -> dict[str, Any]:
         "activations": info.activations,
         "attributes": json.dumps([asdict(attribute) for attribute in info.attributes]),
         "links": json.dumps([asdict(link) for link in info.links]),
+        "robot_options": json.dumps(dict(info.robot_options)),
         "map": info.map_text,
     }
 
@@ -124,6 +128,7 @@ def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, s
         start=_read_text(properties, "start", default=""),
         obstacles=_read_value(properties, "obstacles", bool, False),
         roads=_read_value(properties, "roads", bool, False),
+        robot_options=_read_robot_options(properties),
     )
     return info, _read_text(properties, "created")
 
@@ -144,6 +149,19 @@ def _read_text(
     if len(text) > limit:
         raise SessionError(f"property '{name}': expected at most {limit} characters, found {len(text)}")
     return text
+
+
+def _read_robot_options(properties: Mapping[str, list[Any]]) -> RobotOptions:
+    text = _read_text(properties, "robot_options", _MAX_OPTIONS * _MAX_TEXT, "{}")
+    try:
+        options = json.loads(text)
+        if not isinstance(options, dict) or len(options) > _MAX_OPTIONS:
+            raise ValueError(f"expected a table of at most {_MAX_OPTIONS} options")
+        if not all(isinstance(value, OptionValue) for value in options.values()):
+            raise ValueError("expected texts, numbers, or true or false")
+        return {_check_text(name): require_usable_value(value) for name, value in options.items()}
+    except (ValueError, OverflowError, RecursionError) as error:
+        raise SessionError(f"property 'robot_options': invalid: {error!r}") from error
 
 
 def _read_list(

@@ -10,6 +10,7 @@ import numpy as np
 
 from pdtui.core.drive_events import DriveEvent, describe_event
 from pdtui.core.errors import SessionError
+from pdtui.robots.options.robot_option import format_robot_options
 from pdtui.sessions.environment_versions import version_differences
 from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.streams.block_pairs import pair_blocks
@@ -98,6 +99,9 @@ def _list_circumstances(a: SessionHeader, b: SessionHeader) -> tuple[str, ...]:
         for name in ("robot", "seed", "policy", "policy_hash", "stochastic", "start", "dt", "layers")
         if getattr(a.info, name) != getattr(b.info, name)
     ]
+    if a.info.robot_options != b.info.robot_options:
+        one, other = (format_robot_options(x.info.robot_options) or "none" for x in (a, b))
+        lines.append(f"robot options: {one} and {other}")
     if a.info.map_text != b.info.map_text:
         lines.append("map: not the same text")
     if a.info.links != b.info.links:

@@ -13,7 +13,7 @@ from pdtui.policies.weights.import_options import (
 )
 from pdtui.policies.weights.policy_file_lookup import find_file_inside_folders
 from pdtui.policies.weights.policy_loading import load_policy
-from pdtui.robots import open_robot
+from pdtui.robots import RobotSpec, open_robot
 from pdtui.stimulation.map_writer import compose_map, replace_policy
 from pdtui.stimulation.stimulation_map import StimulationMap
 
@@ -57,7 +57,7 @@ def locate_map_policy(
 
 
 def is_of_another_policy(
-    stimulation_map: StimulationMap, robot: str, policy: str, import_options: ImportOptions = NO_OPTIONS
+    stimulation_map: StimulationMap, robot: RobotSpec, policy: str, import_options: ImportOptions = NO_OPTIONS
 ) -> bool:
     """Return whether a map was made for another policy of a robot than the one of this file or name.
 
@@ -66,7 +66,7 @@ def is_of_another_policy(
     """
     with open_robot(robot) as world:
         spaces = ObservationActionSpaces.of_world(world)
-    given = load_policy(policy, robot, import_options=import_options, spaces=spaces)
+    given = load_policy(policy, robot.name, import_options=import_options, spaces=spaces)
     return given.sha256 != stimulation_map.policy_hash
 
 

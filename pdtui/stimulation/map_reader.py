@@ -13,6 +13,7 @@ from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.core.units import ADDRESS
 from pdtui.core.untrusted_file import MAP_BUDGET, describe_bytes, read_bounded_file
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions
+from pdtui.robots.options.robot_option import OptionValue
 from pdtui.stimulation.map_table_reader import MapTableReader
 from pdtui.stimulation.seed_ranges import merge_seed_ranges, parse_seed_range
 from pdtui.stimulation.stimulation_map import (
@@ -25,6 +26,8 @@ from pdtui.stimulation.stimulation_map import (
     StimulationMap,
 )
 
+ROBOT_OPTIONS = "robot_options"
+"""Name of the table of the robot's options."""
 MAX_BEHAVIORS = 1000
 """Largest number of behaviors, and of primitives."""
 MAX_PERIOD = 1e6
@@ -80,7 +83,7 @@ def parse_map(text: str, source: str) -> StimulationMap:
         ]
         for kind in ("primitives", "behaviors")
     }
-    seeds = _read_seeds(top)
+    seeds, robot_options = _read_seeds(top), _read_robot_options(top, source, text)
     top.done()
     for kind, entries in tables.items():
         if len(entries) > MAX_BEHAVIORS:
@@ -99,8 +102,24 @@ def parse_map(text: str, source: str) -> StimulationMap:
             if other not in behaviors:
                 raise table.error("together", f"names '{other}', which does not exist")
     return StimulationMap(
-        robot, name, sha256, default_key, primitives, behaviors, text, source, import_options, seeds
+        robot,
+        name,
+        sha256,
+        default_key,
+        primitives,
+        behaviors,
+        text,
+        source,
+        import_options,
+        seeds,
+        robot_options,
     )
+
+
+def _read_robot_options(top: MapTableReader, source: str, text: str) -> dict[str, OptionValue]:
+    """Read the robot's options; which ones the robot has is known only where it is built."""
+    data = top.take(ROBOT_OPTIONS, dict, {})
+    return MapTableReader(source, text, ROBOT_OPTIONS, data, f"[{ROBOT_OPTIONS}]", 0).option_values()
 
 
 def _read_seeds(top: MapTableReader) -> tuple[range, ...] | None:

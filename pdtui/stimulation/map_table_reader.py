@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 from pdtui.core.errors import MapError
+from pdtui.robots.options.robot_option import OptionValue, require_usable_value
 
 NUMBER = (int, float)
 MAX_TEXT = 1000
@@ -90,6 +91,19 @@ class MapTableReader:
             if isinstance(value, bool) or not isinstance(value, NUMBER) or not _is_usable(value):
                 raise self.error(name, f"'{key[:80]}': expected {_IN_LIMITS}, found {_describe(value)}")
         return {key: float(value) for key, value in data.items()}
+
+    def option_values(self) -> dict[str, OptionValue]:
+        """Take all fields, which are texts, numbers, or true or false."""
+        values: dict[str, OptionValue] = {}
+        for name, value in self._data.items():
+            if not isinstance(value, OptionValue):
+                raise self.error(name, f"expected text, a number, or true or false, found {_describe(value)}")
+            try:
+                values[name] = require_usable_value(value)
+            except ValueError as problem:
+                raise self.error(name, str(problem)) from problem
+        self._data = {}
+        return values
 
     def done(self) -> None:
         """Check that every field was taken."""

@@ -21,7 +21,8 @@ from pdtui.core.atomic_file import write_file
 from pdtui.core.attributes import BehaviorAim
 from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
-from pdtui.stimulation.map_reader import parse_map
+from pdtui.robots.options.robot_option import RobotOptions
+from pdtui.stimulation.map_reader import ROBOT_OPTIONS, parse_map
 from pdtui.stimulation.seed_ranges import format_seed_ranges, merge_seed_ranges, parse_seed_range
 from pdtui.stimulation.stimulation_map import (
     SCHEMA,
@@ -52,6 +53,8 @@ def compose_map(stimulation_map: StimulationMap, comments: Sequence[str] = ()) -
     document.add("robot", tomlkit.item(stimulation_map.robot))
     if stimulation_map.seeds:
         document.add("seeds", tomlkit.item(format_seed_ranges(stimulation_map.seeds)))
+    if stimulation_map.robot_options:
+        document.add(ROBOT_OPTIONS, _table_of(stimulation_map.robot_options))
     policy = stimulation_map.policy, stimulation_map.policy_hash, stimulation_map.import_options
     document.add("policy", _table_of(_policy_fields(*policy)))
     document.add("keys", _table_of({"default": stimulation_map.default_key}))
@@ -107,6 +110,17 @@ def replace_policy(text: str, name: str, import_options: ImportOptions, source: 
     changed = f"{text[:start]}{tomlkit.dumps(part)}{text[end:]}"
     parse_map(changed, source)
     return changed
+
+
+def replace_robot_options(text: str, options: RobotOptions, source: str) -> str:
+    """Return the text of a map with other options of the robot."""
+
+    def replace(document: Any) -> None:
+        document.pop(ROBOT_OPTIONS, None)
+        if options:
+            document.add(ROBOT_OPTIONS, _table_of(options))
+
+    return _edit(text, source, replace)
 
 
 def add_behavior(text: str, behavior: Behavior, source: str) -> str:

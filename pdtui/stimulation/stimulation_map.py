@@ -9,6 +9,7 @@ from pdtui.core.attributes import BehaviorAim
 from pdtui.core.errors import MapError, PolicyError
 from pdtui.core.units import parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
+from pdtui.robots.options.robot_option import OptionValue
 
 SCHEMA = 1
 BehaviorMode = Literal["fixed", "pid"]
@@ -127,6 +128,7 @@ class StimulationMap:
         source: Name of the map in messages.
         import_options: Answers to what the weights file does not state.
         seeds: Seeds on which anything in the map was searched, tuned or chosen; None if it does not say.
+        robot_options: Options with which the robot is built, by name.
     """
 
     robot: str
@@ -139,6 +141,7 @@ class StimulationMap:
     source: str = "map"
     import_options: ImportOptions = NO_OPTIONS
     seeds: tuple[range, ...] | None = None
+    robot_options: dict[str, OptionValue] = field(default_factory=dict)
 
     def units_of(self, behavior: Behavior) -> dict[str, float]:
         """Return a behavior's outputs v by unit address; ``v = c ρ`` for a primitive (section 3.3)."""
@@ -152,6 +155,11 @@ class StimulationMap:
         """Return the behavior that a key latches, if any."""
         return next((behavior for behavior in self.behaviors.values() if behavior.key == key), None)
 
+    def check_robot(self, robot: str) -> None:
+        """Check that the map is for a robot of this name; otherwise raise a `MapError`."""
+        if self.robot != robot:
+            raise MapError(f"{self.source}: made for robot '{self.robot}', not for '{robot}'")
+
     def check(self, robot: str, layers: tuple[int, ...], policy_hash: str, *, force: bool = False) -> None:
         """Check that the map fits a policy.
 
@@ -159,8 +167,7 @@ class StimulationMap:
             MapError: The map is for another robot, for another policy and not forced, or names a unit that
                 does not exist. A map without behaviors need not name the policy's hash.
         """
-        if self.robot != robot:
-            raise MapError(f"{self.source}: made for robot '{self.robot}', not for '{robot}'")
+        self.check_robot(robot)
         hash_matters = self.policy_hash or self.behaviors
         if hash_matters and self.policy_hash != policy_hash and not force:
             raise MapError(

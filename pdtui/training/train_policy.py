@@ -9,6 +9,7 @@ from typing import Any
 
 from pdtui.core.errors import TrainingError
 from pdtui.robots import list_robot_names, make_robot
+from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions, format_option_value
 from pdtui.training.training_config import PpoConfig, SacConfig
 
 
@@ -25,8 +26,11 @@ def train_policy(
     layers: tuple[int, ...] | None = None,
     activation: str | None = None,
     initial_policy: str | None = None,
+    robot_options: RobotOptions = NO_ROBOT_OPTIONS,
 ) -> Path:
     """Train a policy in a folder, or continue there, and return the path of the best weights.
+
+    The robot is built with the options of its recipe, except for those that are given.
 
     Raises:
         TrainingError: The extra ``train`` is not installed, the robot is an environment of Gymnasium or has
@@ -46,7 +50,7 @@ def train_policy(
         from pdtui.training.sac_trainer import SacTrainer
     except ImportError as error:
         raise TrainingError(f"training needs the extra: pip install 'pdtui[train]' ({error})") from error
-    options = dict(recipe.options) | ({"forward": forward} if forward else {})
+    options = {**recipe.options, **({"forward": forward} if forward else {}), **robot_options}
     defaults = PpoConfig() if algorithm == "ppo" else SacConfig()
     choices: dict[str, Any] = {"layers": layers, "activation": activation, "initial_policy": initial_policy}
     if algorithm == "sac" and (activation not in (None, "tanh") or initial_policy):
@@ -59,6 +63,8 @@ def train_policy(
         f"pdtui train {robot} --algorithm {algorithm} --seed {seed} --steps {config.total_steps} "
         f"--learning-rate {config.learning_rate:g}" + (f" --forward {forward}" if forward else "")
     )
+    for name, value in robot_options.items():
+        command += f" --robot-option {name}={format_option_value(value)}"
     command += f" --layers {','.join(map(str, layers))}" if layers else ""
     command += f" --activation {activation}" if activation else ""
     command += f" --initial-policy {Path(initial_policy).stem}" if initial_policy else ""

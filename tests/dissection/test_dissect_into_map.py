@@ -49,6 +49,11 @@ def test_roll_outs_are_kept_until_map_and_pictures_are_written(policy_file: Path
     assert tuple(load_map(output).behaviors) == written.behaviors
 
 
+def test_the_map_names_the_robots_options(dissection: Dissection) -> None:
+    assert dissection.to_map().robot_options == dissection.robot_options == {}
+    assert replace(dissection, robot_options={"forward": "x"}).to_map().robot_options == {"forward": "x"}
+
+
 def test_the_command_has_the_defaults_of_the_python_api() -> None:
     defaults = {field.name: field.default for field in fields(DissectionConfig)}
     options = {option.name: option.default for option in dissect_command.params}

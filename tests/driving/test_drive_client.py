@@ -7,6 +7,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -90,6 +91,12 @@ def test_a_drive_through_the_pipe_is_recorded_and_replays(connection: DriveClien
     result = replay_session(recording)
     assert result.first_difference is None
     assert result.steps == session.steps
+
+
+def test_the_simulation_has_the_maps_robot_options_and_says_so(small_map: StimulationMap) -> None:
+    connection = DriveClient(DriveConfig("ant", replace(small_map, robot_options={"forward": "x"}), 3))
+    assert _briefing(connection).title == "Ant (MuJoCo), forward = x"
+    connection.close()
 
 
 def test_pause_single_step_and_speed_are_no_part_of_the_run(connection: DriveClient) -> None:

@@ -55,5 +55,7 @@ def test_a_missing_policy_lists_the_shipped_ones() -> None:
 
 
 def test_a_policy_of_another_robot_is_refused(weights: Path) -> None:
-    with pytest.raises(PolicyError, match="expected a policy for robot 'walker', found one for 'ant'"):
+    with pytest.raises(
+        PolicyError, match="expected a policy for robot 'walker', found one for 'ant'; `pdtui conv"
+    ):
         load_policy(weights, "walker")

@@ -220,7 +220,7 @@ def test_what_it_does_not_have_is_refused(a1: A1) -> None:
     with pytest.raises(RobotError, match="no start 'moon'; available: plane, rough, forest"):
         a1.reset(options={"start": "moon"})
     with pytest.raises(RobotError, match="no terrain 'moon'; available: plane, rough, forest"):
-        A1("moon")
+        A1("moon")  # type: ignore[arg-type]
     a1.reset(seed=0)
     ant = make_robot("ant")
     ant.reset(seed=0)

@@ -79,6 +79,28 @@ def test_a_damaged_head_of_a_chunk_is_named(tmp_path: Path) -> None:
             read_session_header(path)
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ("[1]", "expected a table of at most 100 options"),
+        ('{"torque": [1]}', "expected texts, numbers, or true or false"),
+        ('{"torque": Infinity}', "expected a finite number"),
+        ('{"road": "\\u001b[31m"}', "expected printable text"),
+        ("{", "property 'robot_options': invalid"),
+    ],
+)
+def test_robot_options_that_are_none_are_refused(options: str, said: str) -> None:
+    info = read_session_header(SAMPLES / "ant.rrd").info
+    assert info.robot_options == {}  # the sample is older than the property
+    properties = {
+        name: value if isinstance(value, list) else [value]
+        for name, value in encode_drive_info(info, "2026-01-01").items()
+    }
+    assert decode_drive_info(properties)[0] == info
+    with pytest.raises(SessionError, match=said):
+        decode_drive_info({**properties, "robot_options": [options]})
+
+
 @pytest.mark.parametrize("cut", [40, 500, 3000, 10**6])
 def test_the_start_of_a_block_is_decompressed_from_its_start(cut: int) -> None:
     content = b"".join(b"%d, %d, " % (number % 77, number * number) for number in range(3000)) + bytes(70_000)

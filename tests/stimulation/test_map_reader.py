@@ -69,6 +69,16 @@ def test_a_map_is_read_whole(small_map: StimulationMap, map_text: str) -> None:
         ('says = "pushes"', 'says = "\\u001b[31m"', r"m\.toml:22: .*'says': expected printable text"),
         ('robot = "ant"\n', "", r"field 'robot': missing"),
         ("[keys]", "[keys", "not a TOML file"),
+        (
+            "[keys]",
+            "[robot_options]\nforward = []\n[keys]",
+            r"m\.toml:9: robot_options: field 'forward': expected text, a number, or true or false",
+        ),
+        (
+            "[keys]",
+            "[robot_options]\nforward = inf\n[keys]",
+            r"m\.toml:9: robot_options: field 'forward': expected a finite number",
+        ),
     ],
 )
 def test_mistakes_name_line_and_field(map_text: str, old: str, new: str, message: str) -> None:

@@ -25,11 +25,13 @@ FIGURES = {"push": MeasuredEffect(1.23456, 1.0, 1.5, 2, 20)}
 
 def test_a_composed_map_reads_back_as_what_it_was_made_of(map_text: str) -> None:
     text = map_text.replace('mode = "pid"', 'mode = "pid"\nbase = { "0:5" = 0.5 }\ncommands = { pace = 0.5 }')
-    text = text.replace("[keys]", 'activation = "relu"\n\n[keys]').replace(
+    options = '[robot_options]\nforward = "x"\nlegs = 4\nweight = 0.5\nstrong = true\n\n'
+    text = text.replace("[keys]", f'activation = "relu"\n\n{options}[keys]').replace(
         '"push"]\n', '"push"]\ntask = "hop"\n'
     )
     maps = [parse_map(text, "m"), *(load_map(path) for path in shipped_folder("maps").glob("*.toml"))]
     assert len(maps) > 5
+    assert maps[0].robot_options == {"forward": "x", "legs": 4, "weight": 0.5, "strong": True}
     for one in maps:
         composed = compose_map(one, ["first", "second"])
         assert composed.startswith("# first\n# second\nschema = 1\n")

@@ -215,5 +215,6 @@ def _with_vision(config: DriveConfig) -> DriveConfig:
         find_weights_file(name)
     except PolicyError as error:
         raise PolicyError(f"'{name}' has no policy yet: {error}") from error
-    nothing = StimulationMap(name, name, "", config.stimulation_map.default_key, {}, {})
+    judged = config.stimulation_map
+    nothing = StimulationMap(name, name, "", judged.default_key, {}, {}, robot_options=judged.robot_options)
     return DriveConfig(name, nothing, 0, name, start=FOREST, force=True)

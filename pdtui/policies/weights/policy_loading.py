@@ -75,13 +75,20 @@ def load_policy(
     network, digest = load_any_network(path, import_options, spaces, folders, found)
     spec = network.spec
     if robot is not None and spec.robot not in ("", robot):
-        raise PolicyError(f"{path}: expected a policy for robot '{robot}', found one for '{spec.robot}'")
-    if spaces is not None:
-        discrete = spec.head == "categorical"
-        spaces.check(str(path), spec.observations, spec.action_size, spec.actions if discrete else 0)
+        raise PolicyError(
+            f"{path}: expected a policy for robot '{robot}', found one for '{spec.robot}'; "
+            f"`pdtui convert {path} --robot {robot} -o FILE.safetensors` makes one for it, if the shapes fit"
+        )
+    _check_shapes(path, spec, spaces)
     return Policy(
         network, spec.observations, decode=make_action_decoder(network), name=path.stem, sha256=digest
     )
+
+
+def _check_shapes(path: Path, spec: NetworkSpec, spaces: ObservationActionSpaces | None) -> None:
+    if spaces is not None:
+        discrete = spec.actions if spec.head == "categorical" else 0
+        spaces.check(str(path), spec.observations, spec.action_size, discrete)
 
 
 def read_policy_of_another_program(path: Path) -> ForeignFile | None:
@@ -147,7 +154,9 @@ def _find_statistics(path: Path, import_options: ImportOptions, folders: Sequenc
 def convert_policy(
     path: Path, output: Path, import_options: ImportOptions, spaces: ObservationActionSpaces | None
 ) -> NetworkSpec:
-    """Write a policy of another program as a safetensors file, and return the specification that it states.
+    """Write a policy as a safetensors file, and return the specification that it states.
+
+    The policy is one of another program, or one of pdtui for another robot with the same shapes.
 
     Raises:
         PolicyError: As for `load_policy`; or the output already exists or cannot be written.
@@ -155,6 +164,7 @@ def convert_policy(
     if output.exists():
         raise PolicyError(f"{output}: already exists; a policy is converted into a new file")
     network, _ = load_any_network(path, import_options, spaces)
+    _check_shapes(path, network.spec, spaces)
     if spaces is not None:
         network.spec = replace(network.spec, robot=spaces.owner)
     save_network(output, network)

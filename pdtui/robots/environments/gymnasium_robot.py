@@ -17,6 +17,7 @@ from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.core.robot_links_and_state import RobotState
 from pdtui.robots.environments import gymnasium_spaces
 from pdtui.robots.environments.action_log import ActionLog, repeat_log
+from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions
 from pdtui.robots.robot import ResetResult, Robot, StepResult
 from pdtui.robots.simulators import python_state
 
@@ -27,10 +28,10 @@ _MAX_SEED = 2**31
 _TRIAL_STEPS, _STEPS_BEFORE_COPY = 24, 4
 
 
-def make_environment(name: str) -> gymnasium.Env[Any, Any]:
+def make_environment(name: str, options: RobotOptions = NO_ROBOT_OPTIONS) -> gymnasium.Env[Any, Any]:
     """Build a registered environment with the wrappers of its registration, but without a time limit.
 
-    A time limit serves training; it would end a drive for no visible reason.
+    A time limit serves training; it would end a drive for no visible reason. Options are the environment's.
 
     Raises:
         RobotError: A package is missing, or the environment cannot be built.
@@ -40,7 +41,7 @@ def make_environment(name: str) -> gymnasium.Env[Any, Any]:
         # Advice to trainers ("there is a newer version") would be printed over the screen.
         warnings.simplefilter("ignore")
         try:
-            return gymnasium.make(name, max_episode_steps=-1, disable_env_checker=True)
+            return gymnasium.make(name, max_episode_steps=-1, disable_env_checker=True, **options)
         except (ImportError, gymnasium.error.DependencyNotInstalled) as error:
             reason, cause = f"needs a package that is not installed: {error}", error
         except Exception as error:  # whatever a third party's constructor raises
@@ -63,14 +64,17 @@ class GymnasiumRobot(Robot):
         name: Name of the robot in maps and sessions.
         title: Name for people; by default `name`.
         environment: Registered id of the environment; by default `name`.
+        options: Arguments of the environment's class.
 
     Raises:
         RobotError: The environment cannot be built, or its spaces cannot be used.
     """
 
-    def __init__(self, name: str, title: str = "", environment: str = "") -> None:
+    def __init__(
+        self, name: str, title: str = "", environment: str = "", options: RobotOptions = NO_ROBOT_OPTIONS
+    ) -> None:
         self.name, self.title = name, title or name
-        self._environment = environment or name
+        self._environment, self._environment_options = environment or name, options
         self.env = self.make_world()
         self._flattened = not isinstance(self.env.observation_space, spaces.Box)
         observed = self.env.observation_space
@@ -87,7 +91,7 @@ class GymnasiumRobot(Robot):
 
     def make_world(self) -> gymnasium.Env[Any, Any]:
         """Build a new environment; subclasses may build one that is not registered with Gymnasium."""
-        return make_environment(self._environment)
+        return make_environment(self._environment, self._environment_options)
 
     @property
     def world(self) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
+from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions
 from pdtui.robots.robot import ResetResult
 from pdtui.robots.simulators import mujoco_robot
 from pdtui.robots.simulators.mujoco_attributes import find_model_attributes
@@ -35,8 +36,10 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
 
     _scales: tuple[float, float] | None = None  # on friction and masses
 
-    def __init__(self, name: str, title: str = "", environment: str = "") -> None:
-        super().__init__(name, title, environment)
+    def __init__(
+        self, name: str, title: str = "", environment: str = "", options: RobotOptions = NO_ROBOT_OPTIONS
+    ) -> None:
+        super().__init__(name, title, environment, options)
         model = self.world.model
         self._measured = find_model_attributes(model)
         self.attributes = (*(one.attribute for one in self._measured), Attribute("reward", ""))

@@ -7,6 +7,7 @@ import numpy as np
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
 from pdtui.robots.environments.gymnasium_spaces import action_to_vector, numeric_entries
+from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions
 
 _MAX_OBSERVED = 1000
 
@@ -20,8 +21,10 @@ class PlainGymnasiumRobot(GymnasiumRobot):
     at a step that leaves them out. There are no poses and no links.
     """
 
-    def __init__(self, name: str, title: str = "", environment: str = "") -> None:
-        super().__init__(name, title, environment)
+    def __init__(
+        self, name: str, title: str = "", environment: str = "", options: RobotOptions = NO_ROBOT_OPTIONS
+    ) -> None:
+        super().__init__(name, title, environment, options)
         shape: tuple[int, ...] = self.observation_space.shape or ()
         self._observed = shape[0] if len(shape) == 1 and shape[0] <= _MAX_OBSERVED else 0
         self._reported = self._find_reported()

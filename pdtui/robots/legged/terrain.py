@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.core.errors import RobotError
 
 CELL = 0.25
 """Distance between neighboring heights, m."""
@@ -18,6 +19,8 @@ _TRUNK_RADII = (0.15, 0.35)  # m
 _MIN_GAP = 0.9  # between two trunks, m: wide enough for the robot
 _FIRST_TREE = 2.5  # distance of the first tree from the start, m
 _TRIES_PER_TREE = 30
+_MAX_ROUGHNESS = 1.0  # m
+_MAX_DENSITY = 1.0  # trees per square metre, more than find room
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,13 @@ class RoughGround:
 
 
 def draw_rough_ground(rng: np.random.Generator, roughness: float) -> RoughGround:
-    """Draw heights uniformly from 0 to `roughness` m, on 64 × 20 m; level where the robot starts."""
+    """Draw heights uniformly from 0 to `roughness` m, on 64 × 20 m; level where the robot starts.
+
+    Raises:
+        RobotError: The roughness is not from 0 to 1 m.
+    """
+    if not 0.0 <= roughness <= _MAX_ROUGHNESS:
+        raise RobotError(f"expected a roughness of 0 to {_MAX_ROUGHNESS:g} m, found {roughness:g}")
     x = np.arange(-_BEHIND, AHEAD + CELL / 2, CELL)
     y = np.arange(-_BESIDE, _BESIDE + CELL / 2, CELL)
     heights = rng.uniform(0.0, roughness, (len(x), len(y)))
@@ -62,7 +71,12 @@ def scatter_trees(rng: np.random.Generator, density: float) -> Floats:
 
     Returns:
         x, y and radius of each, m, shape (N, 3), sorted by x.
+
+    Raises:
+        RobotError: The density is not from 0 to 1 tree per square metre.
     """
+    if not 0.0 <= density <= _MAX_DENSITY:
+        raise RobotError(f"expected a density of 0 to {_MAX_DENSITY:g} trees per m², found {density:g}")
     low, high = np.array([_FIRST_TREE, -_BESIDE + 1.0]), np.array([AHEAD - 1.0, _BESIDE - 1.0])
     count = round(density * float(np.prod(high - low)))
     trees = np.empty((0, 3))

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from pdtui.cli import main
 from pdtui.core.attributes import Floats
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.weights.import_options import ImportOptions, ObservationActionSpaces
@@ -140,6 +143,21 @@ def test_the_authors_brake_brakes(reference: Reference) -> None:
     assert not any(fell for _, fell in free)
     assert max(s for s, _ in braked) < 0.3
     assert sum(fell for _, fell in braked) <= 7
+
+
+def test_the_authors_bipedal_walker_walks_with_stock_motors(reference: Reference) -> None:
+    """Its motors give 80 N m; with the robot's usual 300 it falls in one episode of three."""
+    path = reference("bipedal_walker.npz")
+    if not path.exists():
+        pytest.skip(f"{path}, the authors' weights, is not here")
+    arguments = ["evaluate", "bipedal_walker", "--policy", str(path), "--activation", "tanh", "--policy-only"]
+    result = CliRunner().invoke(
+        main, [*arguments, "--robot-option", "torque=80", "--seeds", "100-101", "--json"]
+    )
+    assert result.exit_code == 0, result.output
+    alone = json.loads(result.stdout)
+    assert alone["finished"] == 2
+    assert alone["mean_return"] > 290
 
 
 class _PaddedAnt(Ant):
