@@ -16,7 +16,7 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots import RobotSpec
 from pdtui.robots.robot import Robot
-from pdtui.search.task_search import QUICK_TASK_SEARCH
+from pdtui.search.task_search_settings import QUICK_TASK_SEARCH
 from pdtui.sessions.session_header import read_session_header
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map, parse_map

@@ -55,7 +55,7 @@ def pursue_command(
     """
     from pdtui.dissection.search_task_into_map import search_task_into_map
     from pdtui.robots import RobotSpec, robot_file_stem
-    from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearchSettings
+    from pdtui.search.task_search_settings import QUICK_TASK_SEARCH, TaskSearchSettings
 
     world = RobotSpec(robot, parse_robot_options(robot, robot_options))
     with progress_bar("pursuing", quiet=as_json) as advance:

@@ -17,7 +17,7 @@ from pdtui.robots.robot import Robot
 from pdtui.search.behavior_search import BehaviorSearchSettings
 from pdtui.search.controller_search import ControllerSearchSettings
 from pdtui.search.imprint_candidates import ImprintSettings
-from pdtui.search.task_search import TaskSearchSettings
+from pdtui.search.task_search_settings import TaskSearchSettings
 from pdtui.stimulation.seed_ranges import FIRST_SEARCH_SEED, require_search_seeds
 from pdtui.stimulation.stimulation_map import StimulationMap
 

@@ -20,7 +20,8 @@ from pdtui.robots.options.robot_option import format_robot_options
 from pdtui.robots.task import average_figures
 from pdtui.search.evolutionary_search import SharedTimeBudget
 from pdtui.search.task_rollout import StimulationWithDuration
-from pdtui.search.task_search import TaskSearch, TaskSearchResult, TaskSearchSettings
+from pdtui.search.task_search import TaskSearch, TaskSearchResult
+from pdtui.search.task_search_settings import TaskSearchSettings
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.map_robot_options import map_robot
 from pdtui.stimulation.map_writer import add_behavior, add_seeds, compose_map, rewrite_map

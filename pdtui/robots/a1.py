@@ -15,8 +15,9 @@ from pdtui.core.outcome import fall_info
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
+from pdtui.robots.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
 from pdtui.robots.legged.terrain import RoughGround, draw_rough_ground, scatter_trees
-from pdtui.robots.robot import TRUNK_ATTRIBUTES, ResetResult, StepResult, TrainingRecipe, torque_attributes
+from pdtui.robots.robot import ResetResult, StepResult, TrainingRecipe
 from pdtui.robots.simulators import bullet_robot
 from pdtui.robots.simulators.bullet_robot import BulletRobot
 from pdtui.robots.simulators.urdf_link_shapes import read_urdf_link_shapes
@@ -32,8 +33,7 @@ _DIAGONALS = np.array([0, 1, 2, 3, 4, 5, 3, 4, 5, 0, 1, 2])
 _KP, _KD = 80.0, 0.4  # gains of the joints' controllers, N m/rad and N m s/rad
 # Physics step (s), physics steps per control step, and age of what is observed, in physics steps.
 _DT, _SUBSTEPS, _LATENCY = 0.001, 16, 2
-_START_HEIGHT = 0.28  # of the trunk, m
-_START_NOISE = 0.05  # rad
+_START_HEIGHT, _START_NOISE = 0.28, 0.05  # of the trunk, m, and of the joints, rad
 # Below this height (m), or with less than this share of its vertical axis upright, the robot has fallen.
 _MIN_HEIGHT, _MIN_UPRIGHT = 0.2, 0.6
 _FRICTION = {"lateralFriction": 1.0, "spinningFriction": 0.01, "rollingFriction": 0.01}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -24,23 +24,6 @@ from pdtui.robots.task import Task, find_task
 
 ResetResult = tuple[Floats, dict[str, Any]]
 StepResult = tuple[Floats, float, bool, bool, dict[str, Any]]
-TRUNK_ATTRIBUTES = (
-    Attribute("vx", "m/s"),
-    Attribute("vy", "m/s"),
-    Attribute("speed", "m/s"),
-    Attribute("yaw", "rad", wraps=True),
-    Attribute("yaw rate", "rad/s"),
-    Attribute("roll", "rad", wraps=True),
-    Attribute("pitch", "rad"),
-    Attribute("height", "m"),
-)
-"""What can be measured of a trunk that moves freely."""
-
-
-def torque_attributes(joints: Iterable[str], limits: Iterable[float]) -> list[Attribute]:
-    """Return the torque attributes of joints, scaled by their largest torques, N m."""
-    names = (f"{joint} torque" for joint in joints)
-    return [Attribute(name, "N m", 1.0 / limit) for name, limit in zip(names, limits, strict=True)]
 
 
 @dataclass(frozen=True)

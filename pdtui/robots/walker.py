@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.core.outcome import fall_info
-from pdtui.robots.robot import TrainingRecipe, torque_attributes
+from pdtui.robots.joint_and_trunk_attributes import torque_attributes
+from pdtui.robots.robot import TrainingRecipe
 from pdtui.robots.simulators.mujoco_robot import (
     MujocoRobot,
     read_model_links,

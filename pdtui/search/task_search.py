@@ -15,9 +15,10 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.robot import Robot
 from pdtui.robots.task import Task, TaskVerdict
-from pdtui.search.evolutionary_search import Deadline, EvolutionarySearch, EvolutionProblem, EvolutionSettings
+from pdtui.search.evolutionary_search import Deadline, EvolutionarySearch, EvolutionProblem
 from pdtui.search.stimulation_sampler import CROSSED, StimulationSampler
 from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
+from pdtui.search.task_search_settings import TaskSearchSettings
 from pdtui.stimulation.seed_ranges import JUDGING_SEEDS, require_search_seeds
 
 _SEEDS_APART = 1000
@@ -26,44 +27,6 @@ _RETIMED = 0.4
 """Below this random number, and from `CROSSED` on, a child gets another period."""
 _PERIOD_SPREAD = 0.3
 """Standard deviation of the logarithm of a factor on a period."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class TaskSearchSettings(EvolutionSettings):
-    """How much a search for a task does.
-
-    Attributes:
-        values: outputs at which every unit is tried alone.
-        screen_seeds: walks from which they are tried.
-        screen_units: how many units are tried, drawn at random; None tries all.
-        quick_seeds, full_seeds: walks of the quick score of a child, and of the full one.
-        selection_seeds: walks of the final score.
-        held_out_seeds: walks of the figures.
-        unit_cost: score that each unit has to bring.
-        restarts: how often the search starts anew if it ends before its time, and the task is not yet done on
-            every walk of the selection.
-    """
-
-    values: tuple[float, ...] = (-6.0, -2.0, 2.0, 6.0)
-    screen_seeds: int = 1
-    screen_units: int | None = None
-    elite: int = 20
-    children: int = 32
-    quick_seeds: int = 2
-    full_seeds: int = 8
-    max_units: tuple[int, ...] = (3, 8, 24)
-    generations: int = 16
-    finalists: int = 8
-    selection_seeds: int = 20
-    held_out_seeds: int = 20
-    unit_cost: float = 0.002
-    restarts: int = 100
-
-
-QUICK_TASK_SEARCH = TaskSearchSettings(
-    values=(-4.0, 4.0), screen_units=32, children=4, promoted=2, elite=4, quick_seeds=1, full_seeds=2,
-    max_units=(3,), generations=1, finalists=2, selection_seeds=2, held_out_seeds=4, restarts=0,
-)  # fmt: skip
 
 
 @dataclass(frozen=True)

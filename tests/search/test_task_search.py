@@ -16,7 +16,8 @@ from pdtui.policies.weights.weights_file import find_weights_file
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.search.evolutionary_search import SharedTimeBudget
 from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
-from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearch
+from pdtui.search.task_search import TaskSearch
+from pdtui.search.task_search_settings import QUICK_TASK_SEARCH
 from pdtui.stimulation.map_reader import load_map
 
 

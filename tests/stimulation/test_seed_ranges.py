@@ -15,7 +15,8 @@ from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.task import Task
 from pdtui.search.gain_tuning import tune_gains
-from pdtui.search.task_search import QUICK_TASK_SEARCH, TaskSearch
+from pdtui.search.task_search import TaskSearch
+from pdtui.search.task_search_settings import QUICK_TASK_SEARCH
 from pdtui.stimulation.map_reader import load_map, parse_map
 from pdtui.stimulation.map_writer import add_seeds
 from pdtui.stimulation.seed_ranges import (

@@ -29,9 +29,9 @@ _TRIAL_STEPS, _STEPS_BEFORE_COPY = 24, 4
 
 
 def make_environment(name: str, options: RobotOptions = NO_ROBOT_OPTIONS) -> gymnasium.Env[Any, Any]:
-    """Build a registered environment with the wrappers of its registration, but without a time limit.
+    """Build a registered environment with the wrappers of its registration and options of its own.
 
-    A time limit serves training; it would end a drive for no visible reason. Options are the environment's.
+    It has no time limit: that serves training, and would end a drive for no visible reason.
 
     Raises:
         RobotError: A package is missing, or the environment cannot be built.
@@ -84,8 +84,7 @@ class GymnasiumRobot(Robot):
         self.reward = 0.0
         self.info: Mapping[str, Any] = {}
         self._observation: NDArray[Any] = np.zeros(self.observation_space.shape or (0,))
-        self._seed = 0
-        self._start = ""
+        self._seed, self._start = 0, ""
         self._actions = ActionLog(0)
         self._repeats: bool | None = None
 

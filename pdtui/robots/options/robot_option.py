@@ -57,8 +57,8 @@ class RobotOption:
         """
         if float in self.types and type(value) is int and int not in self.types:
             value = float(value) if abs(value) <= MAX_OPTION_NUMBER else math.inf
-        typed = isinstance(value, OptionValue) and type(value) in self.types
-        if not typed or (self.choices and value not in self.choices):
+        known = not self.choices or value in self.choices
+        if not isinstance(value, OptionValue) or type(value) not in self.types or not known:
             raise ValueError(f"expected {self.expected}, found {_describe(value)}")
         if isinstance(value, str) and not self.takes_paths and _is_path(value):
             raise ValueError(f"expected text that is no path, found {_describe(value)}")
