@@ -58,8 +58,8 @@ def test_sessions_of_other_options_differ_in_words(tmp_path: Path) -> None:
 
 def test_the_command_line_takes_precedence_over_the_map(weak_map: Path, tmp_path: Path) -> None:
     session = tmp_path / "weak.rrd"
-    arguments = ["drive", weak_map, "--robot-option", "torque=80", "--headless", "--steps", 40]
-    drive = run(*arguments, "--record", session)
+    arguments: list[str | Path | int] = ["drive", weak_map, "--robot-option", "torque=80", "--headless"]
+    drive = run(*arguments, "--steps", 40, "--record", session)
     assert drive.exit_code == 0, drive.output
     assert f"{weak_map}: made for torque = 100; the robot is built with torque = 80" in drive.stderr
     info = read_session_header(session).info
