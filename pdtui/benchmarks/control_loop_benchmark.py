@@ -12,8 +12,8 @@ import numpy as np
 
 from pdtui.benchmarks.matching_benchmark import time_call_in_seconds
 from pdtui.core.drive_events import DriveEvent
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import Stimulation
-from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop

@@ -13,7 +13,7 @@ from scipy.signal import get_window
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PdtuiError
-from pdtui.core.worker_pool import WorkerProcess
+from pdtui.core.processes.worker_pool import WorkerProcess
 from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching import UnitDiscrepancies, match_units
 from pdtui.spectra.matching_presets import MatchingPreset, find_matching_preset

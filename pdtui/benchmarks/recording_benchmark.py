@@ -11,8 +11,8 @@ from pathlib import Path
 
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import ScreenError
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.step_record import StepRecord
-from pdtui.core.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_server import PACED_ROWS_PER_WRITE

@@ -9,8 +9,8 @@ import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.confidence_intervals import bootstrap_interval
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import Stimulation
-from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.dissection_config import DissectionSettings
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.measured_effects import PlanEffects, UnitEffects

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from torch import nn
 
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import Stimulation, parse_unit
-from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_attribute_columns
 from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.dissection.dissection_result import Dissection, pick_sample_episode

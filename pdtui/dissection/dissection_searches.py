@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import Stimulation
-from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.dissection_config import DissectionSettings
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.measured_effects import UnitEffects

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.core.worker_pool import StepProgress
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.dissection.dissection_config import DissectionSettings
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.measured_effects import UnitEffects

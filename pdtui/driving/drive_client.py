@@ -10,7 +10,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Protocol
 
 from pdtui.core.errors import PdtuiError
-from pdtui.core.worker_pool import describe_exit, end_with_parent
+from pdtui.core.processes.worker_pool import describe_exit, end_with_parent
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
 

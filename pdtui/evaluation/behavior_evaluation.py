@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pdtui.core.outcome import count_failures
-from pdtui.core.worker_pool import StepProgress, WorkerPool
+from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.evaluation.behavior_summary import (

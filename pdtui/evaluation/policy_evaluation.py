@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdtui.core.outcome import Outcome, OutcomeCounts, count_outcomes
-from pdtui.core.worker_pool import StepProgress
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import run_episode

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pdtui.core.errors import MapError
-from pdtui.core.worker_pool import StepProgress
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveRunner
 from pdtui.search.tracking_summary import (

@@ -15,7 +15,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.confidence_intervals import PairedRatio, paired_ratio
 from pdtui.core.errors import MapError
-from pdtui.core.worker_pool import StepProgress
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.disturbance_conditions import find_condition, plan_pushes
 from pdtui.evaluation.target_tracking import find_pid_behaviors

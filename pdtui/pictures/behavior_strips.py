@@ -11,8 +11,8 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import PictureError
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.robot_links_and_state import Link
-from pdtui.core.worker_pool import StepProgress
 from pdtui.evaluation.evaluation_plan import EvaluationPlan
 from pdtui.evaluation.held_run import HeldRunFilm, film_held_run
 from pdtui.evaluation.protocol_settings import RunTimes

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PictureError
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import format_unit, parse_unit
-from pdtui.core.worker_pool import StepProgress
 from pdtui.dissection.attribute_movers import movable_attribute_columns
 from pdtui.pictures.matplotlib_page import open_figure_page
 from pdtui.pictures.plot_colors import CYCLE, color_to_hex

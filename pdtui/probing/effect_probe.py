@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pdtui.core.outcome import is_failure
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import NO_STIMULATION, Stimulation
-from pdtui.core.worker_pool import StepProgress
 from pdtui.probing.measured_effects import PlanEffects, SingleUnitEffects, UnitEffects
 from pdtui.probing.rollout_journal import RolloutJournal, fingerprint_start_state
 from pdtui.probing.rollout_pool import RolloutPool

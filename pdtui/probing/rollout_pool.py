@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from pdtui.core.closable import Closable
-from pdtui.core.worker_pool import StepProgress, WorkerPool
+from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
 from pdtui.policies.runtime.policy import Policy, check_policy_fit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
@@ -110,15 +110,18 @@ class RolloutPool(Closable):
             WorkerError: a worker process died.
         """
         size = max(1, _STEPS_PER_CHUNK // steps)
-        parts = [jobs[low : low + size] for low in range(0, len(jobs), size)]
+        # Roll-outs from one start follow each other, because some robots return to the last start quickly.
+        order = sorted(range(len(jobs)), key=lambda number: jobs[number][1])
+        numbers = [order[low : low + size] for low in range(0, len(jobs), size)]
+        parts = [[jobs[number] for number in few] for few in numbers]
         chunks = [(part, {index: starts[index] for _, index in part}, steps, measure_from) for part in parts]
-        results: list[list[RolloutOutcome]] = [[] for _ in chunks]
-        for number, outcomes in self._pool.as_completed(_run_chunk, chunks):
-            results[number] = outcomes
+        results: dict[int, RolloutOutcome] = {}
+        for chunk, outcomes in self._pool.as_completed(_run_chunk, chunks):
+            results |= zip(numbers[chunk], outcomes, strict=True)
             self.count_rollouts(outcomes)
             if keep is not None:
-                keep(range(number * size, number * size + len(outcomes)), outcomes)
-        return [outcome for outcomes in results for outcome in outcomes]
+                keep(numbers[chunk], outcomes)
+        return [results[number] for number in range(len(jobs))]
 
     def map(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -12,9 +13,10 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import RobotError
 from pdtui.core.outcome import Outcome
+from pdtui.core.processes.process_checkpoint import can_hold_state
+from pdtui.core.processes.worker_pool import WorkerProcess
 from pdtui.core.robot_links_and_state import Link, ManualControl, RobotState
 from pdtui.core.scenery import Traffic
-from pdtui.core.worker_pool import WorkerProcess
 from pdtui.robots.environments.action_log import ActionLog
 from pdtui.robots.road.car_tasks import CAR_GOALS, CAR_TASKS
 from pdtui.robots.road.metadrive_repairs import LIDAR_RANGE, OBSERVATIONS
@@ -106,6 +108,7 @@ class MetaDrive(Robot):
         self._actions = ActionLog(2)
         self._seed, self._start = 0, self._scenes
         self._keeps_engine, self._shown = False, ("", -1)
+        self._held: tuple[int, int, bytes] | None = None
 
     def make_alike(self) -> MetaDrive:
         """Return another car with the same options, whose resets keep the engine."""
@@ -164,8 +167,7 @@ class MetaDrive(Robot):
         return self._state.motion
 
     def read_traffic(self) -> Traffic:
-        self._process.send(RoadWorld.read_traffic)
-        traffic: Traffic = self._process.receive()
+        traffic: Traffic = self._ask(RoadWorld.read_traffic)
         return traffic
 
     def read_poses(self) -> Floats:
@@ -181,15 +183,30 @@ class MetaDrive(Robot):
     def restore(self, snapshot: RobotState) -> None:
         self._check_snapshot(snapshot)
         seed, start = (int(value) for value in snapshot.extras[0].view(np.int64))
-        self._begin(self.starts[start], seed, exactly=not self._keeps_engine)
-        for action in snapshot.state.astype(np.float32):
-            self.step(action)
+        wanted, actions = (start, seed, snapshot.state.tobytes()), snapshot.state.astype(np.float32)
+        if wanted == self._held:
+            self._ask(RoadWorld.go_back)
+            self._state, self._actions = self._held_state, ActionLog(2)
+            for action in actions:
+                self._actions.append(action)
+        else:
+            self._begin(self.starts[start], seed, exactly=not self._keeps_engine)
+            for action in actions:
+                self.step(action)
+            if self._keeps_engine and can_hold_state():
+                self._ask(RoadWorld.hold_state)
+                self._held, self._held_state = wanted, self._state
         self.np_random.bit_generator.state = snapshot.rng
 
     def _begin(self, start: str, seed: int, exactly: bool) -> None:
+        if self._held is not None:
+            self._ask(RoadWorld.release_state)
+            self._held = None
         self._seed, self._start, self._actions = seed, start, ActionLog(2)
-        self._process.send(RoadWorld.reset, start, seed, exactly)
-        self._state = self._process.receive()
+        self._state = self._ask(RoadWorld.reset, start, seed, exactly)
         if self._shown != (start, seed):
-            self._process.send(RoadWorld.read_scenery)
-            self.scenery, self._shown = self._process.receive(), (start, seed)
+            self.scenery, self._shown = self._ask(RoadWorld.read_scenery), (start, seed)
+
+    def _ask(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        self._process.send(function, *arguments)
+        return self._process.receive()

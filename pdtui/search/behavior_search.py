@@ -11,8 +11,8 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.confidence_intervals import bootstrap_interval
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import Stimulation
-from pdtui.core.worker_pool import StepProgress
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.measured_effects import PlanEffects, UnitEffects
 from pdtui.probing.null_distributions import sign_flip_p_values

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from pdtui.core.worker_pool import StepProgress
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.search.stimulation_sampler import UnitOutputBounds
 
 Plan = TypeVar("Plan")

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import Stimulation
-from pdtui.core.worker_pool import StepProgress
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot_goals import BehaviorGoal

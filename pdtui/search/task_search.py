@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import Stimulation
-from pdtui.core.worker_pool import StepProgress
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.robot import Robot

@@ -11,8 +11,8 @@ from pdtui.core.attributes import Attribute, Floats, wrap_angle, wrap_angles
 from pdtui.core.closable import Closable
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.outcome import Outcome
+from pdtui.core.processes.worker_pool import WorkerPool
 from pdtui.core.step_record import StepRecord
-from pdtui.core.worker_pool import WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop

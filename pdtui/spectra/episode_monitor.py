@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats, unwrap_angles
 from pdtui.core.errors import SimulationDiverged
-from pdtui.core.worker_pool import StepProgress
+from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.errors import SimulationDiverged, TrainingError, WorkerError
+from pdtui.core.processes.worker_pool import WorkerProcess
 from pdtui.core.robot_links_and_state import RobotState
-from pdtui.core.worker_pool import WorkerProcess
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot, StepResult
 

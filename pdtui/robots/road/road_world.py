@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.outcome import Outcome
+from pdtui.core.processes.process_checkpoint import go_back, hold_state, release_state
 from pdtui.core.scenery import Scenery, Traffic
 from pdtui.robots.road.metadrive_repairs import (
     LIDAR_RANGE,
@@ -120,6 +121,21 @@ class RoadWorld:
     def read_traffic(self) -> Traffic:
         """Return cars, barriers and what the lidar hits, as they are now."""
         return self._traffic.read(self._env, self._observation)
+
+    def hold_state(self) -> None:
+        """Keep the state for `go_back`, until `release_state`; see `pdtui.core.processes.process_checkpoint`.
+
+        It answers again after each of the two.
+        """
+        hold_state()
+
+    def go_back(self) -> None:
+        """Return to the state that is held; it never returns here."""
+        go_back()
+
+    def release_state(self) -> None:
+        """Go on from the state that was held, and hold it no longer; it never returns here."""
+        release_state()
 
     def suggest_action(self) -> NDArray[np.float32]:
         """Return what MetaDrive's rule-based driver, which keeps lane and distance, would do now."""

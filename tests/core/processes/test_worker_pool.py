@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import RobotError, WorkerError
-from pdtui.core.worker_pool import WorkerPool, WorkerProcess
+from pdtui.core.processes.worker_pool import WorkerPool, WorkerProcess
 from tests.deadline import deadline
 
 STATE = [0]
@@ -143,7 +143,7 @@ def test_an_abandoned_run_ends_its_workers() -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_busy_workers_end_when_their_parent_is_killed() -> None:
     with subprocess.Popen(
-        [sys.executable, "-m", "tests.core.test_worker_pool"], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-m", "tests.core.processes.test_worker_pool"], stdout=subprocess.PIPE, text=True
     ) as parent:
         assert parent.stdout is not None
         workers = [int(word) for word in parent.stdout.readline().split()]
