@@ -17,8 +17,8 @@ _BOX_EDGES = np.array(
     [(a, b) for a in range(8) for b in range(a + 1, 8) if (BOX_CORNERS[a] != BOX_CORNERS[b]).sum() == 1]
 )
 """Rows of the corners at both ends of each edge, shape (12, 2)."""
-_ORDER: tuple[LineKind, ...] = ("route", "broken lane line", "solid lane line", "road edge")
-"""Kinds of lines as they are drawn, the later over the earlier."""
+_ORDER: tuple[LineKind, ...] = ("broken lane line", "solid lane line", "road edge", "route")
+"""Kinds of lines as they are drawn, the later over the earlier: junctions are full of lines of lanes."""
 
 
 class RoadLineDrawing:
