@@ -108,6 +108,8 @@ class MetaDrive(Robot):
         self._actions = ActionLog(2)
         self._seed, self._start = 0, self._scenes
         self._keeps_engine, self._shown = False, ("", -1)
+        self._state: CarState
+        self._held_state: CarState
         self._held: tuple[int, int, bytes] | None = None
 
     def make_alike(self) -> MetaDrive:
@@ -142,7 +144,7 @@ class MetaDrive(Robot):
 
     def receive_step(self) -> StepResult:
         """Return what `step` returns, for the action that was sent."""
-        self._state: CarState = self._process.receive()
+        self._state = self._process.receive()
         outcome = self._state.outcome
         info: dict[str, Any] = {"cost": self._state.cost}
         if outcome is not None:

@@ -17,7 +17,7 @@ from pdtui.driving.session_replay import replay_session
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session
 from pdtui.stimulation.stimulation_map import StimulationMap
-from tests.core.test_worker_pool import is_alive
+from tests.core.processes.test_worker_pool import is_alive
 
 PATIENCE = 60.0
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
