@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_optio
 from pdtui.cli.shared_options import (
     FILE_PATH,
     import_option_flags,
+    integer_option,
     json_option,
     minutes_option,
     own_policy_option,
@@ -30,6 +32,7 @@ from pdtui.cli.shared_options import (
 @search_seed_option
 @minutes_option("--minutes", 10.0, " Every unit is tried even if that takes longer.")
 @click.option("--quick", is_flag=True, help="Take a first look: few units, hardly any search.")
+@integer_option("--units", help="Try only the N units that change the policy's action most; default: all.")
 @click.option(
     "-o",
     "--output",
@@ -45,6 +48,7 @@ def pursue_command(
     robot_options: tuple[str, ...],
     policy: str,
     quick: bool,
+    units: int | None,
     output: Path | None,
     as_json: bool,
     **search: Any,
@@ -57,6 +61,7 @@ def pursue_command(
     from pdtui.robots import RobotSpec, robot_file_stem
     from pdtui.search.task_search_settings import QUICK_TASK_SEARCH, TaskSearchSettings
 
+    settings = QUICK_TASK_SEARCH if quick else TaskSearchSettings()
     world = RobotSpec(robot, parse_robot_options(robot, robot_options))
     with progress_bar("pursuing", quiet=as_json) as advance:
         found = search_task_into_map(
@@ -64,7 +69,7 @@ def pursue_command(
             task,
             policy or robot,
             output or Path("maps") / f"{robot_file_stem(robot)}-dissected.toml",
-            settings=QUICK_TASK_SEARCH if quick else TaskSearchSettings(),
+            settings=settings if units is None else replace(settings, screen_units=units),
             progress=advance,
             **search,
         )

@@ -7,11 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pdtui.core.units import Stimulation
+from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.measured_effects import UnitEffects
+from pdtui.robots.robot import Robot
 from pdtui.spectra.matching import UnitDiscrepancies
 
 RANDOM_QUANTILE = 0.9
 """A unit exceeds random units if it moves the attribute more than this share of all units does."""
+_OBSERVED_STEPS, _STEPS_APART = 60, 10
+"""Control steps of the walk on which actions are compared, and steps from one comparison to the next."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +34,51 @@ class PrimitiveCandidate:
     column: int
     value: float
     sign: float
+
+
+def select_units_by_action(
+    robot: Robot,
+    policy: Policy,
+    values: Sequence[float],
+    count: int,
+    *,
+    seed: int,
+    options: dict[str, str] | None,
+) -> tuple[int, ...]:
+    """Choose the units that change the policy's action most, without trying any on the robot.
+
+    Each component of the action is compared in its own standard deviation over all units and outputs, so that
+    steering counts as much as throttle does.
+
+    Args:
+        robot: The robot, which walks to observe.
+        policy: The policy.
+        values: Outputs that each unit is given.
+        count: Number of units.
+        seed, options: Those of the robot's reset.
+
+    Returns:
+        Flat indices of the units, ascending.
+    """
+    observation, _ = robot.reset(seed=seed, options=options)
+    policy.reset()
+    seen = []
+    for step in range(_OBSERVED_STEPS):
+        action = policy.act(observation).action
+        if step % _STEPS_APART == 0:
+            seen.append((observation, action))
+        observation, _, terminated, truncated, _ = robot.step(action)
+        if terminated or truncated:
+            break
+    changes = np.zeros((policy.units, len(values), len(seen[0][1])))
+    for unit in range(policy.units):
+        for number, value in enumerate(values):
+            stimulation = Stimulation.of({unit: value})
+            moved = [policy.act(one, stimulation).action - action for one, action in seen]
+            changes[unit, number] = np.mean(moved, axis=0)
+    spread = changes.std(axis=(0, 1))
+    strength = np.abs(changes / np.where(spread > 0, spread, 1.0)).max(axis=(1, 2))
+    return tuple(sorted(np.argsort(-strength, kind="stable")[:count].tolist()))
 
 
 def select_units_to_refine(

@@ -13,6 +13,7 @@ from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import Stimulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.probing.unit_selection import select_units_by_action
 from pdtui.robots.robot import Robot
 from pdtui.robots.task import Task, TaskVerdict
 from pdtui.search.evolutionary_search import Deadline, EvolutionarySearch, EvolutionProblem
@@ -163,7 +164,12 @@ class TaskSearch:
         tried = np.arange(units) if self._units is None else np.array(self._units)
         limit = settings.screen_units if self._units is None else None
         if limit is not None and limit < units:
-            tried = np.sort(self._rng.choice(units, limit, replace=False))
+            options = {"start": self._task.start} if self._task.start else None
+            robot, policy = self._pool.robot, self._pool.policy
+            chosen = select_units_by_action(
+                robot, policy, settings.values, limit, seed=self._seed, options=options
+            )
+            tried = np.array(chosen)
         plans = [
             StimulationWithDuration(Stimulation.of({unit: value}), period)
             for unit in tried.tolist()

@@ -14,7 +14,7 @@ class TaskSearchSettings(EvolutionSettings):
     Attributes:
         values: outputs at which every unit is tried alone.
         screen_seeds: walks from which they are tried.
-        screen_units: how many units are tried, drawn at random; None tries all.
+        screen_units: how many units are tried, those that change the action most; None tries all.
         quick_seeds, full_seeds: walks of the quick score of a child, and of the full one.
         selection_seeds: walks of the final score.
         held_out_seeds: walks of the figures.
