@@ -53,7 +53,7 @@ class KeyEffects:
     def moved(self, key: str, times: Floats) -> Floats:
         """Return how far a lane key has moved the car to the left at times after the press, s."""
         effect = np.array(self.left if key == LEFT else self.right)
-        return np.interp(times, np.arange(len(effect)) * self.dt, effect)
+        return np.asarray(np.interp(times, np.arange(len(effect)) * self.dt, effect))
 
 
 def driving_behaviors(stimulation_map: StimulationMap) -> dict[str, Behavior]:
@@ -88,7 +88,9 @@ def measure_key_effects(loops: Iterable[ControlLoop]) -> KeyEffects:
         _press_one_by_one(loop, behaviors, watched)
     missing = [key for key, drives in watched.items() if not drives]
     if missing:
-        raise RobotError(f"{loop.map.source}: the car left every straight road before or after '{missing[0]}'")
+        raise RobotError(
+            f"{loop.map.source}: the car left every straight road before or after '{missing[0]}'"
+        )
     left, right = (np.mean([one[:, 1] - one[0, 1] for one in watched[key]], axis=0) for key in (LEFT, RIGHT))
     speeds = np.mean([one[:, 0] for one in watched[BRAKE]], axis=0)
     slow = np.flatnonzero(speeds < _STOPPED * speeds[0])

@@ -9,6 +9,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.paper.driving.key_effects import ACCELERATE, BRAKE, DEFAULT, LEFT, RIGHT, KeyEffects
 from pdtui.paper.driving.maneuver import (
+    HORIZON,
     TIMES,
     Conflicts,
     Maneuver,
@@ -26,11 +27,11 @@ PATIENCE_STANDING, PATIENCE_MOVING, PATIENCE_EDGE = 3.4, 1.4, 1.0
 """Times before a conflict at which it acts: with what stands, with what moves, and with an edge, s."""
 NEAR_STANDING = 20.0
 """Distance from something that stands in the way at which it acts although the car is slow, m."""
-IMPROVEMENT = 1.0
-"""Time by which a lane change must postpone the next conflict, s."""
+IMPROVEMENT, LAST_IMPROVEMENT = 1.0, 0.6
+"""Time by which a lane change must postpone the next conflict, s: usually, and in the last moment."""
 STOPPING_ROOM, CREEPING_ROOM = 18.0, 4.0
-"""Distances from something that stands at which a fast and a slow car are to stop, m: changing lanes afterwards
-needs room."""
+"""Distances from something that stands at which a fast and a slow car are to stop, m: to change lanes
+afterwards, it needs room."""
 _SLOW, _FAST = 4.0, 8.0
 _SPEEDING_UP, _ROLLING = 2.0, 8.0
 """How a car is expected to start, m/s², and the speed up to which, m/s."""
@@ -89,18 +90,16 @@ class KeyOperator:
         expected = find_conflicts(seen, go_on)
         if not self._must_act(seen, expected):
             return ""
-        lanes = self._lane_changes(seen)
-        better = [one for one in lanes if self._improves(find_conflicts(seen, one), expected)]
+        lanes, must_brake = self._lane_changes(seen), self._must_brake(seen, expected)
+        # In the last moment, a small improvement is better than to lose the speed that a lane change needs.
+        gain = LAST_IMPROVEMENT if must_brake else IMPROVEMENT
+        better = [one for one in lanes if _improves(find_conflicts(seen, one), expected, gain)]
         if better:
             return max(better, key=lambda one: _preference(seen, one)).name
-        if not self._must_brake(seen, expected):
+        if not must_brake:
             return ""
         slower = Maneuver(BRAKE, roll(seen.speed, -self._effects.deceleration), drift(seen))
         return max((go_on, slower, *lanes), key=lambda one: find_conflicts(seen, one).first).name
-
-    def _improves(self, conflicts: Conflicts, expected: Conflicts) -> bool:
-        now = min(expected.first, TIMES[-1] - IMPROVEMENT)
-        return conflicts.first > now + IMPROVEMENT and conflicts.edge > TIMES[-1] / 2
 
     def _must_act(self, seen: RoadSight, expected: Conflicts) -> bool:
         patience = self._judgement.patience
@@ -123,7 +122,7 @@ class KeyOperator:
         )
 
     def _release(self, seen: RoadSight) -> str:
-        """Return the default key once the car can go on, straight or with a lane change as soon as it rolls."""
+        """Return the default key once the car can go on, straight or with a lane change when it rolls."""
         straight = Maneuver(DEFAULT, roll(seen.speed, _SPEEDING_UP, _ROLLING), drift(seen))
         expected = find_conflicts(seen, straight)
         if math.isinf(expected.first):
@@ -132,7 +131,8 @@ class KeyOperator:
         if math.isinf(expected.moving) and waited:
             return DEFAULT
         lanes = self._lane_changes(seen)
-        return DEFAULT if any(self._improves(find_conflicts(seen, one), expected) for one in lanes) else ""
+        better = (_improves(find_conflicts(seen, one), expected, IMPROVEMENT) for one in lanes)
+        return DEFAULT if any(better) else ""
 
     def _lane_changes(self, seen: RoadSight) -> list[Maneuver]:
         """Return what the keys for lanes would do now; none while the last one is still at work."""
@@ -142,7 +142,8 @@ class KeyOperator:
         pace = float(np.interp(_PACE_TIME, TIMES, rolls)) / _PACE_TIME
         share = min(1.0, pace / self._effects.speed)
         return [
-            Maneuver(key, rolls, drift(seen) + share * self._effects.moved(key, TIMES)) for key in (LEFT, RIGHT)
+            Maneuver(key, rolls, drift(seen) + share * self._effects.moved(key, TIMES))
+            for key in (LEFT, RIGHT)
         ]
 
     def _beside(self, seen: RoadSight) -> Floats:
@@ -156,7 +157,9 @@ class KeyOperator:
         """Return the key that gets a halted car going: aside if something is close in front of it."""
         if self._time_since() < _HALTED_TIME:
             return ""
-        if distance_to_standing(seen) > CREEPING_ROOM or self._presses[-1:] and self._presses[-1][1] != ACCELERATE:
+        if distance_to_standing(seen) > CREEPING_ROOM or (
+            self._presses[-1:] and self._presses[-1][1] != ACCELERATE
+        ):
             return ACCELERATE
         return LEFT if seen.left > seen.right else RIGHT
 
@@ -172,6 +175,12 @@ class KeyOperator:
         period = self._effects.periods.get(key)
         over = period is not None and (self._step - step) * self._dt >= period
         return "" if over or key == DEFAULT else key
+
+
+def _improves(conflicts: Conflicts, expected: Conflicts, gain: float) -> bool:
+    """Return whether a lane change postpones the next conflict enough and stays on the road."""
+    now = min(expected.first, HORIZON - gain)
+    return conflicts.first > now + gain - 1e-9 and conflicts.edge > HORIZON / 2
 
 
 def _preference(seen: RoadSight, change: Maneuver) -> tuple[float, float]:

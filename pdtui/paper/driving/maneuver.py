@@ -6,16 +6,19 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.paper.driving.road_sight import CAR_HALF_LENGTH, CAR_HALF_WIDTH, RoadSight
 
-TIMES: Floats = np.arange(1, 21) * 0.2
-"""Moments of a prediction, s from now."""
+HORIZON = 4.0
+"""How far a prediction reaches, s."""
+TIMES: Floats = np.linspace(0.2, HORIZON, 20)
+"""Its moments, s from now."""
 STANDING = 0.5
 """Largest speed of something that counts as standing, m/s."""
 _GAP_AHEAD, _GAP_ASIDE, _GAP_TO_EDGE = 1.5, 0.35, 0.7
-"""Gaps that count as too close: to others lengthways and sideways, and from the car's middle to an edge, m."""
+"""Gaps that are too close, m: to others lengthways and sideways, and from the car's middle to an edge."""
 _DRIFT_TIME = 0.6
 """Time in which a drift to one side ends, s."""
 
@@ -97,5 +100,5 @@ def distance_to_standing(sight: RoadSight) -> float:
     return float(gaps.min()) if len(gaps) else math.inf
 
 
-def _first_time(when: Floats) -> float:
+def _first_time(when: NDArray[np.bool_]) -> float:
     return float(TIMES[np.argmax(when)]) if when.any() else math.inf

@@ -32,8 +32,8 @@ class RoadSight:
         others: Cars and obstacles within `SIGHT`: distances along the road and to the left from the car's
             middle to theirs, half their extents along and across the road, m, and their speeds along the road
             and to the left, m/s, shape (N, 6).
-        road: The middle line of the road ahead in the car's own directions, forward and left, m, shape (M, 2);
-            neighboring points are `ROAD_STEP` apart, the first is beside the car.
+        road: The middle line of the road ahead in the car's own directions, forward and left, m, shape
+            (M, 2); neighboring points are `ROAD_STEP` apart, the first is beside the car.
     """
 
     speed: float

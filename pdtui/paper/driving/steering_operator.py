@@ -1,4 +1,4 @@
-"""The operator that steers (H^n and human only): it drives along a lane, late, and changes it when it must."""
+"""The operator that steers (H^n and human only): it keeps to a lane and changes it when it must."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from pdtui.paper.driving.key_operator import (
     PATIENCE_STANDING,
 )
 from pdtui.paper.driving.maneuver import (
+    HORIZON,
     TIMES,
     Maneuver,
     distance_to_standing,
@@ -112,8 +113,8 @@ class SteeringOperator:
             return
         near = [lane for lane in (seen.lane - 1, seen.lane, seen.lane + 1) if 0 <= lane < seen.lanes]
         later = {lane: self._expect(seen, lane) for lane in near}
-        best = max(later, key=lambda lane: (min(later[lane], 2 * TIMES[-1]), -abs(lane - seen.lane)))
-        if later[best] > min(now, TIMES[-1] - IMPROVEMENT) + IMPROVEMENT:
+        best = max(later, key=lambda lane: (min(later[lane], 2 * HORIZON), -abs(lane - seen.lane)))
+        if later[best] > min(now, HORIZON - IMPROVEMENT) + IMPROVEMENT:
             self._target = best
 
     def _expect(self, seen: RoadSight, lane: int) -> float:
@@ -139,17 +140,18 @@ class SteeringOperator:
         ahead, beside, half_length, half_width, speed, _ = seen.others.T
         gaps = ahead - half_length - CAR_HALF_LENGTH
         to = seen.to_middle_of(self._target)
-        low, high = min(0.0, to), max(0.0, to)
         reach = half_width + CAR_HALF_WIDTH + 0.3
         # A lane change leaves what is far enough away behind.
-        here = (beside > -reach) & (beside < reach) & (gaps < 4.0 + 0.5 * LANE_WIDTH + abs(to))
-        there = (beside > high - reach) & (beside < high + reach) if to >= 0 else (beside > low - reach) & (beside < low + reach)
+        here = (np.abs(beside) < reach) & (gaps < _STANDSTILL_GAP + LANE_WIDTH / 2 + abs(to))
+        there = np.abs(beside - to) < reach
         front = (ahead > 0.0) & (here | there)
         if not front.any():
             return math.inf
         room = np.maximum(gaps[front] - _STANDSTILL_GAP, 0.0)
         ahead_speed = np.maximum(speed[front], 0.0)
-        return float(np.min(np.minimum(np.sqrt(ahead_speed**2 + 2 * _BRAKING * room), ahead_speed + room / _HEADWAY)))
+        return float(
+            np.min(np.minimum(np.sqrt(ahead_speed**2 + 2 * _BRAKING * room), ahead_speed + room / _HEADWAY))
+        )
 
 
 def _middle(seen: RoadSight) -> float:
