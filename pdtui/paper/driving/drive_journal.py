@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PdtuiError
+from pdtui.core.outcome import Outcome
 from pdtui.paper.driving.driving_episode import DrivingScore
 
 
@@ -59,7 +60,7 @@ class DriveJournal:
             try:
                 fields = json.loads(line)
                 key = fields.pop("drive")
-                self._scores[key] = DrivingScore(**fields)
+                self._scores[key] = DrivingScore(outcome=Outcome(fields.pop("outcome")), **fields)
             except (ValueError, TypeError, KeyError, AttributeError) as error:
                 if number == len(lines) and not line.endswith("}"):
                     # It was interrupted while it wrote the last line.

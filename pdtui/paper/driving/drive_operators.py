@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Literal, Protocol
 
 from pdtui.core.drive_events import DriveEvent
+from pdtui.core.scenery import Traffic
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.paper.driving.key_effects import DEFAULT, KeyEffects, driving_behaviors
 from pdtui.paper.driving.key_operator import KeyOperator
@@ -21,14 +22,15 @@ while it takes over (H^n); or that operator without the policy."""
 class DriveOperator(Protocol):
     """Operates a drive."""
 
-    def act(self) -> Sequence[DriveEvent]:
-        """Return the events before the next control step; call it once per step."""
+    def act(self, traffic: Traffic) -> Sequence[DriveEvent]:
+        """Return the events before the next control step, with this traffic; call it once per step."""
 
 
 class NoOperator:
     """Leaves the policy alone."""
 
-    def act(self) -> Sequence[DriveEvent]:
+    def act(self, traffic: Traffic) -> Sequence[DriveEvent]:
+        del traffic
         return ()
 
 
@@ -40,8 +42,8 @@ class KeyDriveOperator:
         self._operator = KeyOperator(effects, loop.robot.control_dt, judgement)
         self._behaviors = driving_behaviors(loop.map)
 
-    def act(self) -> Sequence[DriveEvent]:
-        step, task = self._loop.step, self._operator.choose_key(self._reader.look())
+    def act(self, traffic: Traffic) -> Sequence[DriveEvent]:
+        step, task = self._loop.step, self._operator.choose_key(self._reader.look(traffic))
         if not task:
             return ()
         if task == DEFAULT:
@@ -57,8 +59,8 @@ class WheelDriveOperator:
         self._loop, self._reader = loop, SightReader(loop.robot)
         self._operator = SteeringOperator(loop.robot.control_dt, judgement, always=always)
 
-    def act(self) -> Sequence[DriveEvent]:
-        step, controls = self._loop.step, self._operator.choose_controls(self._reader.look())
+    def act(self, traffic: Traffic) -> Sequence[DriveEvent]:
+        step, controls = self._loop.step, self._operator.choose_controls(self._reader.look(traffic))
         if controls is None:
             return (DriveEvent(step, "hand back"),) if self._loop.takeover.values else ()
         return (

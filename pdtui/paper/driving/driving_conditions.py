@@ -41,7 +41,7 @@ from pdtui.paper.driving.key_effects import (
 )
 from pdtui.paper.driving.operator_memory import draw_judgement
 from pdtui.policies.runtime.policy import Policy
-from pdtui.robots import make_robot, robot_file_stem
+from pdtui.robots import robot_file_stem
 from pdtui.robots.robot import Robot
 
 REPEATS = 5
@@ -153,12 +153,11 @@ class _Car:
 
     def loop(self, config: DriveConfig, start: str, seed: int = 0) -> ControlLoop:
         """Return a drive before its first step."""
-        self._robot = self._robot or make_robot(config.robot)
         name = config.policy or config.stimulation_map.policy
         loop = build_control_loop(
             replace(config, start=start, seed=seed), self._robot, self._policies.get(name)
         )
-        self._policies[name] = loop.policy
+        self._robot, self._policies[name] = loop.robot, loop.policy
         return loop
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.core.errors import SessionError
+from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.driving.headless_drive import run_episode
 from pdtui.paper.driving.drive_operators import DriveOperator, SharedControl
 from pdtui.robots.road.road_scenes import TEST_SCENES
 from pdtui.sessions.session_reader import read_session
@@ -20,7 +20,6 @@ from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 TEST_STARTS = tuple(f"test-{number}" for number in range(TEST_SCENES))
 """The scenes of the experiment."""
-ARRIVED, LEFT_ROAD, OUT_OF_TIME = "arrived", "left the road", "out of time"
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class DrivingScore:
 
     Attributes:
         scene: Name of the start.
-        outcome: How it ended: ``arrived``, ``left the road`` or ``out of time``.
+        outcome: How it ended.
         reward: The paper's return.
         cost: Sum of the costs.
         steps: Number of control steps.
@@ -38,7 +37,7 @@ class DrivingScore:
     """
 
     scene: str
-    outcome: str
+    outcome: Outcome
     reward: float
     cost: float
     steps: int
@@ -48,12 +47,12 @@ class DrivingScore:
     @property
     def success(self) -> bool:
         """Whether it reached the destination."""
-        return self.outcome == ARRIVED
+        return self.outcome is Outcome.ARRIVED
 
     @property
     def out_of_road(self) -> bool:
         """Whether it ended off the road."""
-        return self.outcome == LEFT_ROAD
+        return self.outcome is Outcome.LEFT_ROAD
 
 
 def drive_episode(
@@ -68,15 +67,20 @@ def drive_episode(
     """
     rewards, costs = [], []
     involvement = presses = 0
-    for record in run_episode(loop, loop.robot.episode_steps, lambda _: operator.act()):
+    traffic = loop.robot.read_traffic()
+    for _ in range(loop.robot.episode_steps):
+        record = loop.advance(operator.act(traffic))
+        traffic = record.traffic
         watch(record)
         rewards.append(record.reward)
         costs.append(record.cost)
         involvement += record.involved
         presses += sum(bool(event.key) for event in record.events)
+        if record.ended:
+            break
     return DrivingScore(
         loop.start,
-        record.ended or OUT_OF_TIME,
+        record.outcome or Outcome.OUT_OF_TIME,
         float(np.sum(rewards)),
         float(np.sum(costs)),
         len(rewards),
@@ -116,7 +120,7 @@ def read_episode(path: Path, robot: str) -> tuple[DrivingScore, str, SharedContr
     if back is not None:
         raise SessionError(f"{path}: it was rewound at step {back}; a scored drive must not be rewound")
     count = int((session.episodes == 0).sum())
-    outcome = session.endings.get(count - 1)
+    outcome = session.outcomes.get(count - 1)
     if outcome is None:
         raise SessionError(
             f"{path}: its first episode stops at step {count} and has no outcome; drive on until it ends"

@@ -17,8 +17,9 @@ from pdtui.paper.driving.maneuver import (
     drift,
     find_conflicts,
     roll,
+    sideways_past_standing,
 )
-from pdtui.paper.driving.operator_memory import Judgement, OperatorMemory
+from pdtui.paper.driving.operator_memory import REACTION_TIME, Judgement, OperatorMemory
 from pdtui.paper.driving.road_sight import RoadSight
 
 PRESSES_PER_SECOND = 3
@@ -29,7 +30,7 @@ NEAR_STANDING = 20.0
 """Distance from something that stands in the way at which it acts although the car is slow, m."""
 IMPROVEMENT, LAST_IMPROVEMENT = 1.0, 0.6
 """Time by which a lane change must postpone the next conflict, s: usually, and in the last moment."""
-STOPPING_ROOM, CREEPING_ROOM = 18.0, 4.0
+STOPPING_ROOM, CREEPING_ROOM = 18.0, 2.0
 """Distances from something that stands at which a fast and a slow car are to stop, m: to change lanes
 afterwards, it needs room."""
 _SLOW, _FAST = 4.0, 8.0
@@ -37,8 +38,12 @@ _SPEEDING_UP, _ROLLING = 2.0, 8.0
 """How a car is expected to start, m/s², and the speed up to which, m/s."""
 _HALTED, _HALTED_TIME = 0.5, 2.0
 """Speed of a car that has halted, m/s, and the time after which it should have gone on, s."""
+_CLOSE = 4.0
+"""Distance from something that stands at which a halted car must first turn aside, m."""
 _BRAKED_TIME = 3.0
 """Time after which it lets a stopped car go on unless somebody comes, s."""
+_LANE_KEY_TIME = 1.2
+"""Time after a lane key in which it does not brake early: what the key does is not to be seen yet, s."""
 _PACE_TIME = 1.6
 """Time over which the car's speed matters for a lane change, s."""
 
@@ -98,6 +103,8 @@ class KeyOperator:
             return max(better, key=lambda one: _preference(seen, one)).name
         if not must_brake:
             return ""
+        if seen.speed < _SLOW and (aside := self._aside(seen)):
+            return aside
         slower = Maneuver(BRAKE, roll(seen.speed, -self._effects.deceleration), drift(seen))
         return max((go_on, slower, *lanes), key=lambda one: find_conflicts(seen, one).first).name
 
@@ -114,6 +121,8 @@ class KeyOperator:
         """Return whether the last moment to brake has come."""
         stopping = seen.speed**2 / (2 * self._effects.deceleration) + 0.2 * seen.speed
         room = float(np.interp(seen.speed, [_SLOW, _FAST], [CREEPING_ROOM, STOPPING_ROOM]))
+        if self._time_since(LEFT, RIGHT) < _LANE_KEY_TIME:
+            room = CREEPING_ROOM
         patience = self._judgement.patience
         return (
             distance_to_standing(seen) < stopping + room * patience
@@ -134,34 +143,57 @@ class KeyOperator:
         better = (_improves(find_conflicts(seen, one), expected, IMPROVEMENT) for one in lanes)
         return DEFAULT if any(better) else ""
 
+    def _aside(self, seen: RoadSight) -> str:
+        """Return the key that moves a slow car past what stands in its way, on the side where less is to go.
+
+        Nothing if a car is there, or while the key still works.
+        """
+        to_left, to_right = sideways_past_standing(seen)
+        rolls = roll(seen.speed, 0.0)
+        for distance, key in sorted([(to_left, LEFT), (to_right, RIGHT)]):
+            shift = distance if key == LEFT else -distance
+            shifted = Maneuver(key, rolls, np.full_like(TIMES, shift))
+            conflicts = find_conflicts(seen, shifted)
+            if math.isinf(conflicts.moving) and math.isinf(conflicts.edge):
+                return key if self._may_press(key) else ""
+        return ""
+
+    def _may_press(self, key: str) -> bool:
+        """Return whether a lane key may be pressed: again once it has ended, the other one once settled."""
+        other = RIGHT if key == LEFT else LEFT
+        pulse = self._effects.periods.get(key, self._effects.settling_time)
+        return self._time_since(key) >= pulse and self._time_since(other) >= self._effects.settling_time
+
     def _lane_changes(self, seen: RoadSight) -> list[Maneuver]:
         """Return what the keys for lanes would do now; none while the last one is still at work."""
-        if self._time_since(LEFT, RIGHT) < self._effects.settling_time:
-            return []
         rolls = roll(seen.speed, _SPEEDING_UP if seen.speed < _FAST else 0.0, _ROLLING)
         pace = float(np.interp(_PACE_TIME, TIMES, rolls)) / _PACE_TIME
         share = min(1.0, pace / self._effects.speed)
         return [
             Maneuver(key, rolls, drift(seen) + share * self._effects.moved(key, TIMES))
             for key in (LEFT, RIGHT)
+            if self._may_press(key)
         ]
 
     def _beside(self, seen: RoadSight) -> Floats:
-        """Return how far the car moves to the left by itself and by the lane key that was pressed last."""
+        """Return how far the car moves to the left by itself and by the lane key that was pressed last.
+
+        A policy may steer against the key; once that is to be seen, the key counts no more.
+        """
         key, since = (self._presses[-1][1], self._time_since()) if self._presses else ("", math.inf)
-        if key in (LEFT, RIGHT) and since < self._effects.settling_time:
+        works = since < 2 * REACTION_TIME or (seen.heading > 0.0) == (key == LEFT)
+        if key in (LEFT, RIGHT) and since < self._effects.settling_time and works:
             return self._effects.moved(key, since + TIMES) - self._effects.moved(key, np.array([since]))
         return drift(seen)
 
     def _start_again(self, seen: RoadSight) -> str:
-        """Return the key that gets a halted car going: aside if something is close in front of it."""
+        """Return the key that gets a halted car going: first aside if something is close ahead."""
         if self._time_since() < _HALTED_TIME:
             return ""
-        if distance_to_standing(seen) > CREEPING_ROOM or (
-            self._presses[-1:] and self._presses[-1][1] != ACCELERATE
-        ):
+        turned = bool(self._presses) and self._presses[-1][1] in (LEFT, RIGHT)
+        if turned or distance_to_standing(seen) > _CLOSE:
             return ACCELERATE
-        return LEFT if seen.left > seen.right else RIGHT
+        return self._aside(seen) or ACCELERATE
 
     def _time_since(self, *keys: str) -> float:
         """Return how long ago one of the keys was pressed, or any if none is named, s."""

@@ -100,5 +100,16 @@ def distance_to_standing(sight: RoadSight) -> float:
     return float(gaps.min()) if len(gaps) else math.inf
 
 
+def sideways_past_standing(sight: RoadSight) -> tuple[float, float]:
+    """Return how far the car must move to the left, and to the right, to pass what is next in its way, m."""
+    ahead, beside, _, half_width, speed, sideways = sight.others.T
+    reach = half_width + CAR_HALF_WIDTH + _GAP_ASIDE
+    in_way = (ahead > 0.0) & (np.hypot(speed, sideways) < STANDING) & (np.abs(beside) < reach)
+    if not in_way.any():
+        return 0.0, 0.0
+    nearest = ahead[in_way] < ahead[in_way].min() + 2 * CAR_HALF_LENGTH
+    return (float((reach + beside)[in_way][nearest].max()), float((reach - beside)[in_way][nearest].max()))
+
+
 def _first_time(when: NDArray[np.bool_]) -> float:
     return float(TIMES[np.argmax(when)]) if when.any() else math.inf

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,13 +12,12 @@ from pdtui.core.attributes import Floats
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.paper.driving.drive_operators import NoOperator, SharedControl, make_operator
+from pdtui.paper.driving.drive_operators import SharedControl, make_operator
 from pdtui.paper.driving.driving_episode import TEST_STARTS, drive_episode
 from pdtui.paper.driving.driving_results import DrivingExperimentResult
 from pdtui.paper.driving.key_effects import KeyEffects
 from pdtui.paper.driving.operator_memory import draw_judgement
 from pdtui.paper.driving.sight_reader import read_boxes
-from pdtui.robots import open_robot
 from pdtui.robots.robot import Robot
 
 _MOST_SCENES = 6
@@ -30,8 +28,8 @@ _STOOD = 1.0
 class DriveWatcher:
     """Notes where the car and what is around it have been."""
 
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
+    def __init__(self) -> None:
+        self.lines: tuple[Floats, ...] = ()
         self.places: list[Floats] = []
         self.behaviors: list[str] = []
         self._others: dict[tuple[str, int], list[Floats]] = {}
@@ -41,7 +39,9 @@ class DriveWatcher:
         self.places.append(record.poses[0, :2].copy())
         acting = record.behaviors[-1].name if record.behaviors else ""
         self.behaviors.append("operator" if record.replaced else acting)
-        for key, box in read_boxes(self._robot).items():
+        if not self.lines:
+            self.lines = tuple(line.points[:, :2] for line in record.scenery.lines if line.kind != "route")
+        for key, box in read_boxes(record.scenery, record.traffic).items():
             self._others.setdefault(key, []).append(box)
 
     def standing(self) -> Floats:
@@ -72,39 +72,30 @@ def draw_trajectories(paths: Sequence[Path], config: DriveConfig, result: Drivin
 
     policy = Path(config.stimulation_map.source).stem
     effects = result.effects.get(policy)
-    pictures = []
-    with open_robot(config.robot) as robot:
-        for scene in choose_scenes(result, policy):
-            alone, ended = _drive(config, robot, scene, "alone", None)
-            control: SharedControl = "keys" if effects is not None else "takeover"
-            shared, reached = _drive(config, robot, scene, control, effects)
-            pictures.append(
-                RoadPicture(
-                    f"{scene}: alone: {ended}; shared: {reached}",
-                    tuple(line.points[:, :2] for line in _scenery(robot).lines if line.kind != "route"),
-                    shared.standing(),
-                    shared.tracks(),
-                    np.array(alone.places),
-                    np.array(shared.places),
-                    tuple(shared.behaviors),
-                )
-            )
-    draw_road_pictures(paths, f"{config.robot}, driven by {policy} with an operator's keys", pictures)
+    control: SharedControl = "keys" if effects is not None else "takeover"
+    pictures, robot = [], None
+    for scene in choose_scenes(result, policy):
+        alone, ended, robot = _drive(config, robot, scene, "alone", None)
+        shared, reached, robot = _drive(config, robot, scene, control, effects)
+        title = f"{scene}: alone: {ended}; shared: {reached}"
+        places = np.array(alone.places), np.array(shared.places)
+        behaviors = tuple(shared.behaviors)
+        pictures.append(
+            RoadPicture(title, shared.lines, shared.standing(), shared.tracks(), *places, behaviors)
+        )
+    if robot is not None:
+        robot.close()
+    draw_road_pictures(paths, f"{config.robot}, driven by {policy} and an operator", pictures)
 
 
 def _drive(
-    config: DriveConfig, robot: Robot, scene: str, control: SharedControl, effects: KeyEffects | None
-) -> tuple[DriveWatcher, str]:
+    config: DriveConfig, robot: Robot | None, scene: str, control: SharedControl, effects: KeyEffects | None
+) -> tuple[DriveWatcher, str, Robot]:
     loop = build_control_loop(replace(config, start=scene), robot)
     judgement = draw_judgement(0, TEST_STARTS.index(scene))
-    operator = NoOperator() if control == "alone" else make_operator(control, loop, effects, judgement)
-    watcher = DriveWatcher(robot)
-    score = drive_episode(loop, operator, watcher.watch)
-    return watcher, score.outcome
-
-
-def _scenery(robot: Any) -> Any:
-    return robot.scenery
+    watcher = DriveWatcher()
+    score = drive_episode(loop, make_operator(control, loop, effects, judgement), watcher.watch)
+    return watcher, score.outcome, loop.robot
 
 
 def _stood(boxes: Sequence[Floats]) -> bool:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from pdtui.core.attributes import Floats, wrap_angle
 from pdtui.core.errors import RobotError
+from pdtui.core.scenery import Scenery, Traffic
 from pdtui.paper.driving.road_sight import ROAD_STEP, SIGHT, RoadSight
 from pdtui.paper.driving.route_line import RouteLine
+from pdtui.robots.robot import Robot
 
 _STEPS_OF_VELOCITY = 2
 """Control steps over which somebody's velocity is judged."""
 _ROAD_BEHIND = 10.0
-_OWN, _BOX = ("speed", "heading", "yaw rate", "left distance", "right distance"), 7
+_OWN = ("speed", "heading", "yaw rate", "left distance", "right distance")
 
 
 class SightReader:
@@ -27,17 +28,17 @@ class SightReader:
         robot: The car; its scenery has a route, and its traffic the boxes around it.
     """
 
-    def __init__(self, robot: Any) -> None:
+    def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._columns = [robot.attribute_index(name) for name in _OWN]
         self._dt = float(robot.control_dt)
         self._line: RouteLine | None = None
-        self._scenery: object = None
+        self._scenery: Scenery | None = None
         self._along: float | None = None
         self._seen: list[dict[tuple[str, int], Floats]] = []
 
-    def look(self) -> RoadSight:
-        """Return what there is to see now; call it once per control step."""
+    def look(self, traffic: Traffic) -> RoadSight:
+        """Return what there is to see now, with this traffic; call it once per control step."""
         line = self._route_line()
         speed, heading, yaw_rate, left, right = self._robot.read_attributes()[self._columns].tolist()
         place = self._robot.read_poses()[:1, :2]
@@ -55,11 +56,17 @@ class SightReader:
             axis=1,
         )
         return RoadSight(
-            speed, wrap_angle(heading), yaw_rate, left, right, self._others(line, place[0], along), road
+            speed,
+            wrap_angle(heading),
+            yaw_rate,
+            left,
+            right,
+            self._others(traffic, line, place[0], along),
+            road,
         )
 
-    def _others(self, line: RouteLine, place: Floats, along: float) -> Floats:
-        seen = read_boxes(self._robot)
+    def _others(self, traffic: Traffic, line: RouteLine, place: Floats, along: float) -> Floats:
+        seen = read_boxes(self._robot.scenery, traffic)
         self._seen = [*self._seen[-_STEPS_OF_VELOCITY:], seen]
         before = self._seen[0]
         span = (len(self._seen) - 1) * self._dt
@@ -97,11 +104,10 @@ class SightReader:
         return self._line
 
 
-def read_boxes(robot: Any) -> dict[tuple[str, int], Floats]:
+def read_boxes(scenery: Scenery, traffic: Traffic) -> dict[tuple[str, int], Floats]:
     """Return what is around a car: x, y (m), yaw (rad), length and width (m), by kind and number."""
-    traffic = robot.read_traffic()
     boxes = np.concatenate([traffic.poses[:, [0, 1, 3]], traffic.sizes[:, :2]], axis=1)
-    found = dict(zip(traffic.keys, boxes, strict=True))
-    for number, (x, y, radius) in enumerate(robot.scenery.cylinders.tolist()):
+    found: dict[tuple[str, int], Floats] = dict(zip(traffic.keys, boxes, strict=True))
+    for number, (x, y, radius) in enumerate(scenery.cylinders.tolist()):
         found["cylinder", number] = np.array([x, y, 0.0, 2 * radius, 2 * radius])
     return found

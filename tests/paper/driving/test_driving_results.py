@@ -12,6 +12,7 @@ import pytest
 from rich.console import Console
 
 from pdtui.core.errors import PdtuiError
+from pdtui.core.outcome import Outcome
 from pdtui.paper.driving.drive_journal import DriveJournal
 from pdtui.paper.driving.driving_episode import DrivingScore
 from pdtui.paper.driving.driving_results import (
@@ -21,12 +22,20 @@ from pdtui.paper.driving.driving_results import (
     summarise_row,
 )
 
-WORDS = ("arrived", "arrived", "left the road", "out of time", "arrived", "crashed")
+OUTCOMES = [
+    Outcome(word) for word in ("arrived", "arrived", "left the road", "out of time", "arrived", "crashed")
+]
 
 
 def _score(number: int, involvement: int) -> DrivingScore:
     return DrivingScore(
-        f"test-{number}", WORDS[number], 100.0 + 7 * number, float(number % 3), 300, involvement, involvement
+        f"test-{number}",
+        OUTCOMES[number],
+        100.0 + 7 * number,
+        float(number % 3),
+        300,
+        involvement,
+        involvement,
     )
 
 
@@ -36,7 +45,7 @@ ALONE = [[_score(number, 0) for number in range(6)]]
 
 
 def test_a_row_is_the_mean_and_spread_of_its_repeats() -> None:
-    worse = [*KEYS[:2], [replace(one, outcome="left the road") for one in KEYS[2]]]
+    worse = [*KEYS[:2], [replace(one, outcome=Outcome.LEFT_ROAD) for one in KEYS[2]]]
     row = summarise_row("ppo", "keys", "program", worse)
     successes = [3 / 6, 3 / 6, 0.0]
     assert (row.success.mean, row.success.std) == pytest.approx((mean(successes), stdev(successes)))
