@@ -22,6 +22,7 @@ class RandomPurpose(IntEnum):
     RANDOM_UNITS = 5
     RANDOM_DIRECTION = 6
     PLACEBO_KEYS = 7
+    OPERATOR_JUDGEMENT = 8
 
 
 def purpose_generator(purpose: RandomPurpose, *key: int) -> np.random.Generator:

@@ -72,6 +72,25 @@ class Experiment:
     draws_pictures: bool = False
 
 
+SESSION_OPTION = click.Option(
+    ["--session", "sessions"],
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="Score a recorded drive; may be repeated. Anything else is then measured only where it is named "
+    "(--condition, --control).",
+)
+RECORD_OPTION = click.Option(
+    ["--record"],
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="FOLDER",
+    help="Record the operator's drives with keys, each as a session and a keystroke file.",
+)
+REPEATS_OPTION = click.Option(
+    ["--repeats"], type=click.IntRange(1), metavar="N", help="Number of repeats.  [default: 5]"
+)
+"""Options that several experiments take."""
+
+
 def list_experiments() -> dict[str, Experiment]:
     """Return all experiments of this package by name."""
     names = [module.name for module in pkgutil.iter_modules(pdtui.paper.__path__)]

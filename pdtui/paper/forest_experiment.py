@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 
 import click
 
-from pdtui.paper.experiment import Experiment, ExperimentReport, ExperimentRequest
+from pdtui.paper.experiment import (
+    RECORD_OPTION,
+    REPEATS_OPTION,
+    SESSION_OPTION,
+    Experiment,
+    ExperimentReport,
+    ExperimentRequest,
+)
 
 
 def run_forest_experiment(request: ExperimentRequest) -> ExperimentReport:
@@ -38,30 +44,14 @@ EXPERIMENT = Experiment(
             metavar="N",
             help="Longest episode, in control steps.  [default: 2400]",
         ),
-        click.Option(
-            ["--repeats"],
-            type=click.IntRange(1),
-            metavar="N",
-            help="Number of groups of seeds.  [default: 5]",
-        ),
+        REPEATS_OPTION,
         click.Option(
             ["--condition", "conditions"],
             multiple=True,
             type=click.Choice(["alone", "operator", "placebo", "vision"]),
             help="Measure only this condition; may be repeated.  [default: all]",
         ),
-        click.Option(
-            ["--session", "sessions"],
-            multiple=True,
-            type=click.Path(path_type=Path),
-            help="Score a recorded drive; may be repeated. Conditions are then measured only where "
-            "--condition names them.",
-        ),
-        click.Option(
-            ["--record"],
-            type=click.Path(path_type=Path, file_okay=False),
-            metavar="FOLDER",
-            help="Record the operator's drives, each as a session and a keystroke file.",
-        ),
+        SESSION_OPTION,
+        RECORD_OPTION,
     ),
 )

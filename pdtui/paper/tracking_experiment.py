@@ -24,9 +24,10 @@ def run_tracking_experiment(request: ExperimentRequest) -> ExperimentReport:
         PdtuiError: as `compare_heading_precision`, or a picture cannot be written.
     """
     from pdtui.paper.heading_precision import compare_heading_precision
-    from pdtui.pictures.heading_figures import check_heading_picture_paths, draw_heading_pictures
+    from pdtui.pictures.heading_figures import draw_heading_pictures
+    from pdtui.pictures.picture_paths import check_picture_paths
 
-    check_heading_picture_paths(request.pictures, request.overwrite)
+    check_picture_paths(request.pictures, request.overwrite)
     result = compare_heading_precision(
         request.configs, request.seeds, workers=request.workers, progress=request.progress, **request.options
     )

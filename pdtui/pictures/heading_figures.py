@@ -15,7 +15,6 @@ import rerun.blueprint as rrb
 from rich.table import Table
 
 from pdtui.core.attributes import Floats, wrap_angles
-from pdtui.core.errors import PictureError
 from pdtui.core.printable_text import to_json
 from pdtui.pictures.matplotlib_page import open_figure_page
 from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, color_to_hex
@@ -76,19 +75,6 @@ class HeadingFigure:
     def seeds(self) -> int:
         """Number of drives of each behavior."""
         return len(self.behaviors[0].values)
-
-
-def check_heading_picture_paths(paths: Sequence[Path], overwrite: bool) -> None:
-    """Find out before minutes of work whether the pictures can be written.
-
-    Raises:
-        PictureError: The ending is unknown, or a file already exists.
-    """
-    for path in paths:
-        if path.suffix not in (".png", ".rrd"):
-            raise PictureError(f"{path}: expected a name that ends in .png or .rrd")
-        if path.exists() and not overwrite:
-            raise PictureError(f"{path}: already exists; --overwrite replaces it")
 
 
 def draw_heading_pictures(paths: Sequence[Path], shown: HeadingFigure) -> None:

@@ -30,10 +30,13 @@ EXPERIMENTS = find_experiments()
 
 def experiment_options(command: click.Command) -> click.Command:
     """Add the options of the experiments to a command."""
+    takers: dict[click.Option, list[str]] = {}
     for name, experiment in EXPERIMENTS.items():
         for option in experiment.options:
-            option.help = f"With --experiment {name}: {option.help}"
-            command.params.append(option)
+            takers.setdefault(option, []).append(name)
+    for option, names in takers.items():
+        option.help = f"With --experiment {' or '.join(names)}: {option.help}"
+        command.params.append(option)
     return command
 
 

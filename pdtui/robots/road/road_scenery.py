@@ -49,7 +49,7 @@ class TrafficReader:
             "vehicle" if _is_vehicle(thing) else "obstacle" for thing in boxes.values()
         )
         poses = [[*thing.position, 0.5 * thing.HEIGHT, thing.heading_theta] for thing in boxes.values()]
-        sizes = [[thing.LENGTH, thing.WIDTH, thing.HEIGHT] for thing in boxes.values()]
+        sizes = [[*_footprint(thing), thing.HEIGHT] for thing in boxes.values()]
         return Traffic(
             np.array([self._numbers[name] for name in boxes], np.int64),
             kinds,
@@ -113,6 +113,11 @@ def _is_cone(thing: Any) -> bool:
 
 def _is_box(thing: Any, car: Any) -> bool:
     return thing is not car and not _is_cone(thing) and hasattr(thing, "LENGTH")
+
+
+def _footprint(thing: Any) -> tuple[float, float]:
+    """Return the extents of a box along its heading and across it, m: a barrier's length lies across."""
+    return (thing.LENGTH, thing.WIDTH) if _is_vehicle(thing) else (thing.WIDTH, thing.LENGTH)
 
 
 def _lidar_hits(car: Any, observation: NDArray[np.float32]) -> Floats:

@@ -1,0 +1,197 @@
+"""The results of the driving experiment: Table 1 of the paper."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from rich.console import Group
+from rich.table import Table
+
+from pdtui.core.confidence_intervals import PairedRatio, paired_ratio
+from pdtui.core.text_tables import format_mean_with_interval, new_table
+from pdtui.evaluation.paired_statistics import share_interval
+from pdtui.paper.driving.drive_operators import SharedControl
+from pdtui.paper.driving.driving_episode import DrivingScore
+from pdtui.paper.driving.key_effects import KeyEffects
+
+CONTROL_NAMES: dict[SharedControl, str] = {
+    "alone": "alone",
+    "keys": "H*, keys on units",
+    "takeover": "H^n, steers while taking over",
+    "human only": "human only",
+}
+"""Names of the ways to share control in tables."""
+
+
+@dataclass(frozen=True)
+class RepeatedFigure:
+    """Mean over repeats and their standard deviation (n − 1), which is NaN for a single repeat."""
+
+    mean: float
+    std: float
+
+
+@dataclass(frozen=True)
+class DrivingRow:
+    """The figures of one row of the table.
+
+    Attributes:
+        policy: Name of the policy; empty for an operator without one.
+        driver: ``program`` or ``person``; empty for a policy alone.
+        success: Share of episodes that reach the destination.
+        success_share: Its exact 95 % interval over all episodes.
+        out_of_road: Share of episodes that end off the road.
+        reward, cost: The paper's return and cost of an episode.
+        involvement: Control steps of an episode in which the operator was involved; None for a policy alone.
+        presses: Key presses of an episode; None for a policy alone.
+        repeats: Number of repeats.
+        scores: Scores of all episodes, repeat after repeat.
+    """
+
+    policy: str
+    control: SharedControl
+    driver: str
+    success: RepeatedFigure
+    success_share: tuple[float, float]
+    out_of_road: RepeatedFigure
+    reward: RepeatedFigure
+    cost: RepeatedFigure
+    involvement: RepeatedFigure | None
+    presses: RepeatedFigure | None
+    repeats: int
+    scores: tuple[DrivingScore, ...]
+
+
+@dataclass(frozen=True)
+class InvolvementRatio:
+    """Involvement with keys over that with takeovers, paired by scene and repeat, with its 95 % interval."""
+
+    policy: str
+    ratio: PairedRatio
+
+
+@dataclass(frozen=True)
+class DrivingExperimentResult:
+    """The result of the driving experiment.
+
+    Attributes:
+        scenes: Names of the scenes.
+        repeats: Number of repeats of every row with an operator.
+        effects: What the operator was told of its keys, by policy.
+        left_out: Policies that were not measured, and the reasons.
+        sessions: Files of people's drives.
+    """
+
+    robot: str
+    scenes: tuple[str, ...]
+    repeats: int
+    rows: tuple[DrivingRow, ...]
+    ratios: tuple[InvolvementRatio, ...]
+    effects: Mapping[str, KeyEffects]
+    left_out: Mapping[str, str]
+    sessions: tuple[str, ...]
+
+
+def summarise_row(
+    policy: str, control: SharedControl, driver: str, repeats: Sequence[Sequence[DrivingScore]]
+) -> DrivingRow:
+    """Return a row from the scores of each repeat's episodes."""
+
+    def figure(name: str) -> RepeatedFigure:
+        means = np.array([np.mean([float(getattr(one, name)) for one in scores]) for scores in repeats])
+        return RepeatedFigure(float(means.mean()), float(means.std(ddof=1)) if len(repeats) > 1 else math.nan)
+
+    scores = tuple(one for repeat in repeats for one in repeat)
+    operated = control != "alone"
+    return DrivingRow(
+        policy,
+        control,
+        driver,
+        figure("success"),
+        share_interval(sum(one.success for one in scores), len(scores)),
+        figure("out_of_road"),
+        figure("reward"),
+        figure("cost"),
+        figure("involvement") if operated else None,
+        figure("presses") if operated else None,
+        len(repeats),
+        scores,
+    )
+
+
+def compare_involvement(rows: Sequence[DrivingRow]) -> tuple[InvolvementRatio, ...]:
+    """Return the ratio of involvement for each policy that was driven with keys and with takeovers."""
+    ratios = []
+    for keys in rows:
+        for takeover in rows:
+            same = (
+                (takeover.policy, takeover.driver) == (keys.policy, keys.driver) == (keys.policy, "program")
+            )
+            if same and (keys.control, takeover.control) == ("keys", "takeover"):
+                above, below = (
+                    np.array([float(one.involvement) for one in row.scores]) for row in (keys, takeover)
+                )
+                ratios.append(InvolvementRatio(keys.policy, paired_ratio(above, below)))
+    return tuple(ratios)
+
+
+def driving_table(result: DrivingExperimentResult) -> Group:
+    """Return the table, with notes below it."""
+    count = len(result.scenes)
+    table = new_table(
+        f"{result.robot} among traffic and obstacles, {count} scenes" if count else f"{result.robot}: drives",
+        *(
+            "policy",
+            "driven",
+            "success",
+            "[95 %]",
+            "out of road",
+            "return",
+            "cost",
+            "involvement",
+            "key presses",
+        ),
+        left=("policy", "driven"),
+    )
+    for row in result.rows:
+        low, high = row.success_share
+        table.add_row(
+            row.policy,
+            CONTROL_NAMES[row.control] + (", by a person" if row.driver == "person" else ""),
+            _format(row.success, 2),
+            f"[{low:.2f}, {high:.2f}]",
+            _format(row.out_of_road, 2),
+            _format(row.reward, 1),
+            _format(row.cost, 2),
+            "–" if row.involvement is None else _format(row.involvement, 1),
+            "–" if row.presses is None else _format(row.presses, 1),
+        )
+    return Group(table, *([_ratio_table(result.ratios)] if result.ratios else []), *_notes(result))
+
+
+def _notes(result: DrivingExperimentResult) -> list[str]:
+    notes = ["Involvement: control steps of an episode in which a key was pressed or the operator steered."]
+    if result.scenes:
+        notes.append(
+            f"Mean ± standard deviation of {result.repeats} repeats, in each of which the operator judges "
+            "distances and speeds otherwise. A policy alone acts the same every time: it is run once."
+        )
+    if result.sessions:
+        scenes = {one.scene for row in result.rows if row.driver == "person" for one in row.scores}
+        notes.append(f"People drove {len(result.sessions)} times: {', '.join(sorted(scenes))}.")
+    return notes + [f"Not measured: {policy}: {reason}" for policy, reason in result.left_out.items()]
+
+
+def _ratio_table(ratios: Sequence[InvolvementRatio]) -> Table:
+    table = new_table("Involvement with keys / while taking over [95 %]", "policy", "ratio")
+    for one in ratios:
+        table.add_row(one.policy, format_mean_with_interval(one.ratio.value, one.ratio.low, one.ratio.high))
+    return table
+
+
+def _format(figure: RepeatedFigure, digits: int) -> str:
+    spread = "" if math.isnan(figure.std) else f" ± {figure.std:.{digits}f}"
+    return f"{figure.mean:.{digits}f}{spread}"

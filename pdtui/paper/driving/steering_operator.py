@@ -1,0 +1,176 @@
+"""The operator that steers (H^n and human only): it keeps to a lane and changes it when it must."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdtui.core.attributes import Floats
+from pdtui.paper.driving.key_operator import (
+    IMPROVEMENT,
+    NEAR_STANDING,
+    PATIENCE_EDGE,
+    PATIENCE_MOVING,
+    PATIENCE_STANDING,
+)
+from pdtui.paper.driving.maneuver import (
+    HORIZON,
+    TIMES,
+    Maneuver,
+    distance_to_standing,
+    drift,
+    find_conflicts,
+    roll,
+)
+from pdtui.paper.driving.operator_memory import Judgement, OperatorMemory
+from pdtui.paper.driving.road_sight import CAR_HALF_LENGTH, CAR_HALF_WIDTH, LANE_WIDTH, ROAD_STEP, RoadSight
+
+CRUISING_SPEED = 10.0
+"""Speed at which it drives where nothing is in the way, m/s."""
+_SIDEWAYS_ACCELERATION = 3.0
+"""Largest acceleration to the side in a bend, m/s²."""
+_CHANGE_TIME = 2.4
+"""Time that it takes for a lane change, s."""
+_LOOK_AHEAD, _LOOK_AHEAD_TIME = 5.0, 0.9
+"""Distance of the place that it steers to: at rest, m, and per speed, s."""
+_WHEELBASE, _LARGEST_ANGLE = 2.47, math.radians(40.0)
+"""Distance between the axles, m, and the angle of the wheels at full steering, rad."""
+_BRAKING, _HEADWAY, _STANDSTILL_GAP = 3.0, 1.2, 4.0
+"""How hard it plans to brake, m/s², and its distance from who is in front: per speed, s, and at rest, m."""
+_THROTTLE_GAIN = 0.3
+"""Throttle per error of the speed, s/m."""
+_HANDS_OFF_AFTER = 5
+"""Control steps on a free road after which it hands back."""
+_CENTERED, _STRAIGHT = 0.6, 0.06
+"""Distance from the middle of the lane, m, and heading, rad, with which a lane change is over."""
+
+
+@dataclass(frozen=True)
+class ManualControls:
+    """What the operator does with the wheel, to the left, and with the throttle, each in [−1, 1]."""
+
+    steering: float
+    throttle: float
+
+
+class SteeringOperator:
+    """Decides how to steer, and whether to, from what there is to see.
+
+    Args:
+        dt: Duration of a control step, s.
+        judgement: How it judges what it sees.
+        always: Whether it drives all the time, or takes over only where the car alone would come too close to
+            something, until that is over.
+    """
+
+    def __init__(self, dt: float, judgement: Judgement | None = None, *, always: bool = False) -> None:
+        self._judgement, self._always = judgement or Judgement(), always
+        self._memory = OperatorMemory(dt, self._judgement)
+        self._dt, self._target, self._driving, self._quiet, self._halted = dt, 0, False, 0, 0
+
+    def choose_controls(self, sight: RoadSight) -> ManualControls | None:
+        """Observe the road and return what to do now, or None to leave it to the policy.
+
+        Call it once per control step.
+        """
+        seen = self._memory.recall(sight)
+        if seen is None:
+            return ManualControls(0.0, 0.0) if self._always else None
+        self._halted = self._halted + 1 if seen.speed < 0.5 else 0
+        if not self._driving:
+            if not (self._always or self._must_act(seen)):
+                return None
+            self._driving, self._quiet, self._target = True, 0, seen.lane
+        self._choose_lane(seen)
+        if not self._always and self._is_over(seen):
+            self._driving = False
+            return None
+        return self._drive(seen)
+
+    def _must_act(self, seen: RoadSight) -> bool:
+        expected = find_conflicts(seen, Maneuver("", roll(seen.speed, 0.0), drift(seen)))
+        patience = self._judgement.patience
+        return (
+            expected.standing < PATIENCE_STANDING * patience
+            or expected.moving < PATIENCE_MOVING * patience
+            or expected.edge < PATIENCE_EDGE * patience
+            or distance_to_standing(seen) < NEAR_STANDING * patience
+            or self._halted * self._dt > 2.0
+        )
+
+    def _is_over(self, seen: RoadSight) -> bool:
+        centered = abs(seen.to_middle_of(self._target)) < _CENTERED and abs(seen.heading) < _STRAIGHT
+        self._quiet = self._quiet + 1 if centered and not self._must_act(seen) else 0
+        return self._quiet >= _HANDS_OFF_AFTER
+
+    def _choose_lane(self, seen: RoadSight) -> None:
+        """Choose another lane if that postpones the next conflict; it is kept until it is reached."""
+        self._target = min(self._target, seen.lanes - 1)
+        now = self._expect(seen, self._target)
+        if now > PATIENCE_STANDING * self._judgement.patience:
+            return
+        near = [lane for lane in (seen.lane - 1, seen.lane, seen.lane + 1) if 0 <= lane < seen.lanes]
+        later = {lane: self._expect(seen, lane) for lane in near}
+        best = max(later, key=lambda lane: (min(later[lane], 2 * HORIZON), -abs(lane - seen.lane)))
+        if later[best] > min(now, HORIZON - IMPROVEMENT) + IMPROVEMENT:
+            self._target = best
+
+    def _expect(self, seen: RoadSight, lane: int) -> float:
+        """Return the time of the first conflict on the way to a lane and along it, s."""
+        speed = max(seen.speed, 3.0)
+        share = np.clip(TIMES / _CHANGE_TIME, 0.0, 1.0)
+        beside = seen.to_middle_of(lane) * share * share * (3.0 - 2.0 * share)
+        return find_conflicts(seen, Maneuver("", roll(speed, 0.0), beside)).first
+
+    def _drive(self, seen: RoadSight) -> ManualControls:
+        beside = seen.to_middle_of(self._target) + _middle(seen)
+        distance = _LOOK_AHEAD + _LOOK_AHEAD_TIME * seen.speed
+        x, y = _place_ahead(seen.road, distance, beside)
+        angle = math.atan(2.0 * _WHEELBASE * y / max(x * x + y * y, 1.0))
+        speed = min(CRUISING_SPEED, _bend_speed(seen.road), self._following_speed(seen))
+        throttle = _THROTTLE_GAIN * (speed - seen.speed)
+        return ManualControls(
+            float(np.clip(angle / _LARGEST_ANGLE, -1.0, 1.0)), float(np.clip(throttle, -1.0, 1.0))
+        )
+
+    def _following_speed(self, seen: RoadSight) -> float:
+        """Return the speed at which the car does not run into what is in front of it on its way, m/s."""
+        ahead, beside, half_length, half_width, speed, _ = seen.others.T
+        gaps = ahead - half_length - CAR_HALF_LENGTH
+        to = seen.to_middle_of(self._target)
+        reach = half_width + CAR_HALF_WIDTH + 0.3
+        # A lane change leaves what is far enough away behind.
+        here = (np.abs(beside) < reach) & (gaps < _STANDSTILL_GAP + LANE_WIDTH / 2 + abs(to))
+        there = np.abs(beside - to) < reach
+        front = (ahead > 0.0) & (here | there)
+        if not front.any():
+            return math.inf
+        room = np.maximum(gaps[front] - _STANDSTILL_GAP, 0.0)
+        ahead_speed = np.maximum(speed[front], 0.0)
+        return float(
+            np.min(np.minimum(np.sqrt(ahead_speed**2 + 2 * _BRAKING * room), ahead_speed + room / _HEADWAY))
+        )
+
+
+def _middle(seen: RoadSight) -> float:
+    """Return how far the car's middle is to the left of the road's, m."""
+    return (seen.right - seen.left) / 2
+
+
+def _place_ahead(road: Floats, distance: float, beside: float) -> tuple[float, float]:
+    """Return a place beside the middle line, forward and to the left in the car's own directions, m."""
+    index = min(len(road) - 2, int(distance / ROAD_STEP))
+    along = road[index + 1] - road[index]
+    along = along / np.hypot(*along)
+    x, y = road[index] + along * (distance - index * ROAD_STEP) + beside * np.array([-along[1], along[0]])
+    return float(x), float(y)
+
+
+def _bend_speed(road: Floats) -> float:
+    """Return the speed that the bend ahead allows, m/s."""
+    steps = np.diff(road[:12], axis=0)
+    turns = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
+    curvature = float(np.convolve(turns, np.ones(4) / 4, "valid").max()) / ROAD_STEP
+    return math.sqrt(_SIDEWAYS_ACCELERATION / max(curvature, 1e-3))
