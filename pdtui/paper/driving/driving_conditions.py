@@ -12,7 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from pdtui.core.errors import PdtuiError, SessionError
-from pdtui.core.worker_pool import StepProgress, WorkerPool
+from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
