@@ -11,7 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-PACKAGES = ("pdtui", "mujoco", "pybullet", "box2d", "gymnasium", "torch", "numpy", "simple-pid", "rerun-sdk")
+PACKAGES = (
+    "pdtui", "mujoco", "pybullet", "box2d", "metadrive-simulator", "panda3d", "gymnasium", "torch", "numpy",
+    "simple-pid", "rerun-sdk",
+)  # fmt: skip
 COMPUTES_NOTHING = ("system", "rerun-sdk")
 """Entries that may differ without affecting any number of a run."""
 
