@@ -79,6 +79,9 @@ def evaluate_driving(
             scored.
     """
     robot = configs[0].robot
+    if unknown := sorted(set(scenes) - set(TEST_STARTS)):
+        known = f"{TEST_STARTS[0]} to {TEST_STARTS[-1]}"
+        raise PdtuiError(f"expected scenes of the experiment, {known}, found '{unknown[0]}'")
     read = [read_episode(path, robot) for path in sessions]
     if record is not None and (present := sorted(record.glob("*.rrd"))):
         raise SessionError(f"{present[0]}: already exists; drives are recorded into a new folder")

@@ -19,11 +19,11 @@ from pdtui.paper.driving.key_effects import KeyEffects
 
 CONTROL_NAMES: dict[SharedControl, str] = {
     "alone": "alone",
-    "keys": "H*, keys on units",
-    "takeover": "H^n, steers while taking over",
+    "keys": "H*",
+    "takeover": "H^n",
     "human only": "human only",
 }
-"""Names of the ways to share control in tables."""
+"""The paper's names of the ways to share control."""
 
 
 @dataclass(frozen=True)
@@ -143,31 +143,18 @@ def driving_table(result: DrivingExperimentResult) -> Group:
     count = len(result.scenes)
     table = new_table(
         f"{result.robot} among traffic and obstacles, {count} scenes" if count else f"{result.robot}: drives",
-        *(
-            "policy",
-            "driven",
-            "success",
-            "[95 %]",
-            "out of road",
-            "return",
-            "cost",
-            "involvement",
-            "key presses",
-        ),
+        *("policy", "driven", "success", "out of road", "return", "cost", "involvement"),
         left=("policy", "driven"),
     )
     for row in result.rows:
-        low, high = row.success_share
         table.add_row(
             row.policy,
-            CONTROL_NAMES[row.control] + (", by a person" if row.driver == "person" else ""),
+            CONTROL_NAMES[row.control] + (", a person" if row.driver == "person" else ""),
             _format(row.success, 2),
-            f"[{low:.2f}, {high:.2f}]",
             _format(row.out_of_road, 2),
             _format(row.reward, 1),
             _format(row.cost, 2),
             "–" if row.involvement is None else _format(row.involvement, 1),
-            "–" if row.presses is None else _format(row.presses, 1),
         )
     return Group(table, *([_ratio_table(result.ratios)] if result.ratios else []), *_notes(result))
 
@@ -186,7 +173,7 @@ def _notes(result: DrivingExperimentResult) -> list[str]:
 
 
 def _ratio_table(ratios: Sequence[InvolvementRatio]) -> Table:
-    table = new_table("Involvement with keys / while taking over [95 %]", "policy", "ratio")
+    table = new_table("Involvement of H* / that of H^n [95 %]", "policy", "ratio")
     for one in ratios:
         table.add_row(one.policy, format_mean_with_interval(one.ratio.value, one.ratio.low, one.ratio.high))
     return table
