@@ -32,11 +32,12 @@ _QUARTER_TURN = math.sqrt(0.5)
 _WORDS = (
     ("arrive_dest", Outcome.ARRIVED),
     ("out_of_road", Outcome.LEFT_ROAD),
+    # An episode that a crash does not end may run out of time while the car touches something.
+    ("max_step", Outcome.OUT_OF_TIME),
     ("crash_vehicle", Outcome.CRASHED),
     ("crash_object", Outcome.CRASHED),
     ("crash_building", Outcome.CRASHED),
     ("crash_human", Outcome.CRASHED),
-    ("max_step", Outcome.OUT_OF_TIME),
 )
 
 
