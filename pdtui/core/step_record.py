@@ -50,7 +50,7 @@ class ReplacedAction(NamedTuple):
 Involvement = TypeVar("Involvement", bool, NDArray[np.bool_])
 
 
-def involves_operator(keyed: Involvement, taken_over: Involvement) -> Involvement:
+def is_involvement_step(keyed: Involvement, taken_over: Involvement) -> Involvement:
     """Return whether control steps count as human involvement, the paper's measure: one step each.
 
     Args:
@@ -107,4 +107,4 @@ class StepRecord(NamedTuple):
     @property
     def involved(self) -> bool:
         """Whether the step counts as human involvement."""
-        return involves_operator(any(event.key for event in self.events), bool(self.replaced))
+        return is_involvement_step(any(event.key for event in self.events), bool(self.replaced))

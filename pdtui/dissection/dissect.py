@@ -125,7 +125,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             prober, robot, settings, seed, SharedTimeBudget(config.budget_minutes, began), stage, known
         )
         behaviors, controllers = searches.run(screen, refined, starts.searches)
-        tasks = searches.search_tasks(refined.units)
+        tasks = searches.search_units_for_tasks(refined.units)
         return Dissection(
             robot=robot.name,
             policy=network.name if isinstance(config.policy, Policy) else str(config.policy),

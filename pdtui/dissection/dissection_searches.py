@@ -65,7 +65,7 @@ class DissectionSearches:
         behaviors = self._search_behaviors(goals, (screen, refined), shared, starts)
         return behaviors, self._search_controllers(controller_goals, refined, shared, starts)
 
-    def search_tasks(self, units: Sequence[int]) -> tuple[TaskSearchResult, ...]:
+    def search_units_for_tasks(self, units: Sequence[int]) -> tuple[TaskSearchResult, ...]:
         """Search for what does the tasks that the robot's goals name.
 
         Args:

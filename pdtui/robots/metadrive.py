@@ -187,7 +187,7 @@ class MetaDrive(Robot):
         seed, start = (int(value) for value in snapshot.extras[0].view(np.int64))
         wanted, actions = (start, seed, snapshot.state.tobytes()), snapshot.state.astype(np.float32)
         if wanted == self._held:
-            self._ask(RoadWorld.go_back)
+            self._ask(RoadWorld.return_to_held_state)
             self._state, self._actions = self._held_state, ActionLog(2)
             for action in actions:
                 self._actions.append(action)
@@ -202,7 +202,7 @@ class MetaDrive(Robot):
 
     def _begin(self, start: str, seed: int, exactly: bool) -> None:
         if self._held is not None:
-            self._ask(RoadWorld.release_state)
+            self._ask(RoadWorld.return_and_release_state)
             self._held = None
         self._seed, self._start, self._actions = seed, start, ActionLog(2)
         self._state = self._ask(RoadWorld.reset, start, seed, exactly)

@@ -22,7 +22,7 @@ class EpisodeStatistics:
     Attributes:
         episode: number of the episode.
         steps: number of control steps, including those that were rewound.
-        involvement: number of control steps that count as human involvement (`involves_operator`).
+        involvement: number of control steps that count as human involvement (`is_involvement_step`).
         distance: latest value of the robot's attribute ``distance``, m; None if the robot lacks it.
         collisions: sum of the cost of all steps where there are obstacles, else None.
         outcome: how it ended, or that its task was done; empty while there is no outcome.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.outcome import Outcome, OutcomeCounts, count_outcomes
-from pdtui.core.step_record import involves_operator
+from pdtui.core.step_record import is_involvement_step
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.episode_statistics import EpisodeStatistics, EpisodeStatisticsCounter
 from pdtui.sessions.rrd.end_index import read_end_index
@@ -44,7 +44,7 @@ class SessionSummary:
         seconds: simulated time, s.
         episodes: number of episodes that began.
         outcomes: how episodes ended, or that their task was done, and how often.
-        involvement: number of control steps that count as human involvement (`involves_operator`).
+        involvement: number of control steps that count as human involvement (`is_involvement_step`).
         total_reward, total_cost: sums over all steps, including those that were rewound.
         stimulated: number of control steps in which units were overwritten.
         tallies: statistics of the episodes, ordered by their numbers.
@@ -199,7 +199,7 @@ def summarise_session(session: SessionHeader) -> SessionSummary:
             rewards=block.rewards,
             costs=block.costs,
             episodes=block.episodes,
-            involved=involves_operator(np.isin(block.steps, keyed), taken_over),
+            involved=is_involvement_step(np.isin(block.steps, keyed), taken_over),
             stimulated=block.stimulated_counts > 0,
             taken_over=taken_over,
             outcomes=[

@@ -23,10 +23,10 @@ def can_hold_state() -> bool:
 def hold_state() -> None:
     """Keep the state of this process, and return in a copy of it.
 
-    The copy goes on in the place of the process, with the same pipes, until it calls `go_back` or
-    `release_state`. Then this function returns once more: in another copy, whose state is that of the first
-    call, or in the process itself, which has that state, too. If the copy ends in another way, so does the
-    process; if the process is killed, so is the copy.
+    The copy goes on in the place of the process, with the same pipes, until it calls `return_to_held_state`
+    or `return_and_release_state`. Then this function returns once more: in another copy, whose state is that
+    of the first call, or in the process itself, which has that state, too. If the copy ends in another way,
+    so does the process; if the process is killed, so is the copy.
     """
     while True:
         holder, copy = os.getpid(), os.fork()
@@ -42,11 +42,11 @@ def hold_state() -> None:
             os._exit(1)
 
 
-def go_back() -> None:
+def return_to_held_state() -> None:
     """End this copy; another one goes on from the state that is held."""
     os._exit(_AGAIN)
 
 
-def release_state() -> None:
+def return_and_release_state() -> None:
     """End this copy; the process that held the state goes on from it itself."""
     os._exit(_RELEASE)

@@ -10,7 +10,7 @@ from pdtui.core.scenery import Traffic
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.paper.driving.key_effects import DEFAULT, KeyEffects, driving_behaviors
 from pdtui.paper.driving.key_operator import KeyOperator
-from pdtui.paper.driving.operator_memory import Judgement
+from pdtui.paper.driving.operator_memory import JudgementErrors
 from pdtui.paper.driving.sight_reader import SightReader
 from pdtui.paper.driving.steering_operator import SteeringOperator
 
@@ -37,7 +37,7 @@ class NoOperator:
 class KeyDriveOperator:
     """Presses keys of a drive that has not begun."""
 
-    def __init__(self, loop: ControlLoop, effects: KeyEffects, judgement: Judgement) -> None:
+    def __init__(self, loop: ControlLoop, effects: KeyEffects, judgement: JudgementErrors) -> None:
         self._loop, self._reader = loop, SightReader(loop.robot)
         self._operator = KeyOperator(effects, loop.robot.control_dt, judgement)
         self._behaviors = driving_behaviors(loop.map)
@@ -55,7 +55,7 @@ class KeyDriveOperator:
 class WheelDriveOperator:
     """Steers and sets the throttle of a drive that has not begun, all the time or while it takes over."""
 
-    def __init__(self, loop: ControlLoop, judgement: Judgement, *, always: bool) -> None:
+    def __init__(self, loop: ControlLoop, judgement: JudgementErrors, *, always: bool) -> None:
         self._loop, self._reader = loop, SightReader(loop.robot)
         self._operator = SteeringOperator(loop.robot.control_dt, judgement, always=always)
 
@@ -70,7 +70,7 @@ class WheelDriveOperator:
 
 
 def make_operator(
-    control: SharedControl, loop: ControlLoop, effects: KeyEffects | None, judgement: Judgement
+    control: SharedControl, loop: ControlLoop, effects: KeyEffects | None, judgement: JudgementErrors
 ) -> DriveOperator:
     """Return who operates a drive that has not begun; the keys' effects are needed where it presses keys."""
     if control == "keys":

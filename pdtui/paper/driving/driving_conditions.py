@@ -16,7 +16,6 @@ from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.paper.driving.drive_journal import DriveJournal
 from pdtui.paper.driving.drive_operators import SharedControl, make_operator
 from pdtui.paper.driving.driving_episode import (
     TEST_STARTS,
@@ -39,7 +38,8 @@ from pdtui.paper.driving.key_effects import (
     driving_behaviors,
     measure_key_effects,
 )
-from pdtui.paper.driving.operator_memory import draw_judgement
+from pdtui.paper.driving.operator_memory import sample_judgement_errors
+from pdtui.paper.driving.score_journal import ScoreJournal
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import robot_file_stem
 from pdtui.robots.robot import Robot
@@ -85,7 +85,7 @@ def evaluate_driving(
     read = [read_episode(path, robot) for path in sessions]
     if record is not None and (present := sorted(record.glob("*.rrd"))):
         raise SessionError(f"{present[0]}: already exists; drives are recorded into a new folder")
-    kept, missing = DriveJournal(journal), dict(left_out or {})
+    kept, missing = ScoreJournal(journal), dict(left_out or {})
     effects: dict[str, KeyEffects] = {}
     rows: list[DrivingRow] = []
     with WorkerPool(f"roads of {robot}", workers, _Car(), _Car) as pool:
@@ -184,7 +184,7 @@ def _plan_jobs(
 
 
 def _run_jobs(
-    pool: WorkerPool[_Car], jobs: Sequence[_DriveJob], kept: DriveJournal, progress: StepProgress | None
+    pool: WorkerPool[_Car], jobs: Sequence[_DriveJob], kept: ScoreJournal, progress: StepProgress | None
 ) -> dict[str, DrivingScore]:
     scores = {job.key: score for job in jobs if (score := kept.find(job.key)) is not None}
     left = [job for job in jobs if job.key not in scores]
@@ -212,7 +212,7 @@ def _measure_keys(car: _Car, config: DriveConfig) -> KeyEffects:
 
 def _run_drive(car: _Car, job: _DriveJob) -> DrivingScore:
     loop = car.loop(job.config, job.scene)
-    judgement = draw_judgement(job.repeat, TEST_STARTS.index(job.scene))
+    judgement = sample_judgement_errors(job.repeat, TEST_STARTS.index(job.scene))
     operator = make_operator(job.control, loop, job.effects, judgement)
     if job.folder is None:
         return drive_episode(loop, operator)

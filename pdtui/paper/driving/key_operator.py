@@ -11,15 +11,15 @@ from pdtui.paper.driving.key_effects import ACCELERATE, BRAKE, DEFAULT, LEFT, RI
 from pdtui.paper.driving.maneuver import (
     HORIZON,
     TIMES,
-    Conflicts,
     Maneuver,
+    TimesToConflict,
     distance_to_standing,
     drift,
-    find_conflicts,
+    predict_times_to_conflict,
     roll,
     sideways_past_standing,
 )
-from pdtui.paper.driving.operator_memory import REACTION_TIME, Judgement, OperatorMemory
+from pdtui.paper.driving.operator_memory import REACTION_TIME, JudgementErrors, OperatorMemory
 from pdtui.paper.driving.road_sight import RoadSight
 
 PRESSES_PER_SECOND = 3
@@ -57,8 +57,8 @@ class KeyOperator:
         judgement: How it judges what it sees.
     """
 
-    def __init__(self, effects: KeyEffects, dt: float, judgement: Judgement | None = None) -> None:
-        self._effects, self._dt, self._judgement = effects, dt, judgement or Judgement()
+    def __init__(self, effects: KeyEffects, dt: float, judgement: JudgementErrors | None = None) -> None:
+        self._effects, self._dt, self._judgement = effects, dt, judgement or JudgementErrors()
         self._memory = OperatorMemory(dt, self._judgement)
         self._second = math.ceil(1.0 / dt - 1e-9)
         self._step, self._rolled = -1, 0
@@ -92,13 +92,13 @@ class KeyOperator:
         if min((self._step - self._rolled) * self._dt, self._time_since(DEFAULT)) > _HALTED_TIME:
             return self._start_again(seen)
         go_on = Maneuver("", roll(seen.speed, 0.0), self._beside(seen))
-        expected = find_conflicts(seen, go_on)
+        expected = predict_times_to_conflict(seen, go_on)
         if not self._must_act(seen, expected):
             return ""
         lanes, must_brake = self._lane_changes(seen), self._must_brake(seen, expected)
         # In the last moment, a small improvement is better than to lose the speed that a lane change needs.
         gain = LAST_IMPROVEMENT if must_brake else IMPROVEMENT
-        better = [one for one in lanes if _improves(find_conflicts(seen, one), expected, gain)]
+        better = [one for one in lanes if _improves(predict_times_to_conflict(seen, one), expected, gain)]
         if better:
             return max(better, key=lambda one: _preference(seen, one)).name
         if not must_brake:
@@ -106,9 +106,9 @@ class KeyOperator:
         if seen.speed < _SLOW and (aside := self._aside(seen)):
             return aside
         slower = Maneuver(BRAKE, roll(seen.speed, -self._effects.deceleration), drift(seen))
-        return max((go_on, slower, *lanes), key=lambda one: find_conflicts(seen, one).first).name
+        return max((go_on, slower, *lanes), key=lambda one: predict_times_to_conflict(seen, one).first).name
 
-    def _must_act(self, seen: RoadSight, expected: Conflicts) -> bool:
+    def _must_act(self, seen: RoadSight, expected: TimesToConflict) -> bool:
         patience = self._judgement.patience
         return (
             expected.standing < PATIENCE_STANDING * patience
@@ -117,7 +117,7 @@ class KeyOperator:
             or distance_to_standing(seen) < NEAR_STANDING * patience
         )
 
-    def _must_brake(self, seen: RoadSight, expected: Conflicts) -> bool:
+    def _must_brake(self, seen: RoadSight, expected: TimesToConflict) -> bool:
         """Return whether the last moment to brake has come."""
         stopping = seen.speed**2 / (2 * self._effects.deceleration) + 0.2 * seen.speed
         room = float(np.interp(seen.speed, [_SLOW, _FAST], [CREEPING_ROOM, STOPPING_ROOM]))
@@ -133,14 +133,14 @@ class KeyOperator:
     def _release(self, seen: RoadSight) -> str:
         """Return the default key once the car can go on, straight or with a lane change when it rolls."""
         straight = Maneuver(DEFAULT, roll(seen.speed, _SPEEDING_UP, _ROLLING), drift(seen))
-        expected = find_conflicts(seen, straight)
+        expected = predict_times_to_conflict(seen, straight)
         if math.isinf(expected.first):
             return DEFAULT
         waited = min((self._step - self._rolled) * self._dt, self._time_since()) > _BRAKED_TIME
         if math.isinf(expected.moving) and waited:
             return DEFAULT
         lanes = self._lane_changes(seen)
-        better = (_improves(find_conflicts(seen, one), expected, IMPROVEMENT) for one in lanes)
+        better = (_improves(predict_times_to_conflict(seen, one), expected, IMPROVEMENT) for one in lanes)
         return DEFAULT if any(better) else ""
 
     def _aside(self, seen: RoadSight) -> str:
@@ -153,7 +153,7 @@ class KeyOperator:
         for distance, key in sorted([(to_left, LEFT), (to_right, RIGHT)]):
             shift = distance if key == LEFT else -distance
             shifted = Maneuver(key, rolls, np.full_like(TIMES, shift))
-            conflicts = find_conflicts(seen, shifted)
+            conflicts = predict_times_to_conflict(seen, shifted)
             if math.isinf(conflicts.moving) and math.isinf(conflicts.edge):
                 return key if self._may_press(key) else ""
         return ""
@@ -209,7 +209,7 @@ class KeyOperator:
         return "" if over or key == DEFAULT else key
 
 
-def _improves(conflicts: Conflicts, expected: Conflicts, gain: float) -> bool:
+def _improves(conflicts: TimesToConflict, expected: TimesToConflict, gain: float) -> bool:
     """Return whether a lane change postpones the next conflict enough and stays on the road."""
     now = min(expected.first, HORIZON - gain)
     return conflicts.first > now + gain - 1e-9 and conflicts.edge > HORIZON / 2
@@ -217,4 +217,4 @@ def _improves(conflicts: Conflicts, expected: Conflicts, gain: float) -> bool:
 
 def _preference(seen: RoadSight, change: Maneuver) -> tuple[float, float]:
     """Return how good a lane change is: late conflicts first, then room on its side."""
-    return find_conflicts(seen, change).first, seen.left if change.name == LEFT else seen.right
+    return predict_times_to_conflict(seen, change).first, seen.left if change.name == LEFT else seen.right

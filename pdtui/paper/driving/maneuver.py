@@ -40,7 +40,7 @@ class Maneuver:
 
 
 @dataclass(frozen=True)
-class Conflicts:
+class TimesToConflict:
     """When a maneuver comes too close to something, s from now; infinite if it does not within `TIMES`.
 
     Attributes:
@@ -73,7 +73,7 @@ def roll(speed: float, acceleration: float, top: float = math.inf) -> Floats:
     return np.asarray(np.cumsum((speeds[1:] + speeds[:-1]) / 2 * np.diff(times)))
 
 
-def find_conflicts(sight: RoadSight, maneuver: Maneuver) -> Conflicts:
+def predict_times_to_conflict(sight: RoadSight, maneuver: Maneuver) -> TimesToConflict:
     """Return when a maneuver comes too close to what is seen, if everybody else keeps speed and direction."""
     out = (maneuver.beside > sight.left - _GAP_TO_EDGE) & (maneuver.beside > 0.1)
     out |= (maneuver.beside < _GAP_TO_EDGE - sight.right) & (maneuver.beside < -0.1)
@@ -86,7 +86,7 @@ def find_conflicts(sight: RoadSight, maneuver: Maneuver) -> Conflicts:
     # Who comes from behind keeps away by himself.
     close &= (ahead > 0.0) | (np.abs(maneuver.beside[-1]) > 1.0)
     stands = np.hypot(others[:, 4], others[:, 5]) < STANDING
-    return Conflicts(
+    return TimesToConflict(
         _first_time(close[stands].any(axis=0)), _first_time(close[~stands].any(axis=0)), _first_time(out)
     )
 

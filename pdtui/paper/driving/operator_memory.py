@@ -17,7 +17,7 @@ _DISTANCE_SPREAD, _SPEED_SPREAD, _PATIENCE_SPREAD = 0.05, 0.1, 0.1
 
 
 @dataclass(frozen=True)
-class Judgement:
+class JudgementErrors:
     """How one operator judges: factors on the true values, 1 if it judges right.
 
     Attributes:
@@ -31,7 +31,7 @@ class Judgement:
     patience: float = 1.0
 
 
-def draw_judgement(repeat: int, scene: int) -> Judgement:
+def sample_judgement_errors(repeat: int, scene: int) -> JudgementErrors:
     """Return the judgement of the operator of a repeat in a scene.
 
     Nobody judges distances and speeds exactly, nor twice alike; the standard deviations are 5 % of distances
@@ -39,7 +39,7 @@ def draw_judgement(repeat: int, scene: int) -> Judgement:
     """
     rng = purpose_generator(RandomPurpose.OPERATOR_JUDGEMENT, repeat, scene)
     spreads = np.array([_DISTANCE_SPREAD, _SPEED_SPREAD, _PATIENCE_SPREAD])
-    return Judgement(*(1.0 + spreads * np.clip(rng.standard_normal(3), -2.0, 2.0)).tolist())
+    return JudgementErrors(*(1.0 + spreads * np.clip(rng.standard_normal(3), -2.0, 2.0)).tolist())
 
 
 class OperatorMemory:
@@ -50,7 +50,7 @@ class OperatorMemory:
         judgement: How the operator judges what it sees.
     """
 
-    def __init__(self, dt: float, judgement: Judgement) -> None:
+    def __init__(self, dt: float, judgement: JudgementErrors) -> None:
         self._dt, self._judgement = dt, judgement
         self._delay = math.ceil(REACTION_TIME / dt - 1e-9)
         self._seen: list[RoadSight] = []

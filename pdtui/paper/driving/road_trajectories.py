@@ -16,7 +16,7 @@ from pdtui.paper.driving.drive_operators import SharedControl, make_operator
 from pdtui.paper.driving.driving_episode import TEST_STARTS, drive_episode
 from pdtui.paper.driving.driving_results import DrivingExperimentResult
 from pdtui.paper.driving.key_effects import KeyEffects
-from pdtui.paper.driving.operator_memory import draw_judgement
+from pdtui.paper.driving.operator_memory import sample_judgement_errors
 from pdtui.paper.driving.sight_reader import read_boxes
 from pdtui.robots.robot import Robot
 
@@ -92,7 +92,7 @@ def _drive(
     config: DriveConfig, robot: Robot | None, scene: str, control: SharedControl, effects: KeyEffects | None
 ) -> tuple[DriveWatcher, str, Robot]:
     loop = build_control_loop(replace(config, start=scene), robot)
-    judgement = draw_judgement(0, TEST_STARTS.index(scene))
+    judgement = sample_judgement_errors(0, TEST_STARTS.index(scene))
     watcher = DriveWatcher()
     score = drive_episode(loop, make_operator(control, loop, effects, judgement), watcher.watch)
     return watcher, score.outcome, loop.robot

@@ -21,10 +21,10 @@ from pdtui.paper.driving.maneuver import (
     Maneuver,
     distance_to_standing,
     drift,
-    find_conflicts,
+    predict_times_to_conflict,
     roll,
 )
-from pdtui.paper.driving.operator_memory import Judgement, OperatorMemory
+from pdtui.paper.driving.operator_memory import JudgementErrors, OperatorMemory
 from pdtui.paper.driving.road_sight import CAR_HALF_LENGTH, CAR_HALF_WIDTH, LANE_WIDTH, ROAD_STEP, RoadSight
 
 CRUISING_SPEED = 10.0
@@ -48,7 +48,7 @@ _CENTERED, _STRAIGHT = 0.6, 0.06
 
 
 @dataclass(frozen=True)
-class ManualControls:
+class ManualControlValues:
     """What the operator does with the wheel, to the left, and with the throttle, each in [−1, 1]."""
 
     steering: float
@@ -65,19 +65,19 @@ class SteeringOperator:
             something, until that is over.
     """
 
-    def __init__(self, dt: float, judgement: Judgement | None = None, *, always: bool = False) -> None:
-        self._judgement, self._always = judgement or Judgement(), always
+    def __init__(self, dt: float, judgement: JudgementErrors | None = None, *, always: bool = False) -> None:
+        self._judgement, self._always = judgement or JudgementErrors(), always
         self._memory = OperatorMemory(dt, self._judgement)
         self._dt, self._target, self._driving, self._quiet, self._halted = dt, 0, False, 0, 0
 
-    def choose_controls(self, sight: RoadSight) -> ManualControls | None:
+    def choose_controls(self, sight: RoadSight) -> ManualControlValues | None:
         """Observe the road and return what to do now, or None to leave it to the policy.
 
         Call it once per control step.
         """
         seen = self._memory.recall(sight)
         if seen is None:
-            return ManualControls(0.0, 0.0) if self._always else None
+            return ManualControlValues(0.0, 0.0) if self._always else None
         self._halted = self._halted + 1 if seen.speed < 0.5 else 0
         if not self._driving:
             if not (self._always or self._must_act(seen)):
@@ -90,7 +90,7 @@ class SteeringOperator:
         return self._drive(seen)
 
     def _must_act(self, seen: RoadSight) -> bool:
-        expected = find_conflicts(seen, Maneuver("", roll(seen.speed, 0.0), drift(seen)))
+        expected = predict_times_to_conflict(seen, Maneuver("", roll(seen.speed, 0.0), drift(seen)))
         patience = self._judgement.patience
         return (
             expected.standing < PATIENCE_STANDING * patience
@@ -122,16 +122,16 @@ class SteeringOperator:
         speed = max(seen.speed, 3.0)
         share = np.clip(TIMES / _CHANGE_TIME, 0.0, 1.0)
         beside = seen.to_middle_of(lane) * share * share * (3.0 - 2.0 * share)
-        return find_conflicts(seen, Maneuver("", roll(speed, 0.0), beside)).first
+        return predict_times_to_conflict(seen, Maneuver("", roll(speed, 0.0), beside)).first
 
-    def _drive(self, seen: RoadSight) -> ManualControls:
+    def _drive(self, seen: RoadSight) -> ManualControlValues:
         beside = seen.to_middle_of(self._target) + _middle(seen)
         distance = _LOOK_AHEAD + _LOOK_AHEAD_TIME * seen.speed
         x, y = _place_ahead(seen.road, distance, beside)
         angle = math.atan(2.0 * _WHEELBASE * y / max(x * x + y * y, 1.0))
         speed = min(CRUISING_SPEED, _bend_speed(seen.road), self._following_speed(seen))
         throttle = _THROTTLE_GAIN * (speed - seen.speed)
-        return ManualControls(
+        return ManualControlValues(
             float(np.clip(angle / _LARGEST_ANGLE, -1.0, 1.0)), float(np.clip(throttle, -1.0, 1.0))
         )
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.outcome import Outcome
-from pdtui.core.processes.process_checkpoint import go_back, hold_state, release_state
+from pdtui.core.processes.process_checkpoint import hold_state, return_and_release_state, return_to_held_state
 from pdtui.core.scenery import Scenery, Traffic
 from pdtui.robots.road.metadrive_repairs import (
     LIDAR_RANGE,
@@ -124,19 +124,19 @@ class RoadWorld:
         return self._traffic.read(self._env, self._observation)
 
     def hold_state(self) -> None:
-        """Keep the state for `go_back`, until `release_state`; see `pdtui.core.processes.process_checkpoint`.
+        """Keep the state for `return_to_held_state`, until `return_and_release_state`.
 
         It answers again after each of the two.
         """
         hold_state()
 
-    def go_back(self) -> None:
+    def return_to_held_state(self) -> None:
         """Return to the state that is held; it never returns here."""
-        go_back()
+        return_to_held_state()
 
-    def release_state(self) -> None:
+    def return_and_release_state(self) -> None:
         """Go on from the state that was held, and hold it no longer; it never returns here."""
-        release_state()
+        return_and_release_state()
 
     def suggest_action(self) -> NDArray[np.float32]:
         """Return what MetaDrive's rule-based driver, which keeps lane and distance, would do now."""

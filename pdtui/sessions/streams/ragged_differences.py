@@ -57,7 +57,7 @@ def find_stimulation_difference(
     return _find_table_difference(here.steps, tables[0], tables[1], names, unit, tolerance)
 
 
-def find_takeover_difference(
+def first_takeover_difference(
     here: StepBlock, recorded: StepBlock, tolerance: float | None
 ) -> StreamDifference | None:
     """Return the first difference of what the operator had taken over; None if there is none."""

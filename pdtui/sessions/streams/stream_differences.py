@@ -13,7 +13,7 @@ from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.streams.ragged_differences import (
     find_behavior_difference,
     find_stimulation_difference,
-    find_takeover_difference,
+    first_takeover_difference,
 )
 from pdtui.sessions.streams.step_block import StepBlock
 from pdtui.sessions.streams.value_differences import StreamDifference, differing_values
@@ -67,7 +67,7 @@ def _first_differences(
     if here.activations is not None and recorded.activations is not None:
         both = _same_precision(here.activations, recorded.activations)
         yield dense("activations", *both, unit, here.steps)
-    yield find_takeover_difference(here, recorded, tolerance)
+    yield first_takeover_difference(here, recorded, tolerance)
     yield dense("actions", here.actions, recorded.actions, str, here.steps)
     yield each_step("rewards", here.rewards, recorded.rewards)
     yield each_step("costs", here.costs, recorded.costs)

@@ -9,7 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from pdtui.core.processes.process_checkpoint import can_hold_state, go_back, hold_state, release_state
+from pdtui.core.processes.process_checkpoint import (
+    can_hold_state,
+    hold_state,
+    return_and_release_state,
+    return_to_held_state,
+)
 from pdtui.core.processes.worker_pool import WorkerProcess
 
 pytestmark = pytest.mark.skipif(not can_hold_state(), reason="holds states on Linux only")
@@ -30,10 +35,10 @@ class Counter:
         return self.count
 
     def back(self) -> None:
-        go_back()
+        return_to_held_state()
 
     def release(self) -> None:
-        release_state()
+        return_and_release_state()
 
     def number(self) -> int:
         return os.getpid()

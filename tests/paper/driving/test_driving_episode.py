@@ -19,7 +19,7 @@ from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.paper.driving.drive_operators import NoOperator, make_operator
 from pdtui.paper.driving.driving_episode import read_episode, record_episode
-from pdtui.paper.driving.operator_memory import Judgement
+from pdtui.paper.driving.operator_memory import JudgementErrors
 from pdtui.paper.driving.road_sight import SIGHT
 from pdtui.paper.driving.sight_reader import SightReader, read_boxes
 from pdtui.policies.weights.policy_loading import load_policy
@@ -121,7 +121,7 @@ def test_a_drive_off_the_road_is_scored_recorded_and_scored_again(
 
 def test_the_wheel_keeps_the_car_on_the_road_and_counts_as_involvement(car: Robot, map_path: Path) -> None:
     loop = _loop(car, map_path)
-    operator = make_operator("human only", loop, None, Judgement())
+    operator = make_operator("human only", loop, None, JudgementErrors())
     records: list[StepRecord] = []
     traffic = car.read_traffic()
     for _ in range(STEPS):

@@ -9,7 +9,7 @@ import pytest
 
 from pdtui.core.attributes import Floats
 from pdtui.paper.driving.road_sight import CAR_HALF_LENGTH, CAR_HALF_WIDTH, LANE_WIDTH, ROAD_STEP, RoadSight
-from pdtui.paper.driving.steering_operator import ManualControls, SteeringOperator
+from pdtui.paper.driving.steering_operator import ManualControlValues, SteeringOperator
 from tests.paper.driving.sights import LEFT_LANE, MIDDLE_LANE, cone, sight
 
 DT, WHEELBASE, FULL_LOCK = 0.1, 2.47, math.radians(40.0)
@@ -43,7 +43,7 @@ class StraightRoad:
             road,
         )
 
-    def step(self, controls: ManualControls) -> None:
+    def step(self, controls: ManualControlValues) -> None:
         self.speed = max(0.0, self.speed + 5.0 * controls.throttle * DT)
         self.heading += self.speed * math.tan(FULL_LOCK * controls.steering) / WHEELBASE * DT
         self.along += self.speed * math.cos(self.heading) * DT
@@ -69,7 +69,7 @@ def test_it_keeps_to_the_middle_of_its_lane() -> None:
 def test_it_passes_what_stands_in_its_lane() -> None:
     road, operator = StraightRoad((60.0, 0.0), (62.0, LANE_WIDTH)), SteeringOperator(DT, always=True)
     for _ in range(120):
-        road.step(operator.choose_controls(road.look()) or ManualControls(0.0, 0.0))
+        road.step(operator.choose_controls(road.look()) or ManualControlValues(0.0, 0.0))
         assert not road.touches
         assert abs(road.beside) < 1.5 * LANE_WIDTH - 0.9
     assert road.along > 75.0
@@ -80,7 +80,7 @@ def test_it_stops_before_what_blocks_the_whole_road() -> None:
     wall = [(70.0, y) for y in np.arange(-5.0, 5.1, 1.0)]
     road, operator = StraightRoad(*wall), SteeringOperator(DT, always=True)
     for _ in range(200):
-        road.step(operator.choose_controls(road.look()) or ManualControls(0.0, 0.0))
+        road.step(operator.choose_controls(road.look()) or ManualControlValues(0.0, 0.0))
         assert not road.touches
     assert road.speed < 0.5
 
@@ -93,7 +93,7 @@ def test_it_takes_over_only_where_it_must_and_hands_back_afterwards() -> None:
         controls = operator.choose_controls(road.look())
         if controls is not None:
             taken.append(step)
-        road.step(controls or ManualControls(-0.5 * road.heading / FULL_LOCK, 0.0))
+        road.step(controls or ManualControlValues(-0.5 * road.heading / FULL_LOCK, 0.0))
         assert not road.touches
     assert road.along > 110.0
     assert 30 < taken[0] < 60

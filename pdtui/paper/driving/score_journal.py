@@ -12,7 +12,7 @@ from pdtui.core.outcome import Outcome
 from pdtui.paper.driving.driving_episode import DrivingScore
 
 
-class DriveJournal:
+class ScoreJournal:
     """Keeps the score of each drive, one JSON object per line.
 
     Args:
