@@ -18,9 +18,8 @@ def test_the_units_that_reach_the_action_are_chosen(tmp_path: Path) -> None:
         network.head.weight.zero_()
         network.head.weight[2, 5] = 0.5  # from unit 1:5
         network.head.weight[6, 1] = 0.01  # a weak component counts as much as a strong one
-        network.get_parameter("hidden.1.weight")[[1, 5]] = (
-            0.0  # so that no unit of the first layer does anything
-        )
+        # The units of the first layer shall not reach these two.
+        network.get_parameter("hidden.1.weight")[[1, 5]] = 0.0
     policy = load_policy(write_policy(tmp_path / "two.safetensors", network), "ant")
     robot = make_robot("ant")
     chosen = select_units_by_action(robot, policy, (-4.0, 4.0), 2, seed=1000, options=None)
