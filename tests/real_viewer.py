@@ -25,7 +25,7 @@ from rerun.experimental import ViewerClient, ViewerState
 
 from pdtui.sessions.viewer.viewer_address import LOCAL, find_viewer
 
-_PATIENCE = 30.0
+_PATIENCE = 120.0
 """Longest wait for the viewer, s."""
 _NO_MATTER = ("Software rasterizer", "Failed to load examples")
 _NO_DRIVER = ("No graphics adapter", "Failed to get render context")
