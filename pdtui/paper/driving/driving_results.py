@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,6 +15,7 @@ from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.paper.driving.drive_operators import SharedControl
 from pdtui.paper.driving.driving_episode import DrivingScore
 from pdtui.paper.driving.key_effects import KeyEffects
+from pdtui.paper.repeat_statistics import RepeatStatistics, summarise_repeats
 
 CONTROL_NAMES: dict[SharedControl, str] = {
     "alone": "alone",
@@ -24,14 +24,6 @@ CONTROL_NAMES: dict[SharedControl, str] = {
     "human only": "human only",
 }
 """The paper's names of the ways to share control."""
-
-
-@dataclass(frozen=True)
-class RepeatedFigure:
-    """Mean over repeats and their standard deviation (n − 1), which is NaN for a single repeat."""
-
-    mean: float
-    std: float
 
 
 @dataclass(frozen=True)
@@ -54,13 +46,13 @@ class DrivingRow:
     policy: str
     control: SharedControl
     driver: str
-    success: RepeatedFigure
+    success: RepeatStatistics
     success_share: tuple[float, float]
-    out_of_road: RepeatedFigure
-    reward: RepeatedFigure
-    cost: RepeatedFigure
-    involvement: RepeatedFigure | None
-    presses: RepeatedFigure | None
+    out_of_road: RepeatStatistics
+    reward: RepeatStatistics
+    cost: RepeatStatistics
+    involvement: RepeatStatistics | None
+    presses: RepeatStatistics | None
     repeats: int
     scores: tuple[DrivingScore, ...]
 
@@ -100,9 +92,9 @@ def summarise_row(
 ) -> DrivingRow:
     """Return a row from the scores of each repeat's episodes."""
 
-    def figure(name: str) -> RepeatedFigure:
+    def figure(name: str) -> RepeatStatistics:
         means = np.array([np.mean([float(getattr(one, name)) for one in scores]) for scores in repeats])
-        return RepeatedFigure(float(means.mean()), float(means.std(ddof=1)) if len(repeats) > 1 else math.nan)
+        return summarise_repeats(means)
 
     scores = tuple(one for repeat in repeats for one in repeat)
     operated = control != "alone"
@@ -150,11 +142,11 @@ def driving_table(result: DrivingExperimentResult) -> Group:
         table.add_row(
             row.policy,
             CONTROL_NAMES[row.control] + (", a person" if row.driver == "person" else ""),
-            _format(row.success, 2),
-            _format(row.out_of_road, 2),
-            _format(row.reward, 1),
-            _format(row.cost, 2),
-            "–" if row.involvement is None else _format(row.involvement, 1),
+            f"{row.success:.2f}",
+            f"{row.out_of_road:.2f}",
+            f"{row.reward:.1f}",
+            f"{row.cost:.2f}",
+            "–" if row.involvement is None else f"{row.involvement:.1f}",
         )
     return Group(table, *([_ratio_table(result.ratios)] if result.ratios else []), *_notes(result))
 
@@ -177,8 +169,3 @@ def _ratio_table(ratios: Sequence[InvolvementRatio]) -> Table:
     for one in ratios:
         table.add_row(one.policy, format_mean_with_interval(one.ratio.value, one.ratio.low, one.ratio.high))
     return table
-
-
-def _format(figure: RepeatedFigure, digits: int) -> str:
-    spread = "" if math.isnan(figure.std) else f" ± {figure.std:.{digits}f}"
-    return f"{figure.mean:.{digits}f}{spread}"

@@ -9,9 +9,10 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.drive_events import DriveEvent
-from pdtui.core.errors import MapError, RobotError
+from pdtui.core.errors import RobotError
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.paper.driving.road_sight import LANE_WIDTH
+from pdtui.paper.operator_behaviors import find_operator_behaviors
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 DEFAULT, BRAKE, ACCELERATE, LEFT, RIGHT = "default", "brake", "accelerate", "lane left", "lane right"
@@ -62,14 +63,7 @@ def driving_behaviors(stimulation_map: StimulationMap) -> dict[str, Behavior]:
     Raises:
         MapError: The map lacks a behavior for a task.
     """
-    by_task = {one.task or one.name: one for one in stimulation_map.behaviors.values()}
-    missing = [task for task in TASKS if task not in by_task]
-    if missing:
-        raise MapError(
-            f"{stimulation_map.source}: the operator needs behaviors for {', '.join(TASKS)}; "
-            f"missing: {', '.join(missing)}; the map has {', '.join(by_task) or 'none'}"
-        )
-    return {task: by_task[task] for task in TASKS}
+    return find_operator_behaviors(stimulation_map, TASKS)
 
 
 def measure_key_effects(loops: Iterable[ControlLoop]) -> KeyEffects:

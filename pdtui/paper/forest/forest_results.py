@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -17,6 +16,7 @@ from pdtui.core.text_tables import format_mean_with_interval, format_seed_range,
 from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.paper.forest.forest_episode import ForestEpisodeScore
 from pdtui.paper.forest.key_motion_model import KeyMotionModel
+from pdtui.paper.repeat_statistics import RepeatStatistics, summarise_repeats
 
 ForestCondition = Literal["alone", "operator", "placebo", "vision"]
 COMPARED: tuple[tuple[ForestCondition, ForestCondition], ...] = (
@@ -26,14 +26,6 @@ COMPARED: tuple[tuple[ForestCondition, ForestCondition], ...] = (
     ("operator", "vision"),
 )
 """Conditions that are compared in the same forests."""
-
-
-@dataclass(frozen=True)
-class RepeatStatistics:
-    """Mean over repeats and their standard deviation (n − 1), which is NaN for a single repeat."""
-
-    mean: float
-    std: float
 
 
 @dataclass(frozen=True)
@@ -113,7 +105,7 @@ def summarise_condition(
 
     def spread(name: str) -> RepeatStatistics:
         values = np.array([float(getattr(run, name)) for run in runs]).reshape(repeats, -1).mean(axis=1)
-        return RepeatStatistics(float(values.mean()), float(values.std(ddof=1)) if repeats > 1 else math.nan)
+        return summarise_repeats(values)
 
     falls = sum(is_failure(run.outcome) for run in runs)
     return ForestConditionSummary(
@@ -163,12 +155,12 @@ def forest_table(result: ForestExperimentResult) -> Group:
         *("per episode", *(row.condition for row in rows)),
     )
     table.add_row("policy", *(row.policy for row in rows))
-    table.add_row("reward", *(_mean_and_spread(row.reward, 0) for row in rows))
-    table.add_row("distance along x (m)", *(_mean_and_spread(row.distance, 2) for row in rows))
-    table.add_row("collisions", *(_mean_and_spread(row.collisions, 2) for row in rows))
+    table.add_row("reward", *(f"{row.reward:.0f}" for row in rows))
+    table.add_row("distance along x (m)", *(f"{row.distance:.2f}" for row in rows))
+    table.add_row("collisions", *(f"{row.collisions:.2f}" for row in rows))
     table.add_row("collisions per 100 m", *map(_collisions_per_100_m, rows))
-    table.add_row("key presses", *(_mean_and_spread(row.presses, 1) for row in rows))
-    table.add_row("steps with a key press", *(_mean_and_spread(row.involvement, 1) for row in rows))
+    table.add_row("key presses", *(f"{row.presses:.1f}" for row in rows))
+    table.add_row("steps with a key press", *(f"{row.involvement:.1f}" for row in rows))
     table.add_row("falls", *(f"{row.falls}/{row.episodes}" for row in rows))
     table.add_row("share of falls [95 %]", *map(_fall_share, rows))
     table.add_row("crossed the forest", *(f"{row.crossed}/{row.episodes}" for row in rows))
@@ -195,8 +187,3 @@ def _collisions_per_100_m(row: ForestConditionSummary) -> str:
 def _fall_share(row: ForestConditionSummary) -> str:
     low, high = row.fall_share
     return f"{row.falls / row.episodes:.2f} [{low:.2f}, {high:.2f}]"
-
-
-def _mean_and_spread(figure: RepeatStatistics, digits: int) -> str:
-    spread = "" if math.isnan(figure.std) else f" ± {figure.std:.{digits}f}"
-    return f"{figure.mean:.{digits}f}{spread}"

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from pdtui.core.attributes import Floats, wrap_angle
-from pdtui.core.errors import MapError
 from pdtui.paper.forest.key_motion_model import (
     STEPS_OBSERVED,
     KeyMotionModel,
@@ -17,6 +16,7 @@ from pdtui.paper.forest.key_motion_model import (
     predict_motion,
 )
 from pdtui.paper.forest.key_planner import KeyPlanner
+from pdtui.paper.operator_behaviors import find_operator_behaviors
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 REACTION_TIME = 0.3
@@ -57,14 +57,7 @@ def operator_behaviors(stimulation_map: StimulationMap) -> dict[str, Behavior]:
     Raises:
         MapError: the map lacks a behavior for a task.
     """
-    by_task = {one.task or one.name: one for one in stimulation_map.behaviors.values()}
-    missing = [task for task in NEEDED_TASKS if task not in by_task]
-    if missing:
-        raise MapError(
-            f"{stimulation_map.source}: the operator needs a behavior for each of {', '.join(NEEDED_TASKS)}; "
-            f"missing: {', '.join(missing)}; the map has {', '.join(by_task) or 'none'}"
-        )
-    return {task: by_task[task] for task in (*NEEDED_TASKS, "forward") if task in by_task}
+    return find_operator_behaviors(stimulation_map, NEEDED_TASKS, ("forward",))
 
 
 class ScriptedOperator:
