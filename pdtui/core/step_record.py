@@ -24,6 +24,8 @@ class ActiveBehavior:
         remaining: control steps until its period ends; None if it lasts until another key is pressed.
         factor: factor by which the operator scaled the map's magnitudes.
         target, value, error, magnitude: state of the controller in mode ``pid``, else None.
+        waiting: control steps until an armed behavior begins, −1 while that cannot be known; None for one
+            that has begun.
     """
 
     name: str
@@ -33,6 +35,7 @@ class ActiveBehavior:
     value: float | None = None
     error: float | None = None
     magnitude: float | None = None
+    waiting: int | None = None
 
 
 class ReplacedAction(NamedTuple):

@@ -1,11 +1,16 @@
-"""Hidden units by address, and the stimulation that overwrites them."""
+"""Hidden units by address, and what a control step changes about them."""
 
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pdtui.core.errors import PolicyError
 
@@ -94,17 +99,56 @@ def _find_layer(name: str, layers: Sequence[int]) -> int | None:
     return next((layer for layer in range(len(layers)) if name in _layer_names(layers, layer)), None)
 
 
-@dataclass(frozen=True)
-class Stimulation:
-    """Units and the outputs that overwrite them in one control step.
+class UnitEdit(ABC):
+    """A change to the outputs of units of one layer that may depend on what they would put out.
 
     Attributes:
-        units: flat indices, layer by layer.
-        values: the output v of each unit.
+        units: flat indices of the units, all of one layer, shape (n,).
+    """
+
+    units: NDArray[np.int64]
+
+    @abstractmethod
+    def change(self, outputs: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
+        """Return the new outputs of the units, given their outputs so far, each of shape (n,)."""
+
+    def bind(
+        self, observation: NDArray[Any], activations: Callable[[NDArray[Any]], NDArray[np.float32]]
+    ) -> UnitEdit:
+        """Return the edit for one control step; most do not depend on these arguments.
+
+        Args:
+            observation: what the policy observes.
+            activations: returns what all hidden units would put out for an observation, shape (U,).
+        """
+        del observation, activations
+        return self
+
+
+@dataclass(frozen=True)
+class Stimulation:
+    """What one control step does to hidden units: it overwrites some, and then makes edits in their order.
+
+    Attributes:
+        units: flat indices of the units that are overwritten by constants, layer by layer.
+        values: the output v of each of them.
+        edits: changes that are not by constants.
     """
 
     units: tuple[int, ...] = ()
     values: tuple[float, ...] = ()
+    edits: tuple[UnitEdit, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.units or self.edits)
+
+    def touched_units(self) -> tuple[int, ...]:
+        """Return the flat indices of all units that it may change, each once."""
+        if not self.edits:
+            return self.units
+        edited = np.unique(np.concatenate([edit.units for edit in self.edits])).tolist()
+        own = set(self.units)
+        return (*self.units, *(unit for unit in edited if unit not in own))
 
     @classmethod
     def of(cls, values: Mapping[int, float]) -> Stimulation:

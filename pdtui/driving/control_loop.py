@@ -59,7 +59,9 @@ class ControlLoop:
         self.start = robot.check_start(start)
         self.step = 0
         self.episode = 0
-        self.latch = BehaviorLatch(stimulation_map, policy.layers, robot.attributes, robot.control_dt)
+        self.latch = BehaviorLatch(
+            stimulation_map, policy.layers, robot.attributes, robot.control_dt, robot.observation_edits
+        )
         self.takeover = ManualTakeover(robot)
         self.act: PolicyAct = policy.act
         """What acts in each control step; an evaluation may put a disturbed policy in its place."""
@@ -133,7 +135,7 @@ class ControlLoop:
             self.episode,
             tuple(events),
             behaviors,
-            stimulation,
+            acted.stimulation,
             acted.natural,
             action,
             acted.activations,
@@ -149,7 +151,7 @@ class ControlLoop:
             replaced,
         )
         self.step += 1
-        self.latch.end_step()
+        self.latch.end_step(acted.activations)
         self.takeover.end_step()
         self._ended, self._arrived = bool(ended), self._arrived or outcome is Outcome.ARRIVED
         return record
@@ -201,7 +203,8 @@ class ControlLoop:
         self._observation, _ = self.robot.reset(options=self._options)
         self.policy.reset()
         self.attributes = self.robot.read_attributes()
-        self._clear()
+        self.latch.start_episode()
+        self.takeover.clear()
         self.episode += 1
         self._ended = self._arrived = False
 

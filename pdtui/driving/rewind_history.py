@@ -11,6 +11,7 @@ from typing import Any
 from pdtui.core.errors import KeystrokeError
 from pdtui.core.robot_links_and_state import RobotState
 from pdtui.policies.runtime.recurrent_state import PolicyState
+from pdtui.stimulation.behavior_latch import LatchState
 
 STEPS_PER_KEPT_STATE = 10
 MAX_KEPT_STATES = 240
@@ -24,7 +25,7 @@ class DriveState:
     Attributes:
         robot: state of the simulator.
         policy: recurrent state of the network.
-        latch: the latched behaviors.
+        latch: the latched behaviors, and the gait that they follow.
         takeover: values of the controls that the operator has taken over.
         noise: state of the generator of action noise; empty for a deterministic policy.
         episode: number of the episode.
@@ -33,7 +34,7 @@ class DriveState:
 
     robot: RobotState
     policy: PolicyState
-    latch: list[Any]
+    latch: LatchState
     takeover: Mapping[str, float]
     noise: Mapping[str, Any]
     episode: int

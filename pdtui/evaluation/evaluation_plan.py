@@ -89,16 +89,22 @@ class EvaluationPlan:
         units = self.loop.map.units_of(behavior)
         return Stimulation.of({parse_unit(unit, self.loop.policy.layers): v for unit, v in units.items()})
 
+    def changes_units(self, behavior: Behavior) -> bool:
+        """Return whether a behavior does anything to hidden units; one of commands alone does not."""
+        return bool(self.outputs(behavior).units or behavior.interventions)
+
     def seeds_of(self, condition: str) -> Sequence[int]:
         """Return the seeds that are run in a condition."""
         return self.seeds if condition == UNDISTURBED.name else self.seeds[: self.settings.condition_seeds]
 
     def substitutes_of(self, behavior: Behavior) -> list[tuple[SubstituteKind, int]]:
         """Return the kinds of substitutes of a behavior, and the number of draws of each."""
-        if not self.outputs(behavior).units:
+        draws, constant = self.settings.draws, bool(self.outputs(behavior).units)
+        if not draws or not self.changes_units(behavior):
             return []
-        draws = self.settings.draws
-        return [("random units", draws), ("random directions", draws), ("actions", 1)] if draws else []
+        # Random units take the behavior's constants, which one of interventions does not have.
+        units: list[tuple[SubstituteKind, int]] = [("random units", draws)] if constant else []
+        return [*units, ("random directions", draws), ("actions", 1)]
 
     def held_runs(self) -> list[RunKey]:
         """Return the runs in which a behavior with an aim is held, and those without a press."""
@@ -123,7 +129,7 @@ class EvaluationPlan:
 
         Those without a press measure how far observations spread in a walk from the robot's usual start.
         """
-        named = [b.name for b in self.behaviors if self.outputs(b).units]
+        named = [b.name for b in self.behaviors if self.changes_units(b)]
         names = ["", *named] if self.behaviors or self.tasked else []
         return [
             HeldRunPlan(name, seed, self.times(name, seed))

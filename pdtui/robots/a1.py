@@ -17,6 +17,7 @@ from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
 from pdtui.robots.legged.terrain import RoughGround, draw_rough_ground, scatter_trees
+from pdtui.robots.observation_edits.heading_edit import yaw_heading_edits
 from pdtui.robots.robot import ResetResult, StepResult, TrainingRecipe
 from pdtui.robots.simulators import bullet_robot
 from pdtui.robots.simulators.bullet_robot import BulletRobot
@@ -72,6 +73,7 @@ class A1(BulletRobot):
 
     name = "a1"
     title = "Unitree A1 (PyBullet)"
+    observation_edits = yaw_heading_edits(yaws=(11, 15, 19), velocities=(0, 3, 6))
     tasks: tuple[Task, ...] = A1_TASKS
     # A policy that runs faster cannot be steered between trees. PyBullet holds Python's lock while it steps,
     # and its steps are slow: batches smaller than the paper's 16384 learn from fewer. A robot takes 70 MB.

@@ -13,6 +13,8 @@ from pdtui.core.attributes import Floats
 from pdtui.core.outcome import fall_info
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
+from pdtui.robots.observation_edits.heading_edit import quaternion_heading_edits
+from pdtui.robots.observation_edits.observation_edit import add_to_number
 from pdtui.robots.robot import TrainingRecipe
 from pdtui.robots.simulators.mujoco_robot import (
     MujocoRobot,
@@ -38,6 +40,10 @@ class Ant(MujocoRobot, AntEnv):
 
     name = "ant"
     title = "Ant (MuJoCo)"
+    observation_edits = (
+        *quaternion_heading_edits(quaternion=1, velocity=13),
+        add_to_number(0, "height", "m", "the torso is higher by this much"),
+    )
     training_recipe = TrainingRecipe(options={"forward": "x"})
 
     def __init__(self, forward: Literal["either", "x"] = "either") -> None:

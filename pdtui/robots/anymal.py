@@ -17,6 +17,7 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.outcome import fall_info
 from pdtui.core.robot_links_and_state import CommandRange
 from pdtui.robots.geometry import roll_pitch_yaw, rotate_vectors
+from pdtui.robots.legged.legged_observation_edits import TRUNK_EDITS, command_edits
 from pdtui.robots.legged.observations_and_rewards import (
     COMMAND_SCALES,
     LeggedRobotState,
@@ -105,6 +106,7 @@ class Anymal(MujocoRobot):
         self.action_space = spaces.Box(-_MAX_ACTION, _MAX_ACTION, (12,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (46 + len(self.commands),), np.float64)
         self._feet, self._feet_velocity = foot_sensor_slices(self.model)
+        self.observation_edits = (*TRUNK_EDITS, *command_edits(self.commands))
         self._command = np.array([1.0, 0.0, 0.0])
         self._stand_still()
         torque_scale = 1.0 / _MAX_TORQUE

@@ -18,6 +18,7 @@ from pdtui.core.errors import RobotError
 from pdtui.core.outcome import Outcome, outcome_of_step
 from pdtui.core.robot_links_and_state import CommandRange, Link, ManualControl, RobotState
 from pdtui.core.scenery import NO_SCENERY, NO_TRAFFIC, Scenery, Traffic
+from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions, format_robot_options
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
 from pdtui.robots.task import Task, find_task
@@ -33,6 +34,7 @@ class TrainingRecipe:
     Attributes:
         options: Arguments of the robot's class during training.
         settings: Changes to the algorithm's configuration. Settings that an algorithm lacks are ignored.
+        sac_settings: Further changes where the algorithm is SAC.
         robot_batch: Class that steps all robots of a run at once, ``package.module:Class``, called with a
             robot, the number of robots and a seed. If it is empty, robots are stepped one by one.
         initial_policy: Name of the shipped policy that PPO starts from; empty for an untrained one.
@@ -40,6 +42,7 @@ class TrainingRecipe:
 
     options: Mapping[str, Any] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
+    sac_settings: Mapping[str, Any] = field(default_factory=dict)
     robot_batch: str = ""
     initial_policy: str = ""
 
@@ -61,6 +64,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         commands: What a policy can be commanded, and its default, by name; empty for most robots.
         command_ranges: Ranges in which the policy was trained to follow the commands.
         manual_controls: Components of the action that an operator can take over; empty for most robots.
+        observation_edits: Edits of an observation that imprints can use.
         goals: What a dissection looks for.
         tasks: What `pdtui pursue` can look for, with the judge that tells whether it was done.
         training_recipe: How `pdtui train` trains a policy for the robot.
@@ -80,6 +84,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     commands: Mapping[str, float] = MappingProxyType({})
     command_ranges: Mapping[str, CommandRange] = MappingProxyType({})
     manual_controls: tuple[ManualControl, ...] = ()
+    observation_edits: tuple[ObservationEdit, ...] = ()
     goals: RobotGoals = WALKING_GOALS
     tasks: tuple[Task, ...] = ()
     training_recipe: TrainingRecipe = TrainingRecipe()

@@ -34,7 +34,7 @@ INFO, VERSIONS, OUTCOME, REPAIR = "drive", "versions", "outcome", "repair"
 
 REWARD_COST_ACTION, DIGEST_EPISODE = "reward_cost_action", "digest_episode"
 
-ACTIVE_FIELDS = ("remaining", "factor", "target", "value", "error", "magnitude")
+ACTIVE_FIELDS = ("remaining", "factor", "target", "value", "error", "magnitude", "waiting")
 """Fields in the column ``active``: those of an `ActiveBehavior` except its name, with NaN for None."""
 
 ActivationsKept = Literal["all", "half", "off"]

@@ -5,12 +5,24 @@ from __future__ import annotations
 from copy import deepcopy
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import KeystrokeError
 from pdtui.core.step_record import ActiveBehavior
-from pdtui.core.units import NO_STIMULATION, Stimulation, parse_unit
+from pdtui.core.units import ADDRESS, NO_STIMULATION, Stimulation, UnitEdit, parse_unit
+from pdtui.robots.observation_edits.observation_edit import ObservationEdit
+from pdtui.stimulation.interventions.bound_intervention import (
+    BoundIntervention,
+    bind_intervention,
+    overwrite_by_layer,
+)
+from pdtui.stimulation.interventions.gait_clock import GaitClock, GaitMark
 from pdtui.stimulation.pid_magnitude import PidMagnitude
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
+
+_NOT_YET = -1
 
 
 @dataclass
@@ -18,14 +30,26 @@ class _LatchedBehavior:
     behavior: Behavior
     weights: dict[int, float]
     base: dict[int, float]
+    interventions: tuple[BoundIntervention, ...]
     column: int  # of the attribute that the controller holds
     remaining: int | None  # control steps
+    waiting: int | None  # control steps until its onset; None once it has begun
     factor: float = 1.0
+    age: int = 0  # control steps since it began
     controller: PidMagnitude | None = None
 
     def copy(self) -> _LatchedBehavior:
-        """Copy what changes; behavior and weights never do."""
+        """Copy what changes; behavior, weights and interventions never do."""
         return replace(self, controller=deepcopy(self.controller))
+
+
+@dataclass(frozen=True)
+class LatchState:
+    """What a latch needs to go on: the latched behaviors, the gait, and the last activations."""
+
+    latched: list[_LatchedBehavior]
+    clocks: dict[GaitMark, GaitClock]
+    activations: NDArray[np.float32] | None
 
 
 class BehaviorLatch:
@@ -36,10 +60,12 @@ class BehaviorLatch:
         layers: widths of the policy's hidden layers.
         attributes: the robot's attributes.
         dt: duration of a control step, s.
+        observation_edits: the edits that the robot offers of its observation.
 
     Raises:
         PolicyError: a unit of the map does not exist.
-        RobotError: the robot has no attribute that a behavior of the map is to hold.
+        RobotError: the robot has no attribute that a behavior of the map is to hold, or to wait for.
+        MapError: the robot has no edit of its observation that an imprint of the map needs.
     """
 
     def __init__(
@@ -48,9 +74,11 @@ class BehaviorLatch:
         layers: tuple[int, ...],
         attributes: tuple[Attribute, ...],
         dt: float,
+        observation_edits: tuple[ObservationEdit, ...] = (),
     ) -> None:
-        self._map, self._attributes, self._dt = stimulation_map, attributes, dt
+        self._map, self._attributes, self._dt, self._layers = stimulation_map, attributes, dt, layers
         self._behaviors: dict[str, _LatchedBehavior] = {}
+        marks: dict[GaitMark, str] = {}
         for name, behavior in stimulation_map.behaviors.items():
             weights, base = (
                 {parse_unit(unit, layers): value for unit, value in outputs.items()}
@@ -61,8 +89,24 @@ class BehaviorLatch:
                 0 if behavior.pid is None else attribute_column(behavior.pid.attribute, attributes, owner)
             )
             steps = None if behavior.period is None else max(1, round(behavior.period / dt))
-            self._behaviors[name] = _LatchedBehavior(behavior, weights, base, column, steps)
+            bound = tuple(
+                bind_intervention(
+                    one, layers, stimulation_map.vectors, observation_edits, attributes, dt, owner
+                )
+                for one in behavior.interventions
+            )
+            waiting = None if behavior.onset is None else _NOT_YET
+            self._behaviors[name] = _LatchedBehavior(behavior, weights, base, bound, column, steps, waiting)
+            marks |= dict.fromkeys(behavior.marks(), owner)
+        self._clocks = {mark: GaitClock(mark, dt) for mark in marks}
+        self._signals = {
+            mark: (True, parse_unit(mark.signal, layers))
+            if ADDRESS.fullmatch(mark.signal)
+            else (False, attribute_column(mark.signal, attributes, owner))
+            for mark, owner in marks.items()
+        }
         self._latched: list[_LatchedBehavior] = []
+        self._activations: NDArray[np.float32] | None = None
         self.commands: dict[str, float] = {}
         """The policy's commands that behaviors set in this control step; updated by `stimulate`."""
 
@@ -75,12 +119,15 @@ class BehaviorLatch:
                 one.remaining,
                 one.factor,
                 *((pid.target, pid.value, pid.error, pid.magnitude) if (pid := one.controller) else ()),
+                waiting=one.waiting,
             )
             for one in self._latched
         )
 
     def latch_behavior(self, name: str, attributes: Floats) -> None:
         """Latch a behavior and end those that may not run beside it. A latched behavior starts again.
+
+        One with an onset is armed: it begins at that moment of the gait.
 
         In mode ``pid``, the target starts at the present value, and latching a latched behavior ends it. A
         behavior that the map lacks is a `KeystrokeError`.
@@ -121,38 +168,82 @@ class BehaviorLatch:
         self._find_latched(name).factor = factor
 
     def stimulate(self, attributes: Floats) -> Stimulation:
-        """Return what this control step overwrites, given the robot's present attributes, shape (J,).
+        """Return what this control step does, given the robot's present attributes, shape (J,).
 
-        If two latched behaviors share a unit or a command, the one latched last decides.
+        If two latched behaviors share a unit or a command, the one latched last decides. Call it once per
+        control step, also while nothing is latched: it follows the gait.
         """
+        self._follow_gait(attributes)
         self.commands = {}
         if not self._latched:
             return NO_STIMULATION
         values: dict[int, float] = {}
+        edits: list[UnitEdit] = []
         for latched in self._latched:
+            if not self._has_begun(latched):
+                continue
             factor = latched.factor
             if latched.controller is not None:
                 factor *= latched.controller.update(float(attributes[latched.column]))
             self.commands |= {name: weight * factor for name, weight in latched.behavior.commands.items()}
-            values |= latched.base
-            for unit, weight in latched.weights.items():
-                values[unit] = latched.base.get(unit, 0.0) + weight * factor
-        return Stimulation.of(values)
+            own = latched.base | {
+                unit: latched.base.get(unit, 0.0) + weight * factor
+                for unit, weight in latched.weights.items()
+            }
+            if edits:  # what was latched later comes after the edits of what was latched earlier
+                edits += overwrite_by_layer(own, self._layers)
+            else:
+                values |= own
+            for one in latched.interventions:
+                edits += one.make_edits(factor, latched.age, attributes, self._clocks)
+        return Stimulation(tuple(values), tuple(values.values()), tuple(edits))
 
-    def end_step(self) -> None:
-        """Count down the periods by one control step, and end the behaviors whose period is over."""
+    def end_step(self, activations: NDArray[np.float32] | None = None) -> None:
+        """Count down the periods by one control step, and end the behaviors whose period is over.
+
+        Args:
+            activations: what the hidden units put out in the step, for behaviors that follow one of them.
+        """
+        self._activations = activations
         for latched in self._latched:
-            if latched.remaining is not None:
-                latched.remaining -= 1
+            if latched.waiting is None:
+                latched.age += 1
+                if latched.remaining is not None:
+                    latched.remaining -= 1
         self._latched = [latched for latched in self._latched if latched.remaining != 0]
 
-    def copy_state(self) -> list[_LatchedBehavior]:
-        """Return a copy of the state for `restore_state`."""
-        return [latched.copy() for latched in self._latched]
+    def start_episode(self) -> None:
+        """End all behaviors and forget the gait."""
+        self.clear()
+        self._clocks = {mark: GaitClock(mark, self._dt) for mark in self._clocks}
+        self._activations = None
 
-    def restore_state(self, state: list[_LatchedBehavior]) -> None:
+    def copy_state(self) -> LatchState:
+        """Return a copy of the state for `restore_state`."""
+        latched = [latched.copy() for latched in self._latched]
+        return LatchState(latched, deepcopy(self._clocks), self._activations)
+
+    def restore_state(self, state: LatchState) -> None:
         """Restore a state that `copy_state` returned."""
-        self._latched = [latched.copy() for latched in state]
+        self._latched = [latched.copy() for latched in state.latched]
+        self._clocks, self._activations = deepcopy(state.clocks), state.activations
+
+    def _follow_gait(self, attributes: Floats) -> None:
+        for mark, clock in self._clocks.items():
+            is_unit, column = self._signals[mark]
+            if not is_unit:
+                clock.update(float(attributes[column]))
+            elif self._activations is not None:
+                clock.update(float(self._activations[column]))
+
+    def _has_begun(self, latched: _LatchedBehavior) -> bool:
+        """Return whether a behavior acts in this control step, and note how long it still waits."""
+        onset = latched.behavior.onset
+        if onset is None or latched.waiting is None:
+            return True
+        left = self._clocks[onset.mark].steps_until(round(onset.delay / self._dt))
+        latched.waiting = None if left == 0 else _NOT_YET if left is None else left
+        return latched.waiting is None
 
     def _find_latched(self, name: str) -> _LatchedBehavior:
         for latched in self._latched:

@@ -14,6 +14,8 @@ from pdtui.core.units import ADDRESS
 from pdtui.core.untrusted_file import MAP_BUDGET, describe_bytes, read_bounded_file
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, SQUASH_NAMES, ImportOptions
 from pdtui.robots.options.robot_option import OptionValue
+from pdtui.stimulation.interventions.intervention import LayerVectors
+from pdtui.stimulation.interventions.intervention_reader import read_interventions, read_onset, read_vectors
 from pdtui.stimulation.map_table_reader import MapTableReader
 from pdtui.stimulation.seed_ranges import merge_seed_ranges, parse_seed_range
 from pdtui.stimulation.stimulation_map import (
@@ -81,17 +83,18 @@ def parse_map(text: str, source: str) -> StimulationMap:
             MapTableReader(source, text, f"{kind[:-1]} {number + 1}", entry, f"[[{kind}]]", number)
             for number, entry in enumerate(top.take(kind, list, []))
         ]
-        for kind in ("primitives", "behaviors")
+        for kind in ("primitives", "behaviors", "vectors")
     }
     seeds, robot_options = _read_seeds(top), _read_robot_options(top, source, text)
     top.done()
     for kind, entries in tables.items():
         if len(entries) > MAX_BEHAVIORS:
             raise top.error(kind, f"expected at most {MAX_BEHAVIORS} {kind}, found {len(entries)}")
+    vectors = {v.name: v for v in map(read_vectors, tables["vectors"])}
     primitives = {p.name: p for p in (_read_primitive(table) for table in tables["primitives"])}
     behaviors: dict[str, Behavior] = {}
     for table in tables["behaviors"]:
-        behavior = _read_behavior(table, primitives)
+        behavior = _read_behavior(table, primitives, vectors)
         if behavior.name in behaviors:
             raise table.error("name", f"'{behavior.name}' is taken by another behavior")
         behaviors[behavior.name] = behavior
@@ -113,6 +116,7 @@ def parse_map(text: str, source: str) -> StimulationMap:
         import_options,
         seeds,
         robot_options,
+        vectors,
     )
 
 
@@ -166,7 +170,9 @@ def _read_effect(parent: MapTableReader) -> MeasuredEffect | None:
     return measured
 
 
-def _read_behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive]) -> Behavior:
+def _read_behavior(
+    table: MapTableReader, primitives: dict[str, MotorPrimitive], vectors: dict[str, LayerVectors]
+) -> Behavior:
     name = table.text("name")
     magnitudes = table.numbers("magnitudes", {})
     for key in magnitudes:
@@ -176,7 +182,8 @@ def _read_behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive])
                 "magnitudes", f"'{key}' is neither a layer:index nor a primitive; available: {known}"
             )
     commands = table.numbers("commands", {})
-    if not magnitudes and not commands:
+    interventions, onset = read_interventions(table, vectors), read_onset(table)
+    if not magnitudes and not commands and not interventions:
         raise table.error("magnitudes", "expected at least one unit")
     period = table.number("period", None)
     if period is not None and not 0 < period <= MAX_PERIOD:
@@ -219,6 +226,8 @@ def _read_behavior(table: MapTableReader, primitives: dict[str, MotorPrimitive])
         pid=pid,
         task=table.text("task", ""),
         commands=commands,
+        interventions=interventions,
+        onset=onset,
     )
     table.done()
     return behavior

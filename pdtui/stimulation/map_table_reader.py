@@ -39,6 +39,14 @@ class MapTableReader:
             raise MapError(f"{source}: {where}: expected a table, found {_type_of_value(data)}")
         self._data = dict(data)
 
+    def has(self, name: str) -> bool:
+        """Return whether a field is there that was not taken yet."""
+        return name in self._data
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the fields that were not taken yet."""
+        return tuple(self._data)
+
     def take(self, name: str, kind: type | tuple[type, ...], default: Any = ...) -> Any:
         """Take a field of a type, or of one of several; without a default it must be there."""
         if name not in self._data:
@@ -83,6 +91,32 @@ class MapTableReader:
         return MapTableReader(
             self._source, self._text, f"{self._where}, {name}", value, self._header, self._number
         )
+
+    def tables(self, name: str) -> list[MapTableReader]:
+        """Take a field that is a list of tables; empty if it is missing."""
+        entries = self.take(name, list, [])
+        where = f"{self._where}, {name}"
+        return [
+            MapTableReader(
+                self._source, self._text, f"{where} {number + 1}", entry, self._header, self._number
+            )
+            for number, entry in enumerate(entries)
+        ]
+
+    def number_list(self, name: str, default: Any = ...) -> tuple[float, ...]:
+        """Take a field that is a list of finite numbers."""
+        values = self.take(name, list, default)
+        for value in values:
+            if isinstance(value, bool) or not isinstance(value, NUMBER) or not _is_usable(value):
+                raise self.error(name, f"expected {_IN_LIMITS}, found {_describe(value)}")
+        return tuple(float(value) for value in values)
+
+    def texts(self, name: str) -> tuple[str, ...]:
+        """Take a field that is a list of texts; empty if it is missing."""
+        values = self.take(name, list, [])
+        if not all(isinstance(value, str) for value in values):
+            raise self.error(name, "expected a list of texts")
+        return tuple(values)
 
     def numbers(self, name: str, default: Any = ...) -> dict[str, float]:
         """Take a field that is a table of finite numbers."""
@@ -130,7 +164,7 @@ def _line_of(text: str, header: str, number: int, field: str) -> int:
         start = starts[number] if number < len(starts) else 0
     pattern = re.compile(rf"""(^|[{{,\s])["']?{re.escape(field)}["']?\s*=""")
     for row in range(start, len(lines)):
-        inside = lines[row].strip().startswith(f"[{header.strip('[]')}.")
+        inside = lines[row].strip().lstrip("[").startswith(f"{header.strip('[]')}.")
         if row > start and re.match(r"\s*\[", lines[row]) and header and not inside:
             break
         if pattern.search(lines[row].split("#")[0]):

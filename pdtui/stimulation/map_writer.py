@@ -15,13 +15,18 @@ from typing import Any, TypeVar
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import InlineTable, Table
+from tomlkit.items import AoT, InlineTable, Table
 
 from pdtui.core.atomic_file import write_file
 from pdtui.core.attributes import BehaviorAim
 from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.robots.options.robot_option import RobotOptions
+from pdtui.stimulation.interventions.intervention_fields import (
+    compose_intervention,
+    compose_onset,
+    compose_vectors,
+)
 from pdtui.stimulation.map_reader import ROBOT_OPTIONS, parse_map
 from pdtui.stimulation.seed_ranges import format_seed_ranges, merge_seed_ranges, parse_seed_range
 from pdtui.stimulation.stimulation_map import (
@@ -40,7 +45,9 @@ _MAX_POLICY_PART = 20_000
 """Characters of the table of the policy, or of the map up to its first table."""
 _MAX_INLINE = 5
 """Units that are written on one line; more of them get a line each."""
-_OPTIONAL_FIELDS = "says mode period task magnitudes base commands together pid aim measured"
+_OPTIONAL_FIELDS = (
+    "says mode period task onset magnitudes base commands interventions together pid aim measured"
+)
 """Fields of a behavior in the order in which they are written."""
 
 
@@ -60,7 +67,8 @@ def compose_map(stimulation_map: StimulationMap, comments: Sequence[str] = ()) -
     document.add("keys", _table_of({"default": stimulation_map.default_key}))
     primitives = [_primitive_fields(one) for one in stimulation_map.primitives.values()]
     behaviors = [_behavior_fields(one) for one in stimulation_map.behaviors.values()]
-    for name, tables in (("primitives", primitives), ("behaviors", behaviors)):
+    vectors = [compose_vectors(one) for one in stimulation_map.vectors.values()]
+    for name, tables in (("vectors", vectors), ("primitives", primitives), ("behaviors", behaviors)):
         array = tomlkit.aot()
         for fields in tables:
             array.append(_table_of(fields))
@@ -206,7 +214,11 @@ def _behavior_fields(behavior: Behavior) -> dict[str, Any]:
     fields: dict[str, Any] = {"name": behavior.name, "key": behavior.key}
     for name in _OPTIONAL_FIELDS.split():
         value = getattr(behavior, name)
-        if value and (name, value) != ("mode", "fixed"):
+        if name == "interventions" and value:
+            fields[name] = _tables_of(map(compose_intervention, value))
+        elif name == "onset" and value:
+            fields[name] = _inline(compose_onset(value))
+        elif value and (name, value) != ("mode", "fixed"):
             fields[name] = _to_toml(value)
     return fields
 
@@ -232,9 +244,17 @@ def _effect_table(measured: MeasuredEffect) -> InlineTable:
 def _table_of(fields: Mapping[str, Any]) -> Table:
     """Return a table with a line for each field. Subtables come last, as TOML requires."""
     table = tomlkit.table()
-    for name, value in sorted(fields.items(), key=lambda field: isinstance(field[1], Table)):
+    for name, value in sorted(fields.items(), key=lambda field: isinstance(field[1], Table | AoT)):
         table.add(name, value)
     return table
+
+
+def _tables_of(entries: Iterable[Mapping[str, Any]]) -> AoT:
+    """Return an array of tables whose tables of a few numbers are on one line."""
+    array = tomlkit.aot()
+    for fields in entries:
+        array.append(_table_of({name: _to_toml(value) for name, value in fields.items()}))
+    return array
 
 
 def _inline(values: Mapping[str, Any]) -> InlineTable:

@@ -10,6 +10,8 @@ from pdtui.core.errors import MapError, PolicyError
 from pdtui.core.units import parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.robots.options.robot_option import OptionValue
+from pdtui.stimulation.interventions.gait_clock import GaitMark
+from pdtui.stimulation.interventions.intervention import Intervention, LayerVectors, Onset
 
 SCHEMA = 1
 BehaviorMode = Literal["fixed", "pid"]
@@ -87,6 +89,8 @@ class Behavior:
             ``pid``, weights that are multiplied by the controller's output.
         base: In mode ``pid``, the outputs v, by ``layer:index``, to which weight × output is added; 0 for a
             unit that is not named.
+        interventions: Further changes of hidden units while it is latched, in their order.
+        onset: The moment of the gait at which it begins after its key was pressed; None begins at once.
         commands: Values of the robot's commands, by name, while it is latched. In mode ``pid``, weights that
             are multiplied by the controller's output.
         period: Activation period T, s; None lasts until another key is pressed.
@@ -111,6 +115,13 @@ class Behavior:
     pid: PidGains | None = None
     task: str = ""
     commands: dict[str, float] = field(default_factory=dict)
+    interventions: tuple[Intervention, ...] = ()
+    onset: Onset | None = None
+
+    def marks(self) -> tuple[GaitMark, ...]:
+        """Return the moments of the gait that must be tracked for it."""
+        own = (self.onset.mark,) if self.onset else ()
+        return (*own, *(mark for one in self.interventions for mark in one.marks()))
 
 
 @dataclass(frozen=True)
@@ -129,6 +140,7 @@ class StimulationMap:
         import_options: Answers to what the weights file does not state.
         seeds: Seeds on which anything in the map was searched, tuned or chosen; None if it does not say.
         robot_options: Options with which the robot is built, by name.
+        vectors: Vectors that interventions use, by name.
     """
 
     robot: str
@@ -142,6 +154,7 @@ class StimulationMap:
     import_options: ImportOptions = NO_OPTIONS
     seeds: tuple[range, ...] | None = None
     robot_options: dict[str, OptionValue] = field(default_factory=dict)
+    vectors: dict[str, LayerVectors] = field(default_factory=dict)
 
     def units_of(self, behavior: Behavior) -> dict[str, float]:
         """Return a behavior's outputs v by unit address; ``v = c ρ`` for a primitive (section 3.3)."""

@@ -123,7 +123,7 @@ def task_measuring_runs(plan: EvaluationPlan) -> list[HeldRunPlan]:
     """
     runs = []
     for behavior in plan.tasked:
-        if not plan.outputs(behavior).units:
+        if not plan.changes_units(behavior):
             continue
         task, dt = plan.loop.robot.find_task(behavior.task), plan.loop.robot.control_dt
         usual = plan_run_times(plan.settings, 0, dt, behavior.period)

@@ -44,6 +44,7 @@ class FastMlp:
         units = [isinstance(stage, ACTIVATION_TYPES) for stage in stages]
         self.layers = tuple(width for width, has_units in zip(widths, units, strict=True) if has_units)
         self._activations = np.empty(sum(self.layers), np.float32)
+        self._natural = np.empty_like(self._activations)
         whole = torch.from_numpy(self._activations)
         x = torch.empty(observations)
         self._input: NDArray[np.float32] = x.numpy()
@@ -63,24 +64,29 @@ class FastMlp:
 
     def run(
         self, observation: NDArray[Any], stimulation: Stimulation
-    ) -> tuple[torch.Tensor, NDArray[np.float32], dict[int, float]]:
+    ) -> tuple[torch.Tensor, NDArray[np.float32], NDArray[np.float32]]:
         """Run one forward pass.
 
         Returns:
-            The output, which the next pass overwrites; all activations; and the natural output of each
-            stimulated unit that exists.
+            The output, which the next pass overwrites; all activations as the next layers saw them; and the
+            activations before the stimulation changed those of each layer.
         """
         self._input[:] = observation
         values = self._activations
-        natural: dict[int, float] = {}
+        stimulated = bool(stimulation)
+        natural = self._natural if stimulated else values
         pending = tuple(zip(stimulation.units, stimulation.values, strict=True)) if stimulation.units else ()
         for calls, low, high in self._parts:
             for call in calls:
                 call()
+            if stimulated:
+                natural[low:high] = values[low:high]
             for unit, value in pending:
                 if low <= unit < high:
-                    natural[unit] = float(values[unit])
                     values[unit] = value
+            for edit in stimulation.edits:
+                if low <= edit.units[0] < high:
+                    values[edit.units] = edit.change(values[edit.units])
         for call in self._rest:
             call()
         return self._output, values.copy(), natural

@@ -6,6 +6,7 @@ import copy
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -40,11 +41,14 @@ class PolicyStep(NamedTuple):
     Attributes:
         action: The action, shape (A,), float32.
         activations: Output of every hidden unit as the next layer saw it, shape (U,), float32.
-        natural: Outputs that the stimulated units would have had, in the order of the stimulation.
+        stimulation: The units that were changed and the values that overwrote their outputs. Whatever an edit
+            does, in one control step it comes to this.
+        natural: Outputs that those units would have had, in the same order.
     """
 
     action: NDArray[np.float32]
     activations: NDArray[np.float32]
+    stimulation: Stimulation
     natural: tuple[float, ...]
 
 
@@ -182,7 +186,7 @@ class Policy:
 
         Args:
             observation: An observation of the policy's shape.
-            stimulation: The units to overwrite.
+            stimulation: The units to overwrite, and the edits to make.
             rng: Generator with which the action is drawn from the policy's distribution; without it, the mean
                 action is taken.
 
@@ -196,21 +200,49 @@ class Policy:
         if torch.get_num_threads() != 1:
             with _one_thread():
                 return self.act(observation, stimulation, rng)
+        if not stimulation:
+            output, activations, _ = self._forward(observation, stimulation)
+            return PolicyStep(self._decode(output, rng), activations, stimulation, ())
+        units = stimulation.touched_units()
+        self._check_units(units)
+        if stimulation.edits:
+            edits = tuple(edit.bind(observation, self.activations_for) for edit in stimulation.edits)
+            stimulation = replace(stimulation, edits=edits)
+        output, activations, natural = self._forward(observation, stimulation)
+        places = list(units)
+        if stimulation.edits:
+            stimulation = Stimulation(units, tuple(activations[places].tolist()))
+        return PolicyStep(
+            self._decode(output, rng), activations, stimulation, tuple(natural[places].tolist())
+        )
+
+    def activations_for(self, observation: NDArray[Any]) -> NDArray[np.float32]:
+        """Return what all hidden units would put out for an observation, shape (U,).
+
+        Nothing is overwritten, and the recurrent state stays as it is.
+        """
+        state = self.snapshot()
+        activations = self._forward(observation, NO_STIMULATION)[1]
+        self.restore(state)
+        return activations
+
+    def _forward(
+        self, observation: NDArray[Any], stimulation: Stimulation
+    ) -> tuple[torch.Tensor, NDArray[np.float32], NDArray[np.float32]]:
+        """Return the output, and the activations after and before the stimulation changed them."""
         if self._fast_mlp is not None:
-            output, activations, found = self._fast_mlp.run(observation, stimulation)
-        else:
-            self._hooks.begin(stimulation)
-            output = self._run_network(observation)
-            activations, found = np.concatenate(self._hooks.outputs), self._hooks.natural
-        action = self._decode(output, rng)
-        try:
-            natural = tuple([found[unit] for unit in stimulation.units])
-        except KeyError as error:
-            raise PolicyError(
-                f"{self.name}: unit number {error} does not exist; "
-                f"the policy has {describe_layers(self.layers)}"
-            ) from None
-        return PolicyStep(action, activations, natural)
+            return self._fast_mlp.run(observation, stimulation)
+        self._hooks.begin(stimulation)
+        output = self._run_network(observation)
+        return output, np.concatenate(self._hooks.outputs), np.concatenate(self._hooks.natural)
+
+    def _check_units(self, units: Sequence[int]) -> None:
+        for unit in units:
+            if not 0 <= unit < self.units:
+                raise PolicyError(
+                    f"{self.name}: unit number {unit} does not exist; "
+                    f"the policy has {describe_layers(self.layers)}"
+                )
 
 
 def check_policy_fit(policy: Policy, world: gymnasium.Env[Any, Any], name: str) -> None:

@@ -94,26 +94,20 @@ class UnitHooks:
 
     Attributes:
         outputs: Output of each layer so far, as the next layer sees it, flattened in C order.
-        natural: Outputs that the stimulated units would have had, by flat index.
+        natural: Output of each layer so far before the stimulation changed it, flattened likewise.
     """
 
     def __init__(self) -> None:
         self.outputs: list[NDArray[np.float32]] = []
-        self.natural: dict[int, float] = {}
-        self._pending: tuple[tuple[int, float], ...] = ()
+        self.natural: list[NDArray[np.float32]] = []
+        self._stimulation = NO_STIMULATION
         self._replaced: list[tuple[torch.Tensor, torch.Tensor]] = []
         self._offset = 0
 
     def begin(self, stimulation: Stimulation = NO_STIMULATION) -> None:
         """Prepare for a forward pass."""
-        self.outputs, self._offset = [], 0
-        if self._replaced:
-            self._replaced = []
-        if stimulation.units:
-            self._pending = tuple(zip(stimulation.units, stimulation.values, strict=True))
-            self.natural = {}
-        elif self._pending:
-            self._pending = ()
+        self.outputs, self.natural, self._replaced, self._offset = [], [], [], 0
+        self._stimulation = stimulation
 
     def replace(self, output: Any) -> Any:
         """Return a hidden submodule's output with stimulated units overwritten; None leaves it unchanged.
@@ -123,15 +117,23 @@ class UnitHooks:
         own = _output_tensor(output)
         low, high = self._offset, self._offset + own.numel()
         self._offset = high
-        pending = [(unit - low, value) for unit, value in self._pending if low <= unit < high]
-        shown = own.clone() if pending else own
+        wanted = self._stimulation
+        pairs = zip(wanted.units, wanted.values, strict=True)
+        pending = [(unit - low, value) for unit, value in pairs if low <= unit < high]
+        edits = [edit for edit in wanted.edits if low <= edit.units[0] < high]
+        shown = own.clone() if pending or edits else own
         values = shown.numpy()
-        for place, value in pending:
-            self.natural[low + place] = float(values.flat[place])
-            values.flat[place] = value
-        self.outputs.append(values.astype(np.float32).reshape(-1))
-        if not pending:
+        natural = values.astype(np.float32).reshape(-1)
+        self.natural.append(natural)
+        if not pending and not edits:
+            self.outputs.append(natural)
             return None
+        for place, value in pending:
+            values.flat[place] = value
+        for edit in edits:
+            places = edit.units - low
+            values.flat[places] = edit.change(values.flat[places].astype(np.float32))
+        self.outputs.append(values.astype(np.float32).reshape(-1))
         self._replaced.append((shown, own))
         return (shown, *output[1:]) if isinstance(output, tuple) else shown
 

@@ -14,7 +14,7 @@ from pdtui.sessions.session_schema import ACTIVE_FIELDS
 from pdtui.sessions.streams.step_block import StepBlock
 from pdtui.sessions.streams.value_differences import StreamDifference, StreamValue, differing_values
 
-_EXACT_FIELDS = ("remaining", "factor")
+_EXACT_FIELDS = ("remaining", "factor", "waiting")
 """Fields of an active behavior that no rounding affects."""
 
 

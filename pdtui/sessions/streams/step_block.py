@@ -35,7 +35,7 @@ class StepBlock:
         rewards, costs: reward and cost of each step, shape (n,).
         behavior_counts: number of active behaviors of each step, shape (n,).
         behavior_names: their names, step after step.
-        behavior_states: their `ACTIVE_FIELDS`, with NaN for None, shape (sum of the counts, 6).
+        behavior_states: their `ACTIVE_FIELDS`, with NaN for None, shape (sum of the counts, 7).
         stimulated_counts: number of stimulated units of each step, shape (n,).
         stimulated: flat index, overwritten and natural output of each, shape (sum of the counts, 3).
         replaced_counts: number of components of each step's action that the operator had taken over, shape
@@ -233,6 +233,8 @@ def _spans(counts: NDArray[np.int64]) -> Sequence[tuple[int, int]]:
 
 
 def _decode_active_behavior(name: str, values: Sequence[float]) -> ActiveBehavior:
-    remaining, factor, *controller = (None if math.isnan(value) else value for value in values)
-    steps = None if remaining is None or math.isinf(remaining) else int(remaining)
-    return ActiveBehavior(name, steps, math.nan if factor is None else factor, *controller)
+    remaining, factor, *controller, waiting = (None if math.isnan(value) else value for value in values)
+    steps, until = (
+        None if count is None or math.isinf(count) else int(count) for count in (remaining, waiting)
+    )
+    return ActiveBehavior(name, steps, math.nan if factor is None else factor, *controller, waiting=until)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.core.attributes import Floats
 from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.rrd.entity_table import EntityTable
@@ -30,8 +31,7 @@ def decode_step_block(
     names = drive.read_lists("behaviors", str, optional=True)
     counts = np.fromiter(map(len, names), np.int64, count)
     lengths, states = drive.read_ragged("active", np.float64)
-    if not np.array_equal(lengths, counts * len(ACTIVE_FIELDS)):
-        raise SessionError(f"stream 'active': expected {len(ACTIVE_FIELDS)} numbers per behavior")
+    states = _decode_behavior_states(counts, lengths, states)
     triples, flat = drive.read_ragged("stimulation", np.float64)
     if (triples % 3).any():
         raise SessionError("stream 'stimulation': expected units with two values each")
@@ -55,7 +55,7 @@ def decode_step_block(
         costs=gains[:, 1],
         behavior_counts=counts,
         behavior_names=list(chain.from_iterable(names)),
-        behavior_states=states.reshape(-1, len(ACTIVE_FIELDS)),
+        behavior_states=states,
         stimulated_counts=triples // 3,
         stimulated=stimulated,
         replaced_counts=pairs // 2,
@@ -63,6 +63,19 @@ def decode_step_block(
         activations=decode_activations(drive, info) if activations and info.activations != "off" else None,
         **others,
     )
+
+
+def _decode_behavior_states(counts: NDArray[np.int64], lengths: NDArray[np.int64], flat: Floats) -> Floats:
+    """Return the states of active behaviors, shape (sum of the counts, fields).
+
+    Sessions from before behaviors had an onset lack its field, the last, in which no behavior waits.
+    """
+    fields = len(ACTIVE_FIELDS)
+    if np.array_equal(lengths, counts * fields):
+        return flat.reshape(-1, fields)
+    if np.array_equal(lengths, counts * (fields - 1)):
+        return np.pad(flat.reshape(-1, fields - 1), ((0, 0), (0, 1)), constant_values=np.nan)
+    raise SessionError(f"stream 'active': expected {fields} numbers per behavior")
 
 
 def decode_activations(drive: EntityTable, info: DriveInfo) -> NDArray[Any]:

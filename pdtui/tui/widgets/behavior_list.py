@@ -92,9 +92,13 @@ class BehaviorList(SnapshotWidget):
         return "" if behavior.period is None else f"for {format_number(behavior.period)} s"
 
     def _add_state(self, line: ScreenRow, behavior: Behavior, active: ActiveBehavior, color: Style) -> None:
-        """Add the time left as a draining bar, or the word "latched"."""
+        """Add the time left as a draining bar, the word "latched", or "armed" with the time to go."""
         dt = None if self.facts is None else self.facts.dt
-        if active.remaining is None or dt is None or behavior.period is None:
+        if active.waiting is not None:
+            line.add("armed", color)
+            if active.waiting >= 0 and dt is not None:
+                line.add(f" {active.waiting * dt:.1f} s", color)
+        elif active.remaining is None or dt is None or behavior.period is None:
             line.add("latched", color)
         else:
             steps = max(1, round(behavior.period / dt))

@@ -1,0 +1,78 @@
+"""Edits of the heading in an observation: "heading" sets it and "turn" adds to it, both in rad.
+
+The velocity in the world turns with the trunk, so that the robot seems to do the same in another direction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from pdtui.core.attributes import Floats, wrap_angle
+from pdtui.robots.geometry import roll_pitch_yaw
+from pdtui.robots.observation_edits.observation_edit import ObservationEdit
+
+
+def quaternion_heading_edits(quaternion: int, velocity: int) -> tuple[ObservationEdit, ObservationEdit]:
+    """Return the edits "heading" and "turn" of an observation that holds the trunk's quaternion.
+
+    Args:
+        quaternion: Index in the observation of the trunk's quaternion w x y z.
+        velocity: Index of its velocity x y in the world.
+    """
+
+    def turn(observation: Floats, angle: float) -> Floats:
+        edited = observation.copy()
+        w, x, y, z = observation[quaternion : quaternion + 4].tolist()
+        c, s = math.cos(0.5 * angle), math.sin(0.5 * angle)
+        edited[quaternion : quaternion + 4] = (c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w)
+        vx, vy = observation[velocity : velocity + 2].tolist()
+        edited[velocity : velocity + 2] = _rotate(vx, vy, angle)
+        return edited
+
+    def face(observation: Floats, heading: float) -> Floats:
+        *_, yaw = roll_pitch_yaw(*observation[quaternion : quaternion + 4].tolist())
+        return turn(observation, heading - yaw)
+
+    return _name_edits(face, turn)
+
+
+def yaw_heading_edits(
+    yaws: Sequence[int], velocities: Sequence[int]
+) -> tuple[ObservationEdit, ObservationEdit]:
+    """Return the edits "heading" and "turn" of an observation that holds the trunk's yaw.
+
+    Args:
+        yaws: Indices in the observation of the yaw, now and in earlier steps; the first is the present one.
+        velocities: Indices of the velocities x y in the world, or of displacements, now and earlier.
+    """
+
+    def turn(observation: Floats, angle: float) -> Floats:
+        edited = observation.copy()
+        for index in yaws:
+            edited[index] = wrap_angle(float(observation[index]) + angle)
+        for index in velocities:
+            vx, vy = observation[index : index + 2].tolist()
+            edited[index : index + 2] = _rotate(vx, vy, angle)
+        return edited
+
+    def face(observation: Floats, heading: float) -> Floats:
+        return turn(observation, heading - float(observation[yaws[0]]))
+
+    return _name_edits(face, turn)
+
+
+def _rotate(x: float, y: float, angle: float) -> tuple[float, float]:
+    c, s = math.cos(angle), math.sin(angle)
+    return c * x - s * y, s * x + c * y
+
+
+def _name_edits(
+    face: Callable[[Floats, float], Floats], turn: Callable[[Floats, float], Floats]
+) -> tuple[ObservationEdit, ObservationEdit]:
+    return (
+        ObservationEdit(
+            "heading", "rad", "the torso, and its velocity with it, heads in this direction", face
+        ),
+        ObservationEdit("turn", "rad", "torso and velocity are turned to the left by this much", turn),
+    )

@@ -1,0 +1,47 @@
+"""Edits of an observation: how it would read if one thing about the robot were different."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pdtui.core.attributes import Floats
+
+
+@dataclass(frozen=True)
+class ObservationEdit:
+    """An edit that makes sense for one robot.
+
+    Attributes:
+        name: Name in maps.
+        unit: Unit of its size.
+        says: What it makes the observation say, as in "the torso is turned by so much".
+        apply: Returns the edited observation, given the observation and the size; it copies.
+    """
+
+    name: str
+    unit: str
+    says: str
+    apply: Callable[[Floats, float], Floats]
+
+
+def set_number(index: int, name: str, unit: str, says: str, scale: float = 1.0) -> ObservationEdit:
+    """Return an edit that sets one number of the observation to size × scale."""
+
+    def apply(observation: Floats, size: float) -> Floats:
+        edited = observation.copy()
+        edited[index] = size * scale
+        return edited
+
+    return ObservationEdit(name, unit, says, apply)
+
+
+def add_to_number(index: int, name: str, unit: str, says: str, scale: float = 1.0) -> ObservationEdit:
+    """Return an edit that adds size × scale to one number of the observation."""
+
+    def apply(observation: Floats, size: float) -> Floats:
+        edited = observation.copy()
+        edited[index] += size * scale
+        return edited
+
+    return ObservationEdit(name, unit, says, apply)

@@ -1,0 +1,93 @@
+"""The edits of hidden units of one layer in one control step; `Intervention` has their formulas."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.core.attributes import Floats
+from pdtui.core.units import UnitEdit
+
+Outputs = NDArray[np.float32]
+EditObservation = Callable[[Floats], Floats]
+
+
+class OverwriteUnits(UnitEdit):
+    """Overwrites units by values, shape (n,)."""
+
+    def __init__(self, units: NDArray[np.int64], values: NDArray[np.floating[Any]]) -> None:
+        self.units, self._values = units, values
+
+    def change(self, outputs: Outputs) -> NDArray[np.floating[Any]]:
+        del outputs
+        return self._values
+
+
+class AddToUnits(UnitEdit):
+    """Adds amounts, shape (n,)."""
+
+    def __init__(self, units: NDArray[np.int64], amounts: NDArray[np.floating[Any]]) -> None:
+        self.units, self._amounts = units, amounts
+
+    def change(self, outputs: Outputs) -> NDArray[np.floating[Any]]:
+        return outputs + self._amounts
+
+
+class ScaleUnits(UnitEdit):
+    """Multiplies by factors, shape (n,)."""
+
+    def __init__(self, units: NDArray[np.int64], factors: NDArray[np.floating[Any]]) -> None:
+        self.units, self._factors = units, factors
+
+    def change(self, outputs: Outputs) -> NDArray[np.floating[Any]]:
+        return outputs * self._factors
+
+
+class ClampUnits(UnitEdit):
+    """Limits units to ranges from `low` to `high`, shape (n,) each."""
+
+    def __init__(self, units: NDArray[np.int64], low: Floats, high: Floats) -> None:
+        self.units, self._low, self._high = units, low, high
+
+    def change(self, outputs: Outputs) -> NDArray[np.floating[Any]]:
+        return np.clip(outputs, self._low, self._high)
+
+
+class SetCoordinates(UnitEdit):
+    """Sets the coordinates α, shape (k,), along orthonormal vectors: ``h ← h + U(α − Uᵀh)``, rows (k, n)."""
+
+    def __init__(self, units: NDArray[np.int64], rows: Outputs, coordinates: Floats) -> None:
+        self.units, self._rows, self._coordinates = units, rows, coordinates
+
+    def change(self, outputs: Outputs) -> NDArray[np.floating[Any]]:
+        return outputs + (self._coordinates - self._rows @ outputs) @ self._rows
+
+
+class AddAffine(UnitEdit):
+    """Adds an affine function of low rank: ``h ← h + f (W(Vᵀh) + b)``, `write` and `read` of shape (r, n)."""
+
+    def __init__(
+        self, units: NDArray[np.int64], write: Outputs, read: Outputs, bias: Outputs, strength: float
+    ) -> None:
+        self.units, self._write, self._read = units, write, read
+        self._bias, self._strength = bias, strength
+
+    def change(self, outputs: Outputs) -> NDArray[np.floating[Any]]:
+        return outputs + self._strength * ((self._read @ outputs) @ self._write + self._bias)
+
+
+class ImprintUnits(UnitEdit):
+    """Overwrites units by what they would put out for an edited observation."""
+
+    def __init__(self, units: NDArray[np.int64], edit_observation: EditObservation) -> None:
+        self.units, self._edit_observation = units, edit_observation
+
+    def change(self, outputs: Outputs) -> NDArray[np.floating[Any]]:
+        raise AssertionError(f"an imprint of {len(outputs)} units is bound to an observation first")
+
+    def bind(self, observation: NDArray[Any], activations: Callable[[NDArray[Any]], Outputs]) -> UnitEdit:
+        imprinted = activations(self._edit_observation(observation.astype(np.float64)))
+        return OverwriteUnits(self.units, imprinted[self.units])
