@@ -15,6 +15,7 @@ TOPICS = (
     "driving",
     "sessions",
     "maps",
+    "interventions",
     "dissecting",
     "evaluating",
     "your-policy",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pdtui.core.units import Stimulation
 from pdtui.policies.runtime.policy import Policy
@@ -36,7 +37,7 @@ class PrimitiveCandidate:
     sign: float
 
 
-def select_units_by_action(
+def select_outputs_by_action(
     robot: Robot,
     policy: Policy,
     values: Sequence[float],
@@ -44,22 +45,38 @@ def select_units_by_action(
     *,
     seed: int,
     options: dict[str, str] | None,
-) -> tuple[int, ...]:
-    """Choose the units that change the policy's action most, without trying any on the robot.
+) -> tuple[tuple[int, float], ...]:
+    """Choose single units, and outputs v, that push one component of the action most in one direction.
 
-    Each component of the action is compared in its own standard deviation over all units and outputs, so that
-    steering counts as much as throttle does.
+    None is tried on the robot: the policy is asked at observations of an unperturbed walk.
 
     Args:
         robot: The robot, which walks to observe.
         policy: The policy.
         values: Outputs that each unit is given.
-        count: Number of units.
+        count: Number of units and outputs, shared by the components and their two directions.
         seed, options: Those of the robot's reset.
 
     Returns:
-        Flat indices of the units, ascending.
+        Flat indices and outputs.
     """
+    changes = _action_changes(robot, policy, values, seed, options)
+    components = changes.shape[2]
+    each = max(1, count // (2 * components))
+    chosen: dict[tuple[int, float], None] = {}
+    for component in range(components):
+        for sign in (1.0, -1.0):
+            pushed = sign * changes[:, :, component]
+            best = pushed.argmax(axis=1)
+            order = np.argsort(-pushed.max(axis=1), kind="stable")[:each]
+            chosen |= {(unit, values[best[unit]]): None for unit in order.tolist()}
+    return tuple(chosen)
+
+
+def _action_changes(
+    robot: Robot, policy: Policy, values: Sequence[float], seed: int, options: dict[str, str] | None
+) -> NDArray[np.float64]:
+    """Return the mean change of the action by each unit at each output, shape (U, values, A)."""
     observation, _ = robot.reset(seed=seed, options=options)
     policy.reset()
     seen = []
@@ -76,9 +93,7 @@ def select_units_by_action(
             stimulation = Stimulation.of({unit: value})
             moved = [policy.act(one, stimulation).action - action for one, action in seen]
             changes[unit, number] = np.mean(moved, axis=0)
-    spread = changes.std(axis=(0, 1))
-    strength = np.abs(changes / np.where(spread > 0, spread, 1.0)).max(axis=(1, 2))
-    return tuple(sorted(np.argsort(-strength, kind="stable")[:count].tolist()))
+    return changes
 
 
 def select_units_to_refine(

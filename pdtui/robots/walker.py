@@ -28,6 +28,11 @@ _FEET = {"right": "foot_geom", "left": "foot_left_geom"}
 _MAX_STRIDE_TIME = 0.4
 # Slowing down: share of its speed, and control steps to slow down in and to stay up for afterwards.
 _SLOW_SHARE, _SLOWING_STEPS, _SLOW_STEPS = 0.25, 100, 200
+# Stopping: control steps to stop in, to stand until, and after which it runs again when it is let go; speed
+# that counts as standing, m/s, and share of its speed that counts as running.
+_STOP_STEPS, _STAND_STEPS, _RUN_STEPS, _STANDING, _RUNS_ON = 300, 500, 750, 0.3, 0.5
+# Steps at the end over which the speed is averaged.
+_LAST_STEPS = 50
 # Hopping: control steps to begin in and to hop for, share of these with a foot up, and slowest speed, m/s.
 _HOP_FROM, _HOP_STEPS, _HOP_SHARE, _HOP_SPEED = 50, 150, 0.8, 0.3
 
@@ -44,6 +49,21 @@ def judge_slow_down(trace: TaskRunTrace) -> TaskVerdict:
     score = (1.0 - left) / (1.0 - _SLOW_SHARE) if up else fallen_score
     figures = {"share of speed left": left, "steps up": len(trace)}
     return TaskVerdict(up and left < _SLOW_SHARE, score, figures)
+
+
+def judge_stop_and_go(trace: TaskRunTrace) -> TaskVerdict:
+    """Judge whether it stands from step 300 to 500, and runs again by step 750 after it was let go."""
+    usual = max(trace.mean_before("vx", 100), 1e-6)
+    late = np.abs(trace["vx"][_STOP_STEPS:_STAND_STEPS])
+    left = float(late.mean()) if len(late) else usual
+    again = trace.mean("vx", slice(_RUN_STEPS - _LAST_STEPS, _RUN_STEPS)) / usual
+    stands = trace.stays_up(_STAND_STEPS) and left < _STANDING
+    runs = trace.stays_up(_RUN_STEPS) and again >= _RUNS_ON
+    stopped = min(1.0, max(0.0, (usual - left) / (usual - _STANDING)))
+    score = 0.5 * stopped * min(1.0, len(trace) / _STAND_STEPS) + (0.25 if stands else 0.0)
+    score += 0.25 * min(1.0, max(0.0, again / _RUNS_ON)) if runs or stands else 0.0
+    figures = {"speed while it stands (m/s)": left, "steps up": len(trace), "of its own speed again": again}
+    return TaskVerdict(stands and runs, score, figures)
 
 
 def judge_hop(trace: TaskRunTrace) -> TaskVerdict:
@@ -80,6 +100,16 @@ WALKER_TASKS = (
         walk=(200, 300),
         steps=_SLOWING_STEPS + _SLOW_STEPS,
         judge=judge_slow_down,
+    ),
+    Task(
+        name="stop and go",
+        key="x",
+        says="slows down to a stand, and runs on when it is let go",
+        wanted="under 0.3 m/s from step 300 to 500 and up; half its own speed again 250 steps later",
+        walk=(200, 300),
+        steps=_RUN_STEPS,
+        judge=judge_stop_and_go,
+        period=_STAND_STEPS,
     ),
     Task(
         name="hop",

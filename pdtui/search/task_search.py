@@ -13,7 +13,7 @@ from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import Stimulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_pool import RolloutPool
-from pdtui.probing.unit_selection import select_units_by_action
+from pdtui.probing.unit_selection import select_outputs_by_action
 from pdtui.robots.robot import Robot
 from pdtui.robots.task import Task, TaskVerdict
 from pdtui.search.evolutionary_search import Deadline, EvolutionarySearch, EvolutionProblem
@@ -160,27 +160,35 @@ class TaskSearch:
     def _screen(self, progress: StepProgress | None) -> tuple[list[StimulationWithDuration], Floats]:
         """Return the best single units, and weights by which to draw units."""
         settings, units = self._settings, self._pool.policy.units
-        period = None if self._task.period is None else self._task.period // 2
-        tried = np.arange(units) if self._units is None else np.array(self._units)
-        limit = settings.screen_units if self._units is None else None
-        if limit is not None and limit < units:
-            options = {"start": self._task.start} if self._task.start else None
-            robot, policy = self._pool.robot, self._pool.policy
-            chosen = select_units_by_action(
-                robot, policy, settings.values, limit, seed=self._seed, options=options
-            )
-            tried = np.array(chosen)
+        longest, pairs = self._task.period, self._pairs_to_screen()
+        periods = [None if longest is None else longest // 2]
+        if longest is not None and len(pairs) < units:  # few enough to try each for all of the time, too
+            periods.append(longest)
         plans = [
             StimulationWithDuration(Stimulation.of({unit: value}), period)
-            for unit in tried.tolist()
-            for value in settings.values
+            for unit, value in pairs
+            for period in periods
         ]
         scores = self._score(plans, settings.screen_seeds, progress)
         weights = np.zeros(units)
-        best = scores.reshape(len(tried), -1).max(axis=1)
-        weights[tried] = np.maximum(best - np.median(scores), 0.0)
+        for (unit, _), best in zip(pairs, scores.reshape(len(pairs), -1).max(axis=1), strict=True):
+            weights[unit] = max(weights[unit], best - np.median(scores))
         order = np.argsort(-scores, kind="stable")[: settings.children]
         return [plans[index] for index in order], weights + (weights.mean() or 1.0)
+
+    def _pairs_to_screen(self) -> list[tuple[int, float]]:
+        """Return the units to try alone, with their outputs v: all, or those that push the action most."""
+        settings, units = self._settings, self._pool.policy.units
+        tried = range(units) if self._units is None else self._units
+        limit = settings.screen_units
+        if self._units is None and limit is not None and limit < units:
+            options = {"start": self._task.start} if self._task.start else None
+            values = sorted({*settings.values, *settings.strong_values})
+            chosen = select_outputs_by_action(
+                self._pool.robot, self._pool.policy, values, limit, seed=self._seed, options=options
+            )
+            return list(chosen)
+        return [(unit, value) for unit in tried for value in settings.values]
 
     @property
     def seeds(self) -> tuple[range, ...]:

@@ -13,8 +13,10 @@ class TaskSearchSettings(EvolutionSettings):
 
     Attributes:
         values: outputs at which every unit is tried alone.
+        strong_values: further outputs, where only some units are tried.
         screen_seeds: walks from which they are tried.
-        screen_units: how many units are tried, those that change the action most; None tries all.
+        screen_units: how many units are tried, each at the output that pushes a component of the action most;
+            None tries all at all `values`.
         quick_seeds, full_seeds: walks of the quick score of a child, and of the full one.
         selection_seeds: walks of the final score.
         held_out_seeds: walks of the figures.
@@ -24,6 +26,7 @@ class TaskSearchSettings(EvolutionSettings):
     """
 
     values: tuple[float, ...] = (-6.0, -2.0, 2.0, 6.0)
+    strong_values: tuple[float, ...] = (-20.0, 20.0)
     screen_seeds: int = 1
     screen_units: int | None = None
     elite: int = 20

@@ -28,7 +28,7 @@ THREADS = 2
 # Control steps of the initial policy from which the observations are normalised.
 _WARM_START_STEPS = 200
 # Rounds of imitation, control steps of every robot in each, and the deviation of the noise on the actions.
-_IMITATION_ROUNDS, _IMITATION_STEPS, _IMITATION_NOISE = 3, 800, 0.08
+_IMITATION_ROUNDS, _IMITATION_STEPS, _IMITATION_NOISE = 3, 500, 0.08
 # A smaller deviation than this would blow up inputs that hardly change.
 _MIN_DEVIATION = 0.01
 

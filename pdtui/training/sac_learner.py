@@ -93,7 +93,7 @@ class SacLearner:
         following, log_prob = _sample(state.actor, batch.following, action_key)
         future = _both_critics(state.targets, batch.following, following).min(0)
         future = future - jnp.exp(state.log_alpha) * log_prob
-        goal = batch.reward + batch.discount * self.config.discount * future
+        goal = self.config.reward_scale * batch.reward + batch.discount * self.config.discount * future
 
         def loss(critics: MlpParameters) -> jax.Array:
             value = _both_critics(critics, batch.observation, batch.action)

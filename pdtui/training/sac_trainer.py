@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pkgutil
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from pdtui.training.policy_trainer import Actor, PolicyTrainer, make_numpy_actor
 from pdtui.training.robot_batch import RobotBatch, TransitionBatch
 from pdtui.training.sac_learner import SacLearner
 from pdtui.training.training_config import SacConfig
+
+# Deviation of the noise on what a rule-based driver does, so that the critics see other actions too.
+_DEMONSTRATION_NOISE = 0.2
 
 
 class ReplayBuffer:
@@ -55,7 +59,12 @@ class SacTrainer(PolicyTrainer[SacConfig]):
 
     def build(self) -> None:
         config = self.config
-        self.batches = [RobotBatch(self.make, config.worlds, self.seed)]
+        recipe = self.sample.training_recipe
+        if recipe.robot_batch:
+            batch = pkgutil.resolve_name(recipe.robot_batch)
+            self.batches = [batch(self.sample, config.worlds, self.seed)]
+        else:
+            self.batches = [RobotBatch(self.make, config.worlds, self.seed)]
         self.learner = SacLearner(config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self.replay = ReplayBuffer(config.capacity, self.observations, self.actions)
@@ -89,7 +98,11 @@ class SacTrainer(PolicyTrainer[SacConfig]):
         (batch,) = self.batches
         if self.replay.size < self.config.random_steps:
             shape = (self.config.worlds, self.actions)
-            squashed = self.rng.uniform(-1.0, 1.0, shape).astype(np.float32)
+            if self.config.imitates:
+                noise = _DEMONSTRATION_NOISE * self.rng.standard_normal(shape, np.float32)
+                squashed = np.clip(batch.suggest_actions() + noise, -1.0, 1.0)
+            else:
+                squashed = self.rng.uniform(-1.0, 1.0, shape).astype(np.float32)
         else:
             squashed = actor(batch.observations)
         self.replay.add(batch.step(self.to_robot(squashed))._replace(action=squashed))

@@ -56,7 +56,8 @@ def train_policy(
     if algorithm == "sac" and (activation not in (None, "tanh") or initial_policy):
         raise TrainingError("--activation and --initial-policy are for PPO; SAC trains a tanh network anew")
     given = {"total_steps": steps, "learning_rate": learning_rate, **choices}
-    changes = {name: value for name, value in recipe.settings.items() if hasattr(defaults, name)}
+    settings = {**recipe.settings, **(recipe.sac_settings if algorithm == "sac" else {})}
+    changes = {name: value for name, value in settings.items() if hasattr(defaults, name)}
     changes |= {name: value for name, value in given.items() if value is not None}
     config = replace(defaults, **changes)
     command = (

@@ -23,6 +23,9 @@ class TrainingConfig:
         evaluate_episodes: Episodes of an evaluation.
         evaluate_steps: Control steps of an evaluated episode.
         evaluate_robots: Robots on which these episodes run at a time.
+        imitates: Whether the policy first learns from the robot's rule-based driver: PPO to act as it does,
+            and SAC from what it does instead of random actions.
+        reward_scale: Factor on rewards, which brings the values to the order of 1.
     """
 
     total_steps: int
@@ -37,6 +40,8 @@ class TrainingConfig:
     evaluate_episodes: int = 32
     evaluate_steps: int = 1000
     evaluate_robots: int = 32
+    imitates: bool = False
+    reward_scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -56,10 +61,8 @@ class PpoConfig(TrainingConfig):
         log_std: Initial log standard deviation of the actions.
         initial_policy: Weights file or name of the shipped policy that the run starts from, instead of the
             recipe's. One with other layers is imitated first.
-        imitates: Whether the policy first learns to act as the robot's rule-based driver does.
         critic_iterations: Iterations at the start in which only the critic learns, so that an untrained one
             does not spoil a policy that can act already.
-        reward_scale: Factor on rewards, which brings the values to the order of 1.
         least_deviation: Least deviation by which an observed number is divided. Numbers that hardly change
             in training may change a lot elsewhere.
     """
@@ -77,7 +80,6 @@ class PpoConfig(TrainingConfig):
     entropy: float = 0.001
     log_std: float = -0.5
     initial_policy: str = ""
-    imitates: bool = False
     critic_iterations: int = 0
     reward_scale: float = 0.02
     least_deviation: float = 0.0
@@ -92,7 +94,7 @@ class SacConfig(TrainingConfig):
         batch: Transitions per update.
         final_rate: Share of `learning_rate` that is left at the end of the run.
         tau: Rate per update at which the target critics follow the critics.
-        random_steps: Control steps with random actions before learning starts.
+        random_steps: Control steps with random actions, or a rule-based driver's, before learning starts.
         capacity: Transitions that the replay buffer holds.
     """
 

@@ -62,6 +62,25 @@ def yaw_heading_edits(
     return _name_edits(face, turn)
 
 
+def displacement_edit(yaws: Sequence[int], displacements: Sequence[int], dt: float) -> ObservationEdit:
+    """Return the edit "faster" of an observation that holds yaw and displacement of several steps.
+
+    Args:
+        yaws, displacements: Indices in the observation of each step's yaw, and of its displacement x y.
+        dt: Duration of a step, s.
+    """
+
+    def move(observation: Floats, speed: float) -> Floats:
+        edited = observation.copy()
+        for yaw, index in zip(yaws, displacements, strict=True):
+            x, y = _rotate(speed * dt, 0.0, float(observation[yaw]))
+            edited[index] += x
+            edited[index + 1] += y
+        return edited
+
+    return ObservationEdit("faster", "m/s", "it moves the way that it faces faster by this much", move)
+
+
 def _rotate(x: float, y: float, angle: float) -> tuple[float, float]:
     c, s = math.cos(angle), math.sin(angle)
     return c * x - s * y, s * x + c * y

@@ -34,7 +34,7 @@ class SceneKind:
 
 SCENE_KINDS = {
     "quiet": SceneKind(10_000, 10_000, 0.0, 0.05),
-    "training": SceneKind(0, 50, 0.0, 0.05),
+    "training": SceneKind(0, 50, 0.0, 0.1),
     "traffic": SceneKind(30_000, 10_000, 0.8, 0.1),
     "straight": SceneKind(50_000, 10_000, 0.0, 0.0, "SSSSSSSS", middle_lane=True),
     "test": SceneKind(_FIRST_TEST_SCENE, TEST_SCENES, 0.8, 0.1),
