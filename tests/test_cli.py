@@ -120,7 +120,8 @@ def test_bench_prints_all_parts(map_path: Path) -> None:
     result = run("bench", "loop", "ant", "--map", map_path, "--steps", 100, "--json")
     assert result.exit_code == 0, result.output
     data = json.loads(result.output)
-    assert {"bare", "policy", "stimulated", "recorded", "recorded_share", "forward_us"} == data.keys()
+    rates = {"bare", "policy", "stimulated", "recorded", "recorded_share"}
+    assert rates | {"forward_us", "added_us", "imprinted_us"} == data.keys()
     assert all(value > 0 for value in data.values())
 
 

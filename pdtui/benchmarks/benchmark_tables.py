@@ -20,7 +20,8 @@ def loop_benchmark_table(result: ControlLoopBenchmark) -> Table:
         table.add_row(name, f"{rate:.0f}", f"{rate / result.bare:.0%}")
     table.caption = (
         f"Recorded over bare, median of rounds: {result.recorded_share:.0%}. "
-        f"Forward pass with 3 stimulated units: {result.forward_us:.0f} µs."
+        f"Forward pass with 3 units overwritten: {result.forward_us:.0f} µs; with something added to 64: "
+        f"{result.added_us:.0f} µs; with an imprint of 64: {result.imprinted_us:.0f} µs."
     )
     return table
 

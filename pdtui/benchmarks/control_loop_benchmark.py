@@ -18,8 +18,10 @@ from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.sessions.writer.session_recorder import SessionRecorder
+from pdtui.stimulation.interventions.unit_edits import AddToUnits, ImprintUnits
 
 ROUNDS = 7
+_EDITED_UNITS = 64
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,8 @@ class ControlLoopBenchmark:
         recorded: the same with a recorder.
         recorded_share: median over rounds of `recorded` over `bare`.
         forward_us: time of a forward pass with three stimulated units, µs.
+        added_us: the same with something added to 64 units, µs.
+        imprinted_us: the same with an imprint of 64 units, which takes a second pass, µs.
     """
 
     bare: float
@@ -41,6 +45,8 @@ class ControlLoopBenchmark:
     recorded: float
     recorded_share: float
     forward_us: float
+    added_us: float
+    imprinted_us: float
 
 
 def bench_loop(
@@ -71,7 +77,15 @@ def bench_loop(
             progress(done + 1, rounds)
     share = float(np.median(np.array(rates["recorded"]) / np.array(rates["bare"])))
     medians = {name: float(np.median(values)) for name, values in rates.items()}
-    return ControlLoopBenchmark(**medians, recorded_share=share, forward_us=_forward(loop))
+    width = loop.policy.units
+    units = np.arange(min(_EDITED_UNITS, loop.policy.layers[0]))
+    return ControlLoopBenchmark(
+        **medians,
+        recorded_share=share,
+        forward_us=_forward_us(loop, Stimulation((0, width // 2, width - 1), (1.0, -1.0, 2.0))),
+        added_us=_forward_us(loop, Stimulation(edits=(AddToUnits(units, np.full(len(units), 0.1)),))),
+        imprinted_us=_forward_us(loop, Stimulation(edits=(ImprintUnits(units, np.negative),))),
+    )
 
 
 def _actions(loop: ControlLoop, seed: int, steps: int) -> list[np.ndarray]:
@@ -114,10 +128,8 @@ def _whole(loop: ControlLoop, seed: int, steps: int, behavior: str, *, recorded:
         return steps / (time.perf_counter() - start)
 
 
-def _forward(loop: ControlLoop, calls: int = 2000) -> float:
+def _forward_us(loop: ControlLoop, stimulation: Stimulation, calls: int = 2000) -> float:
     observation = loop.robot.observe()
-    width = loop.policy.units
-    stimulation = Stimulation((0, width // 2, width - 1), (1.0, -1.0, 2.0))
     times = []
     for _ in range(ROUNDS):
         start = time.perf_counter()

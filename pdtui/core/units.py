@@ -113,13 +113,14 @@ class UnitEdit(ABC):
         """Return the new outputs of the units, given their outputs so far, each of shape (n,)."""
 
     def bind(
-        self, observation: NDArray[Any], activations: Callable[[NDArray[Any]], NDArray[np.float32]]
+        self, observation: NDArray[Any], activations: Callable[[NDArray[Any], int], NDArray[np.float32]]
     ) -> UnitEdit:
         """Return the edit for one control step; most do not depend on these arguments.
 
         Args:
             observation: what the policy observes.
-            activations: returns what all hidden units would put out for an observation, shape (U,).
+            activations: returns what the hidden units, up to the layer of a flat index, would put out for an
+                observation, shape (U,); the rest is undefined.
         """
         del observation, activations
         return self
@@ -142,13 +143,15 @@ class Stimulation:
     def __bool__(self) -> bool:
         return bool(self.units or self.edits)
 
-    def touched_units(self) -> tuple[int, ...]:
-        """Return the flat indices of all units that it may change, each once."""
+    def touched_units(self) -> NDArray[np.int64]:
+        """Return the flat indices of all units that it may change, each once, shape (n,)."""
+        own = np.array(self.units, np.int64)
         if not self.edits:
-            return self.units
-        edited = np.unique(np.concatenate([edit.units for edit in self.edits])).tolist()
-        own = set(self.units)
-        return (*self.units, *(unit for unit in edited if unit not in own))
+            return own
+        if not self.units and len(self.edits) == 1:
+            return self.edits[0].units
+        edited = [unit for edit in self.edits for unit in edit.units.tolist()]
+        return np.array(list(dict.fromkeys((*self.units, *edited))), np.int64)
 
     @classmethod
     def of(cls, values: Mapping[int, float]) -> Stimulation:

@@ -19,6 +19,8 @@ from pdtui.core.units import Stimulation
 from pdtui.policies.weights.policy_network import ACTIVATIONS
 
 ACTIVATION_TYPES = tuple(ACTIVATIONS.values())
+# Up to this many units, it is faster to overwrite one after the other.
+_FEW = 12
 _TRIALS = 8
 """Observations on which the fast pass is compared with the module."""
 
@@ -75,7 +77,11 @@ class FastMlp:
         values = self._activations
         stimulated = bool(stimulation)
         natural = self._natural if stimulated else values
-        pending = tuple(zip(stimulation.units, stimulation.values, strict=True)) if stimulation.units else ()
+        units, outputs = stimulation.units, stimulation.values
+        few = len(units) <= _FEW
+        pending = tuple(zip(units, outputs, strict=True)) if few and units else ()
+        if not few:
+            places, constants = np.array(units), np.array(outputs, np.float32)
         for calls, low, high in self._parts:
             for call in calls:
                 call()
@@ -84,12 +90,25 @@ class FastMlp:
             for unit, value in pending:
                 if low <= unit < high:
                     values[unit] = value
+            if not few:
+                here = (places >= low) & (places < high)
+                values[places[here]] = constants[here]
             for edit in stimulation.edits:
                 if low <= edit.units[0] < high:
                     values[edit.units] = edit.change(values[edit.units])
         for call in self._rest:
             call()
         return self._output, values.copy(), natural
+
+    def run_layers(self, observation: NDArray[Any], last: int) -> NDArray[np.float32]:
+        """Run the layers up to that of a unit, and return their activations; the rest is undefined."""
+        self._input[:] = observation
+        for calls, _, high in self._parts:
+            for call in calls:
+                call()
+            if last < high:
+                break
+        return self._activations.copy()
 
 
 def make_fast_mlp(module: nn.Module, observations: int) -> FastMlp | None:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any, NamedTuple
 
-import gymnasium
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -203,24 +200,33 @@ class Policy:
         if not stimulation:
             output, activations, _ = self._forward(observation, stimulation)
             return PolicyStep(self._decode(output, rng), activations, stimulation, ())
-        units = stimulation.touched_units()
-        self._check_units(units)
+        places = stimulation.touched_units()
+        for unit in (places.min(), places.max()):
+            if not 0 <= unit < self.units:
+                raise PolicyError(
+                    f"{self.name}: unit number {unit} does not exist; "
+                    f"the policy has {describe_layers(self.layers)}"
+                )
         if stimulation.edits:
-            edits = tuple(edit.bind(observation, self.activations_for) for edit in stimulation.edits)
-            stimulation = replace(stimulation, edits=edits)
+            edits = tuple([edit.bind(observation, self.activations_for) for edit in stimulation.edits])
+            stimulation = Stimulation(stimulation.units, stimulation.values, edits)
         output, activations, natural = self._forward(observation, stimulation)
-        places = list(units)
         if stimulation.edits:
-            stimulation = Stimulation(units, tuple(activations[places].tolist()))
-        return PolicyStep(
-            self._decode(output, rng), activations, stimulation, tuple(natural[places].tolist())
-        )
+            stimulation = Stimulation(tuple(places.tolist()), tuple(activations[places].tolist()))
+        action = self._decode(output, rng)
+        return PolicyStep(action, activations, stimulation, tuple(natural[places].tolist()))
 
-    def activations_for(self, observation: NDArray[Any]) -> NDArray[np.float32]:
-        """Return what all hidden units would put out for an observation, shape (U,).
+    def activations_for(self, observation: NDArray[Any], last: int | None = None) -> NDArray[np.float32]:
+        """Return what the hidden units would put out for an observation, shape (U,).
 
         Nothing is overwritten, and the recurrent state stays as it is.
+
+        Args:
+            observation: An observation of the policy's shape.
+            last: Flat index of the last unit that is asked for; layers after its own are undefined.
         """
+        if self._fast_mlp is not None:
+            return self._fast_mlp.run_layers(observation, self.units - 1 if last is None else last)
         state = self.snapshot()
         activations = self._forward(observation, NO_STIMULATION)[1]
         self.restore(state)
@@ -235,34 +241,3 @@ class Policy:
         self._hooks.begin(stimulation)
         output = self._run_network(observation)
         return output, np.concatenate(self._hooks.outputs), np.concatenate(self._hooks.natural)
-
-    def _check_units(self, units: Sequence[int]) -> None:
-        for unit in units:
-            if not 0 <= unit < self.units:
-                raise PolicyError(
-                    f"{self.name}: unit number {unit} does not exist; "
-                    f"the policy has {describe_layers(self.layers)}"
-                )
-
-
-def check_policy_fit(policy: Policy, world: gymnasium.Env[Any, Any], name: str) -> None:
-    """Check that a policy takes a world's observations and gives its actions, by acting once on zeros.
-
-    Raises:
-        PolicyError: A shape differs; the message states those of the policy and of the robot called `name`.
-    """
-    observed = world.observation_space.shape or ()
-    taken = policy.shape
-    needed = world.action_space.shape or (1,)  # one number for a Discrete space
-    gives = ""
-    if taken == observed:
-        state = policy.snapshot()
-        given = policy.act(np.zeros(observed, np.float32)).action.shape
-        policy.restore(state)
-        if math.prod(given) == math.prod(needed):
-            return
-        gives = f" and gives actions of shape {given}"
-    raise PolicyError(
-        f"policy '{policy.name}' takes observations of shape {taken}{gives}; robot '{name}' has "
-        f"observations of shape {observed} and actions of shape {needed}"
-    )

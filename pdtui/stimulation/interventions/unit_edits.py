@@ -88,6 +88,8 @@ class ImprintUnits(UnitEdit):
     def change(self, outputs: Outputs) -> NDArray[np.floating[Any]]:
         raise AssertionError(f"an imprint of {len(outputs)} units is bound to an observation first")
 
-    def bind(self, observation: NDArray[Any], activations: Callable[[NDArray[Any]], Outputs]) -> UnitEdit:
-        imprinted = activations(self._edit_observation(observation.astype(np.float64)))
+    def bind(
+        self, observation: NDArray[Any], activations: Callable[[NDArray[Any], int], Outputs]
+    ) -> UnitEdit:
+        imprinted = activations(self._edit_observation(observation.astype(np.float64)), int(self.units[-1]))
         return OverwriteUnits(self.units, imprinted[self.units])

@@ -1,0 +1,116 @@
+"""Edits of an observation, against the observation of a robot that really is as the edit says."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pdtui.robots import make_robot
+from pdtui.robots.observation_edits.observation_edit import ObservationEdit
+from pdtui.robots.robot import Robot
+
+
+def _edit(robot: Robot, name: str) -> ObservationEdit:
+    return next(edit for edit in robot.observation_edits if edit.name == name)
+
+
+def _walked(name: str, steps: int = 20) -> tuple[Any, np.ndarray]:
+    """Return a robot that has taken some random steps, and its observation."""
+    robot: Any = make_robot(name)
+    robot.reset(seed=3)
+    rng = np.random.default_rng(0)
+    for _ in range(steps):
+        action = 0.3 * rng.uniform(-1.0, 1.0, robot.action_space.shape).astype(np.float32)
+        observation = robot.step(action)[0]
+    return robot, np.asarray(observation, np.float64)
+
+
+def _turn_ant(robot: Any, angle: float) -> np.ndarray:
+    """Turn the Ant and its velocity about the vertical, and return what it observes."""
+    qpos, qvel = robot.data.qpos.copy(), robot.data.qvel.copy()
+    w, x, y, z = qpos[3:7]
+    c, s = math.cos(angle / 2), math.sin(angle / 2)
+    qpos[3:7] = c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
+    rotation = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    qvel[:2] = rotation @ qvel[:2]
+    robot.set_state(qpos, qvel)
+    return np.asarray(robot.observe())
+
+
+@pytest.mark.parametrize("angle", [0.7, -2.5])
+def test_an_edit_turns_the_ant_as_turning_it_does(angle: float) -> None:
+    robot, observation = _walked("ant")
+    edited = _edit(robot, "turn").apply(observation, angle)
+    np.testing.assert_allclose(edited, _turn_ant(robot, angle), atol=1e-9)
+
+
+def test_an_edit_sets_the_heading_of_the_ant() -> None:
+    robot, observation = _walked("ant")
+    edited = _edit(robot, "heading").apply(observation, 1.2)
+    np.testing.assert_allclose(edited, _turn_ant(robot, 1.2 - robot.read_attributes()[3]), atol=1e-9)
+    assert robot.read_attributes()[3] == pytest.approx(1.2)
+
+
+def test_edits_leave_the_observation_that_they_are_given() -> None:
+    for name in ("ant", "walker", "anymal"):
+        robot, observation = _walked(name, 2)
+        before = observation.copy()
+        for edit in robot.observation_edits:
+            assert not np.array_equal(edit.apply(observation, 0.37), before), (name, edit.name)
+            np.testing.assert_array_equal(observation, before)
+
+
+@pytest.mark.parametrize(("edit", "coordinate"), [("height", 1), ("pitch", 2)])
+def test_edits_of_the_walkers_posture(edit: str, coordinate: int) -> None:
+    robot, observation = _walked("walker")
+    edited = _edit(robot, edit).apply(observation, 0.05)
+    robot.data.qpos[coordinate] += 0.05
+    np.testing.assert_allclose(edited, robot.observe(), atol=1e-9)
+
+
+def test_edits_of_the_walkers_speed() -> None:
+    robot, observation = _walked("walker")
+    faster, fixed = (_edit(robot, name).apply(observation, 1.5) for name in ("faster", "vx"))
+    robot.data.qvel[0] += 1.5
+    np.testing.assert_allclose(faster, robot.observe(), atol=1e-9)
+    robot.data.qvel[0] = 1.5
+    np.testing.assert_allclose(fixed, robot.observe(), atol=1e-9)
+
+
+def test_edits_of_anymals_motion() -> None:
+    robot, observation = _walked("anymal")
+    yaw_rate = _edit(robot, "yaw rate").apply(observation, 0.6)
+    robot.data.qvel[5] += 0.6
+    np.testing.assert_allclose(yaw_rate, robot.observe(), atol=1e-6)
+    robot.data.qvel[5] -= 0.6
+    higher = _edit(robot, "height").apply(observation, 0.1)
+    robot.data.qpos[2] += 0.1
+    np.testing.assert_allclose(higher, robot.observe(), atol=1e-6)
+
+
+def test_edits_of_anymals_commands() -> None:
+    robot, observation = _walked("anymal")
+    asked = _edit(robot, "yaw rate command").apply(observation, -0.8)
+    robot.set_commands({**robot.commands, "yaw rate": -0.8})
+    np.testing.assert_allclose(asked, robot.observe(), atol=1e-6)
+
+
+def test_edits_of_the_a1_move_yaw_and_displacements_together() -> None:
+    robot, observation = _walked("a1", 8)
+    yaw = robot.attribute_index("yaw")
+    assert observation[11] == pytest.approx(robot.read_attributes()[yaw], abs=0.05)  # it is 2 ms old
+    turned = _edit(robot, "turn").apply(observation, 0.5)
+    for place in (11, 15, 19):
+        assert turned[place] == pytest.approx(observation[place] + 0.5)
+    for place in (0, 3, 6):
+        here, there = complex(*observation[place : place + 2]), complex(*turned[place : place + 2])
+        assert there == pytest.approx(here * np.exp(0.5j))
+    faster = _edit(robot, "faster").apply(observation, 2.0)
+    moved = faster[:2] - observation[:2]
+    assert np.hypot(*moved) == pytest.approx(2.0 * robot.control_dt)
+    assert math.atan2(moved[1], moved[0]) == pytest.approx(observation[11])
+    untouched = [place for place in range(93) if place not in (0, 1, 3, 4, 6, 7)]
+    np.testing.assert_array_equal(faster[untouched], observation[untouched])

@@ -1,0 +1,51 @@
+"""What the shipped maps of imprints do, on one seed each; the guide has the figures of many."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pdtui
+
+SEED = 1800
+
+
+@pytest.mark.parametrize(
+    ("robot", "key", "attribute", "low", "high"),
+    [
+        ("ant", "w", "vy", 4.0, 6.0),
+        ("ant", "s", "vy", -6.0, -4.0),
+        ("ant", "a", "yaw rate", 0.6, 1.0),
+        ("ant", "d", "yaw rate", -1.0, -0.6),
+        ("anymal-forward", "a", "yaw rate", 0.6, 0.9),
+        ("anymal-forward", "d", "yaw rate", -0.9, -0.6),
+        ("anymal-forward", "j", "sideways", 0.25, 0.5),
+        ("a1", "a", "yaw rate", 0.4, 0.9),
+    ],
+)
+def test_a_key_steers_until_it_is_let_go(
+    robot: str, key: str, attribute: str, low: float, high: float
+) -> None:
+    drive = pdtui.drive(robot, f"{robot}-imprints", keys={100: key}, steps=500, seed=SEED)
+    assert not drive.endings
+    assert low <= drive[attribute][300:].mean() <= high
+    assert not low <= drive[attribute][40:100].mean() <= high
+
+
+def test_the_ant_faces_where_the_arrow_keys_point() -> None:
+    left = dict.fromkeys(range(61, 69), "left")
+    drive = pdtui.drive("ant", "ant-imprints", keys={60: "h", **left}, steps=600, seed=SEED)
+    assert not drive.endings
+    target = drive["yaw"][59] + 8 * 0.2
+    error = (drive["yaw"][400:] - target + np.pi) % (2 * np.pi) - np.pi
+    assert abs(error.mean()) < 0.15
+
+
+def test_the_walker_stands_and_runs_on() -> None:
+    drive = pdtui.drive("walker", "walker-imprints", keys={250: "x"}, steps=1100, seed=SEED)
+    assert not drive.endings
+    assert drive["speed"][150:250].mean() > 2.5
+    begun = next(step for step, units in enumerate(drive.stimulations) if units)
+    assert begun >= 250
+    assert drive["speed"][begun + 300 : begun + 500].mean() < 0.5
+    assert drive["speed"][-50:].mean() > 2.0
