@@ -11,7 +11,7 @@ from typing import Any
 from pdtui.core.errors import KeystrokeError
 from pdtui.core.robot_links_and_state import RobotState
 from pdtui.policies.runtime.recurrent_state import PolicyState
-from pdtui.stimulation.behavior_latch import LatchState
+from pdtui.stimulation.latched_behavior import LatchState
 
 STEPS_PER_KEPT_STATE = 10
 MAX_KEPT_STATES = 240

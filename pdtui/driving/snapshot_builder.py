@@ -67,7 +67,7 @@ class SnapshotBuilder:
         loop, last = self._loop, self._last
         active = loop.latch.active
         units: tuple[StimulatedUnit, ...] = ()
-        if last is not None and active:
+        if last is not None and loop.latch.is_acting:
             stimulated = zip(last.stimulation.units, last.natural, last.stimulation.values, strict=True)
             units = tuple(StimulatedUnit(*view) for view in stimulated)
         size = len(loop.robot.attributes)

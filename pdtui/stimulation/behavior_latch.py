@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,43 +12,13 @@ from pdtui.core.errors import KeystrokeError
 from pdtui.core.step_record import ActiveBehavior
 from pdtui.core.units import ADDRESS, NO_STIMULATION, Stimulation, UnitEdit, parse_unit
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
-from pdtui.stimulation.interventions.bound_intervention import (
-    BoundIntervention,
-    bind_intervention,
-    overwrite_by_layer,
-)
+from pdtui.stimulation.interventions.bound_intervention import bind_intervention, overwrite_by_layer
 from pdtui.stimulation.interventions.gait_clock import GaitClock, GaitMark
+from pdtui.stimulation.latched_behavior import LatchedBehavior, LatchState
 from pdtui.stimulation.pid_magnitude import PidMagnitude
-from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
+from pdtui.stimulation.stimulation_map import StimulationMap
 
 _NOT_YET = -1
-
-
-@dataclass
-class _LatchedBehavior:
-    behavior: Behavior
-    weights: dict[int, float]
-    base: dict[int, float]
-    interventions: tuple[BoundIntervention, ...]
-    column: int  # of the attribute that the controller holds
-    remaining: int | None  # control steps
-    waiting: int | None  # control steps until its onset; None once it has begun
-    factor: float = 1.0
-    age: int = 0  # control steps since it began
-    controller: PidMagnitude | None = None
-
-    def copy(self) -> _LatchedBehavior:
-        """Copy what changes; behavior, weights and interventions never do."""
-        return replace(self, controller=deepcopy(self.controller))
-
-
-@dataclass(frozen=True)
-class LatchState:
-    """What a latch needs to go on: the latched behaviors, the gait, and the last activations."""
-
-    latched: list[_LatchedBehavior]
-    clocks: dict[GaitMark, GaitClock]
-    activations: NDArray[np.float32] | None
 
 
 class BehaviorLatch:
@@ -77,7 +46,7 @@ class BehaviorLatch:
         observation_edits: tuple[ObservationEdit, ...] = (),
     ) -> None:
         self._map, self._attributes, self._dt, self._layers = stimulation_map, attributes, dt, layers
-        self._behaviors: dict[str, _LatchedBehavior] = {}
+        self._behaviors: dict[str, LatchedBehavior] = {}
         marks: dict[GaitMark, str] = {}
         for name, behavior in stimulation_map.behaviors.items():
             weights, base = (
@@ -96,7 +65,7 @@ class BehaviorLatch:
                 for one in behavior.interventions
             )
             waiting = None if behavior.onset is None else _NOT_YET
-            self._behaviors[name] = _LatchedBehavior(behavior, weights, base, bound, column, steps, waiting)
+            self._behaviors[name] = LatchedBehavior(behavior, weights, base, bound, column, steps, waiting)
             marks |= dict.fromkeys(behavior.marks(), owner)
         self._clocks = {mark: GaitClock(mark, dt) for mark in marks}
         self._signals = {
@@ -105,14 +74,14 @@ class BehaviorLatch:
             else (False, attribute_column(mark.signal, attributes, owner))
             for mark, owner in marks.items()
         }
-        self._latched: list[_LatchedBehavior] = []
+        self._latched: list[LatchedBehavior] = []
         self._activations: NDArray[np.float32] | None = None
         self.commands: dict[str, float] = {}
         """The policy's commands that behaviors set in this control step; updated by `stimulate`."""
 
     @property
     def active(self) -> tuple[ActiveBehavior, ...]:
-        """The latched behaviors, in the order in which they were latched."""
+        """The latched behaviors, in the order in which they were latched, without those that only fade."""
         return tuple(
             ActiveBehavior(
                 one.behavior.name,
@@ -122,7 +91,13 @@ class BehaviorLatch:
                 waiting=one.waiting,
             )
             for one in self._latched
+            if not one.fading
         )
+
+    @property
+    def is_acting(self) -> bool:
+        """Whether any behavior is latched, armed or fading."""
+        return bool(self._latched)
 
     def latch_behavior(self, name: str, attributes: Floats) -> None:
         """Latch a behavior and end those that may not run beside it. A latched behavior starts again.
@@ -136,14 +111,16 @@ class BehaviorLatch:
             known = ", ".join(self._behaviors)
             raise KeystrokeError(f"{self._map.source}: no behavior '{name}'; available: {known}")
         behavior = self._behaviors[name].behavior
-        was_on = any(latched.behavior.name == name for latched in self._latched)
-        self._latched = [
-            latched
-            for latched in self._latched
-            if latched.behavior.name != name
-            and (name in latched.behavior.together or latched.behavior.name in behavior.together)
-        ]
-        if was_on and behavior.pid is not None:
+        own = [one for one in self._latched if one.behavior.name == name]
+        others = [one for one in self._latched if one.behavior.name != name]
+        holds = behavior.pid is not None and any(not one.fading for one in own)
+        kept: list[LatchedBehavior] = []
+        for one in others:
+            beside = name in one.behavior.together or one.behavior.name in behavior.together
+            kept += [one] if beside else one.let_go(self._dt)
+        self._latched = kept
+        if holds:
+            self._latched += [left for one in own for left in one.let_go(self._dt)]
             return
         latched = self._behaviors[name].copy()
         if behavior.pid is not None:
@@ -153,8 +130,8 @@ class BehaviorLatch:
         self._latched.append(latched)
 
     def clear(self) -> None:
-        """End all behaviors, so that no unit is overwritten."""
-        self._latched = []
+        """Let go of all behaviors, so that no unit is changed once those that fade have faded."""
+        self._latched = [left for one in self._latched for left in one.let_go(self._dt)]
 
     def set_target(self, name: str, target: float) -> None:
         """Set the target of a latched behavior of mode ``pid``; for any other, raise a `KeystrokeError`."""
@@ -184,18 +161,20 @@ class BehaviorLatch:
                 continue
             factor = latched.factor
             if latched.controller is not None:
-                factor *= latched.controller.update(float(attributes[latched.column]))
-            self.commands |= {name: weight * factor for name, weight in latched.behavior.commands.items()}
-            own = latched.base | {
-                unit: latched.base.get(unit, 0.0) + weight * factor
-                for unit, weight in latched.weights.items()
-            }
-            if edits:  # what was latched later comes after the edits of what was latched earlier
-                edits += overwrite_by_layer(own, self._layers)
-            else:
-                values |= own
+                pid = latched.controller
+                factor *= pid.magnitude if latched.fading else pid.update(float(attributes[latched.column]))
+            if not latched.fading:  # constants and commands do not fade
+                self.commands |= {name: weight * factor for name, weight in latched.behavior.commands.items()}
+                own = latched.base | {
+                    unit: latched.base.get(unit, 0.0) + weight * factor
+                    for unit, weight in latched.weights.items()
+                }
+                if edits:  # what was latched later comes after the edits of what was latched earlier
+                    edits += overwrite_by_layer(own, self._layers)
+                else:
+                    values |= own
             for one in latched.interventions:
-                edits += one.make_edits(factor, latched.age, attributes, self._clocks)
+                edits += one.make_edits(factor, latched.age, attributes, self._clocks, latched.share)
         return Stimulation(tuple(values), tuple(values.values()), tuple(edits))
 
     def end_step(self, activations: NDArray[np.float32] | None = None) -> None:
@@ -207,14 +186,16 @@ class BehaviorLatch:
         self._activations = activations
         for latched in self._latched:
             if latched.waiting is None:
-                latched.age += 1
+                latched.age += not latched.fading
                 if latched.remaining is not None:
                     latched.remaining -= 1
-        self._latched = [latched for latched in self._latched if latched.remaining != 0]
+        over = [one for one in self._latched if one.remaining == 0]
+        faded = [left for one in over if not one.fading for left in one.let_go(self._dt)]
+        self._latched = faded + [one for one in self._latched if one.remaining != 0]
 
     def start_episode(self) -> None:
-        """End all behaviors and forget the gait."""
-        self.clear()
+        """End all behaviors, without fading, and forget the gait."""
+        self._latched = []
         self._clocks = {mark: GaitClock(mark, self._dt) for mark in self._clocks}
         self._activations = None
 
@@ -236,7 +217,7 @@ class BehaviorLatch:
             elif self._activations is not None:
                 clock.update(float(self._activations[column]))
 
-    def _has_begun(self, latched: _LatchedBehavior) -> bool:
+    def _has_begun(self, latched: LatchedBehavior) -> bool:
         """Return whether a behavior acts in this control step, and note how long it still waits."""
         onset = latched.behavior.onset
         if onset is None or latched.waiting is None:
@@ -245,8 +226,8 @@ class BehaviorLatch:
         latched.waiting = None if left == 0 else _NOT_YET if left is None else left
         return latched.waiting is None
 
-    def _find_latched(self, name: str) -> _LatchedBehavior:
+    def _find_latched(self, name: str) -> LatchedBehavior:
         for latched in self._latched:
-            if latched.behavior.name == name:
+            if latched.behavior.name == name and not latched.fading:
                 return latched
         raise KeystrokeError(f"behavior '{name}' is not latched")

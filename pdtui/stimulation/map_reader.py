@@ -34,6 +34,8 @@ MAX_BEHAVIORS = 1000
 """Largest number of behaviors, and of primitives."""
 MAX_PERIOD = 1e6
 """Longest activation period, s: eleven days."""
+MAX_FADE = 60.0
+"""Longest time over which interventions fade, s."""
 _MAX_DOTS = 64
 _BETWEEN = re.compile(r"[=,{}\[\]\n#]")
 
@@ -228,9 +230,19 @@ def _read_behavior(
         commands=commands,
         interventions=interventions,
         onset=onset,
+        fade=_read_fade(table, bool(interventions)),
     )
     table.done()
     return behavior
+
+
+def _read_fade(table: MapTableReader, fades: bool) -> float:
+    fade: float = table.number("fade", 0.0)
+    if not 0.0 <= fade <= MAX_FADE or (fade and not fades):
+        raise table.error(
+            "fade", f"expected 0 to {MAX_FADE:g} s, and interventions that can fade, found {fade:g}"
+        )
+    return fade
 
 
 def _check_key(table: MapTableReader, behavior: Behavior, owners: dict[str, str]) -> None:

@@ -46,7 +46,7 @@ _MAX_POLICY_PART = 20_000
 _MAX_INLINE = 5
 """Units that are written on one line; more of them get a line each."""
 _OPTIONAL_FIELDS = (
-    "says mode period task onset magnitudes base commands interventions together pid aim measured"
+    "says mode period task onset fade magnitudes base commands interventions together pid aim measured"
 )
 """Fields of a behavior in the order in which they are written."""
 

@@ -91,6 +91,7 @@ class Behavior:
             unit that is not named.
         interventions: Further changes of hidden units while it is latched, in their order.
         onset: The moment of the gait at which it begins after its key was pressed; None begins at once.
+        fade: Time over which its interventions fade when it is let go, s.
         commands: Values of the robot's commands, by name, while it is latched. In mode ``pid``, weights that
             are multiplied by the controller's output.
         period: Activation period T, s; None lasts until another key is pressed.
@@ -117,6 +118,7 @@ class Behavior:
     commands: dict[str, float] = field(default_factory=dict)
     interventions: tuple[Intervention, ...] = ()
     onset: Onset | None = None
+    fade: float = 0.0
 
     def marks(self) -> tuple[GaitMark, ...]:
         """Return the moments of the gait that must be tracked for it."""

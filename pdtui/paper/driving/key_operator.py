@@ -24,11 +24,11 @@ from pdtui.paper.driving.road_sight import RoadSight
 
 PRESSES_PER_SECOND = 3
 """Largest number of key presses in any second."""
-PATIENCE_STANDING, PATIENCE_MOVING, PATIENCE_EDGE = 3.4, 1.4, 1.0
+PATIENCE_STANDING, PATIENCE_MOVING, PATIENCE_EDGE = 3.4, 1.4, 2.0
 """Times before a conflict at which it acts: with what stands, with what moves, and with an edge, s."""
 NEAR_STANDING = 20.0
 """Distance from something that stands in the way at which it acts although the car is slow, m."""
-IMPROVEMENT, LAST_IMPROVEMENT = 1.0, 0.6
+IMPROVEMENT, LAST_IMPROVEMENT = 1.0, 0.4
 """Time by which a lane change must postpone the next conflict, s: usually, and in the last moment."""
 STOPPING_ROOM, CREEPING_ROOM = 18.0, 2.0
 """Distances from something that stands at which a fast and a slow car are to stop, m: to change lanes

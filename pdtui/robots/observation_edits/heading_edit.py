@@ -91,7 +91,9 @@ def _name_edits(
 ) -> tuple[ObservationEdit, ObservationEdit]:
     return (
         ObservationEdit(
-            "heading", "rad", "the torso, and its velocity with it, heads in this direction", face
+            "heading", "rad", "the torso, and its velocity with it, heads in this direction", face, wraps=True
         ),
-        ObservationEdit("turn", "rad", "torso and velocity are turned to the left by this much", turn),
+        ObservationEdit(
+            "turn", "rad", "torso and velocity are turned to the left by this much", turn, wraps=True
+        ),
     )

@@ -17,12 +17,14 @@ class ObservationEdit:
         unit: Unit of its size.
         says: What it makes the observation say, as in "the torso is turned by so much".
         apply: Returns the edited observation, given the observation and the size; it copies.
+        wraps: Whether its size is an angle, of which whole turns make no difference.
     """
 
     name: str
     unit: str
     says: str
     apply: Callable[[Floats, float], Floats]
+    wraps: bool = False
 
 
 def set_number(index: int, name: str, unit: str, says: str, scale: float = 1.0) -> ObservationEdit:

@@ -237,4 +237,6 @@ def _decode_active_behavior(name: str, values: Sequence[float]) -> ActiveBehavio
     steps, until = (
         None if count is None or math.isinf(count) else int(count) for count in (remaining, waiting)
     )
-    return ActiveBehavior(name, steps, math.nan if factor is None else factor, *controller, waiting=until)
+    target, value, error, magnitude = controller
+    own = math.nan if factor is None else factor
+    return ActiveBehavior(name, steps, own, target, value, error, magnitude, until)

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.core.attributes import Attribute, Floats, attribute_column
+from pdtui.core.attributes import Attribute, Floats, attribute_column, wrap_angle
 from pdtui.core.errors import MapError, PolicyError
 from pdtui.core.units import UnitEdit, parse_unit, split_flat_index
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
@@ -24,8 +24,9 @@ from pdtui.stimulation.interventions.unit_edits import (
     SetCoordinates,
 )
 
-# Makes the edits of a control step at a strength, some seconds after the behavior began.
-_MakeEdits = Callable[[float, float], tuple[UnitEdit, ...]]
+# Makes the edits of a control step at a strength, some seconds after the behavior began, of which a share is
+# left while it fades.
+_MakeEdits = Callable[[float, float, float], tuple[UnitEdit, ...]]
 
 
 class BoundIntervention:
@@ -42,7 +43,12 @@ class BoundIntervention:
         self._intervention, self._make, self._column, self._dt = intervention, make, column, dt
 
     def make_edits(
-        self, strength: float, age: int, attributes: Floats, clocks: Mapping[GaitMark, GaitClock]
+        self,
+        strength: float,
+        age: int,
+        attributes: Floats,
+        clocks: Mapping[GaitMark, GaitClock],
+        share: float = 1.0,
     ) -> tuple[UnitEdit, ...]:
         """Return the edits of a control step; none while a gate is closed.
 
@@ -51,12 +57,13 @@ class BoundIntervention:
             age: Control steps since the behavior began.
             attributes: The robot's present attributes, shape (J,).
             clocks: The moments of the gait that the map's behaviors follow.
+            share: How much of it is left while it fades, 1 to 0.
         """
         gate = self._gate(age, attributes, clocks)
         # An imprint of size 0 is one, too: it shows the network the world as it is, or as its base says.
         if gate == 0.0 or (strength == 0.0 and self._intervention.kind != "imprint"):
             return ()
-        return self._make(gate * strength, age * self._dt)
+        return self._make(gate * strength, age * self._dt, share)
 
     def _gate(self, age: int, attributes: Floats, clocks: Mapping[GaitMark, GaitClock]) -> float:
         one, gate = self._intervention, 1.0
@@ -139,8 +146,13 @@ def _group_by_layer(
 
 
 def _edit_units(
-    intervention: Intervention, groups: Sequence[tuple[NDArray[np.int64], Floats]], strength: float, _: float
+    intervention: Intervention,
+    groups: Sequence[tuple[NDArray[np.int64], Floats]],
+    strength: float,
+    _: float,
+    share: float,
 ) -> tuple[UnitEdit, ...]:
+    strength *= share
     if intervention.kind == "overwrite":
         return tuple(OverwriteUnits(units, strength * values) for units, values in groups)
     if intervention.kind == "add":
@@ -154,7 +166,7 @@ def _bind_clamp(intervention: Intervention, layers: Sequence[int]) -> _MakeEdits
     for units in _split_by_layer(ranges, layers):
         low, high = np.array([ranges[unit] for unit in units]).T
         edits.append(ClampUnits(np.array(units), low, high))
-    return lambda _strength, _seconds: tuple(edits)
+    return lambda _strength, _seconds, _share: tuple(edits)
 
 
 def _layer_units(
@@ -178,9 +190,9 @@ def _bind_direction(
     units, rows = _layer_units(intervention.vectors, layers, vectors, owner)
     coordinates = np.array(intervention.coordinates)
     if intervention.sets:
-        return lambda strength, _: (SetCoordinates(units, rows, strength * coordinates),)
+        return lambda strength, _, share: (SetCoordinates(units, rows, share * strength * coordinates),)
     added = coordinates @ rows
-    return lambda strength, _: (AddToUnits(units, strength * added),)
+    return lambda strength, _, share: (AddToUnits(units, share * strength * added),)
 
 
 def _bind_affine(
@@ -198,7 +210,7 @@ def _bind_affine(
             f"{owner}: '{intervention.read}': expected {len(write)} vectors of the layer of "
             f"'{intervention.vectors}'"
         )
-    return lambda strength, _: (AddAffine(units, write, read, bias, strength),)
+    return lambda strength, _, share: (AddAffine(units, write, read, bias, share * strength),)
 
 
 def _bind_imprint(
@@ -221,15 +233,17 @@ def _bind_imprint(
             addresses[address] = 0.0
     groups = [units for units, _ in _group_by_layer(addresses, layers)]
 
-    def edit_observation(observation: Floats, strength: float, seconds: float) -> Floats:
+    def edit_observation(observation: Floats, strength: float, seconds: float, share: float) -> Floats:
         for name in names:
             grown = intervention.values.get(name, 0.0) + seconds * intervention.rates.get(name, 0.0)
             size = intervention.base.get(name, 0.0) + strength * grown
+            if share < 1.0:  # the shorter way back
+                size = share * (wrap_angle(size) if by_name[name].wraps else size)
             observation = by_name[name].apply(observation, size)
         return observation
 
-    def make_edits(strength: float, seconds: float) -> tuple[UnitEdit, ...]:
-        edit = partial(edit_observation, strength=strength, seconds=seconds)
+    def make_edits(strength: float, seconds: float, share: float) -> tuple[UnitEdit, ...]:
+        edit = partial(edit_observation, strength=strength, seconds=seconds, share=share)
         return tuple(ImprintUnits(units, edit) for units in groups)
 
     return make_edits

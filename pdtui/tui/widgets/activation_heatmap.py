@@ -22,6 +22,9 @@ from pdtui.tui.widgets.unit_table import behaviors_of_units
 
 _LABEL = 4  # width of the layers' numbers, in cells
 
+# More stimulated units than this are summed up.
+_MAX_MARKED = 16
+
 
 class ActivationHeatmap(SnapshotWidget):
     """Draws two rows of pixels per line in half blocks: cold is negative, warm is positive, dark is zero.
@@ -92,6 +95,8 @@ class ActivationHeatmap(SnapshotWidget):
         assert self.snapshot is not None
         names = behaviors_of_units(self.map, self.snapshot.active_behaviors, self.facts.layers)
         units = sorted(self.snapshot.stimulated_units, key=lambda view: view.unit)
+        if len(units) > _MAX_MARKED:
+            return self._sum_up(width, units)
         marks = [(self._column(view, columns, places), view) for view in units]
         marks.sort(key=lambda mark: mark[0])
         row, hidden = ScreenRow(width), 0
@@ -110,6 +115,21 @@ class ActivationHeatmap(SnapshotWidget):
             row.add(" " * (target - at), style).add(text, style)
         if hidden and row.left >= 4:
             row.add(f"+{hidden}".rjust(row.left), STYLES.muted)
+        return row.strip()
+
+    def _sum_up(self, width: int, units: list[StimulatedUnit]) -> Strip:
+        """Return the line that says how many units of each layer are changed, and how far on average."""
+        assert self.facts is not None
+        changes: dict[int, list[float]] = {}
+        for view in units:
+            layer = split_flat_index(view.unit, self.facts.layers)[0]
+            changes.setdefault(layer, []).append(abs(view.overwritten - view.natural))
+        row = ScreenRow(width)
+        for layer, sizes in changes.items():
+            mean = format_number(sum(sizes) / len(sizes))
+            text = f"▲ {len(sizes)} units of layer {layer} changed by {mean} on average  "
+            if len(text) <= row.left:
+                row.add(text, STYLES.accent)
         return row.strip()
 
     def _column(self, view: StimulatedUnit, columns: int, places: list[tuple[int, int]]) -> int:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.attributes import Attribute
+from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 from pdtui.stimulation.behavior_latch import BehaviorLatch
 from pdtui.stimulation.map_reader import parse_map
 
@@ -146,3 +147,60 @@ def test_a_foot_that_bounces_counts_once() -> None:
             begins = step
         latch.end_step()
     assert begins == 9
+
+
+FADING = "fade = 0.4\n" + ADD
+
+
+def test_a_behavior_fades_when_it_is_let_go() -> None:
+    latch = _latch(FADING)
+    added = []
+    latch.latch_behavior("it", _gait(0))
+    for step in range(9):
+        if step == 3:
+            latch.clear()
+        edits = latch.stimulate(_gait(step)).edits
+        added.append(float(edits[0].change(np.zeros(1, np.float32))[0]) if edits else 0.0)
+        assert [one.name for one in latch.active] == (["it"] if step < 3 else [])
+        latch.end_step()
+    np.testing.assert_allclose(added, [1, 1, 1, 0.8, 0.6, 0.4, 0.2, 0, 0], atol=1e-6)
+
+
+def test_a_period_that_ends_fades_too() -> None:
+    added = _added(_latch("period = 0.3\n" + FADING), 9)
+    np.testing.assert_allclose(added, [1, 1, 1, 0.8, 0.6, 0.4, 0.2, 0, 0], atol=1e-6)
+
+
+def test_a_turn_fades_by_the_shorter_way() -> None:
+    sizes: list[float] = []
+
+    def note(observation: np.ndarray, size: float) -> np.ndarray:
+        sizes.append(size)
+        return observation
+
+    text = """
+schema = 1
+robot = "walker"
+[policy]
+name = "walker"
+sha256 = ""
+[[behaviors]]
+name = "it"
+key = "a"
+fade = 0.2
+[[behaviors.interventions]]
+kind = "imprint"
+units = ["0:1"]
+values = {turn = 6.0}
+"""
+    edit = ObservationEdit("turn", "rad", "it is turned", note, wraps=True)
+    latch = BehaviorLatch(parse_map(text, "m"), (4,), ATTRIBUTES, DT, (edit,))
+    latch.latch_behavior("it", _gait(0))
+    for step in range(3):
+        if step == 1:
+            latch.clear()
+        for one in latch.stimulate(_gait(step)).edits:
+            one.bind(np.zeros(2), lambda _observation, _last: np.zeros(4, np.float32))
+        latch.end_step()
+    short = 6.0 - 2 * np.pi
+    np.testing.assert_allclose(sizes, [6.0, short * 2 / 3, short / 3])

@@ -273,6 +273,7 @@ sha256 = ""
 name = "it"
 key = "a"
 onset = {{signal = "height", crosses = "down", level = 1.2, delay = 0.3}}
+fade = 1.5
 [[behaviors.interventions]]
 kind = "direction"
 vectors = "u"

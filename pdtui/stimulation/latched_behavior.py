@@ -1,0 +1,71 @@
+"""What a latch keeps of each latched behavior."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdtui.stimulation.interventions.bound_intervention import BoundIntervention
+from pdtui.stimulation.interventions.gait_clock import GaitClock, GaitMark
+from pdtui.stimulation.pid_magnitude import PidMagnitude
+from pdtui.stimulation.stimulation_map import Behavior
+
+
+@dataclass
+class LatchedBehavior:
+    """A behavior that is latched, armed or fading.
+
+    Attributes:
+        behavior: The behavior.
+        weights, base: Weights and base outputs by flat index.
+        interventions: Its interventions, ready to act.
+        column: Column of the attribute that the controller holds.
+        remaining: Control steps until it ends; None if it lasts.
+        waiting: Control steps until its onset, −1 while that cannot be known; None once it has begun.
+        factor: Factor by which the operator scaled it.
+        age: Control steps since it began.
+        fading: Control steps over which it fades; 0 while it is latched.
+        controller: The controller of mode ``pid``.
+    """
+
+    behavior: Behavior
+    weights: dict[int, float]
+    base: dict[int, float]
+    interventions: tuple[BoundIntervention, ...]
+    column: int
+    remaining: int | None
+    waiting: int | None
+    factor: float = 1.0
+    age: int = 0
+    fading: int = 0
+    controller: PidMagnitude | None = None
+
+    @property
+    def share(self) -> float:
+        """How much of it is left while it fades."""
+        return (self.remaining or 0) / (self.fading + 1) if self.fading else 1.0
+
+    def let_go(self, dt: float) -> list[LatchedBehavior]:
+        """Return what is left of it once it is let go: nothing, unless it fades."""
+        if self.fading:
+            return [self]
+        steps = round(self.behavior.fade / dt)
+        if not steps or self.waiting is not None:
+            return []
+        return [replace(self, fading=steps, remaining=steps)]
+
+    def copy(self) -> LatchedBehavior:
+        """Copy what changes; behavior, weights and interventions never do."""
+        return replace(self, controller=deepcopy(self.controller))
+
+
+@dataclass(frozen=True)
+class LatchState:
+    """What a latch needs to go on: the latched behaviors, the gait, and the last activations."""
+
+    latched: list[LatchedBehavior]
+    clocks: dict[GaitMark, GaitClock]
+    activations: NDArray[np.float32] | None
