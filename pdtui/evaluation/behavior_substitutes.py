@@ -105,15 +105,14 @@ class InterventionSizeMeter:
         self.observations.append(observation.copy())
         state = self._policy.snapshot()
         acted = self._policy.act(observation, stimulation, rng)
-        if stimulation.units:
+        if stimulation:
             after = self._policy.snapshot()
             self._policy.restore(state)
             self._shifts.append(acted.action - self._policy.act(observation).action)
             self._policy.restore(after)
             lengths: dict[int, float] = {}
-            for unit, value, natural in zip(
-                stimulation.units, stimulation.values, acted.natural, strict=True
-            ):
+            changed = acted.stimulation
+            for unit, value, natural in zip(changed.units, changed.values, acted.natural, strict=True):
                 layer = split_flat_index(unit, self._policy.layers)[0]
                 lengths[layer] = lengths.get(layer, 0.0) + (value - natural) ** 2
             for layer, length in lengths.items():
@@ -179,7 +178,7 @@ def act_in_place(
     def act_with_substitute(
         observation: NDArray[Any], stimulation: Stimulation, rng: np.random.Generator | None
     ) -> PolicyStep:
-        if not stimulation.units:
+        if not stimulation:
             return act(observation, stimulation, rng)
         return substitute.act(policy, robot, observation)
 

@@ -20,6 +20,7 @@ from pdtui.evaluation.held_run import HeldRunPlan, drive_held_run, measure_inter
 from pdtui.evaluation.protocol_settings import RunTimes
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
+from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.turning_robot import turning_loop
 
@@ -78,6 +79,26 @@ def test_the_push_is_measured_where_the_behavior_is_held(loop: ControlLoop, poli
     assert found.layers[0] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-5)
     assert set(found.layers) == {0, 1}
     assert measure_intervention(loop, HeldRunPlan("", 5, TIMES)).size is None
+
+
+def test_an_intervention_is_measured_and_replaced_as_constants_are(map_text: str) -> None:
+    text = map_text + """
+[[behaviors]]
+name = "nudge"
+key = "k"
+aim = { attribute = "vy", direction = "increase" }
+[[behaviors.interventions]]
+kind = "add"
+values = { "0:3" = 0.3, "0:4" = -0.4 }
+"""
+    loop = build_control_loop(DriveConfig("ant", parse_map(text, "m"), 0))
+    found = measure_intervention(loop, HeldRunPlan("nudge", 5, TIMES)).size
+    assert found is not None
+    assert found.layers == {0: pytest.approx(0.5, rel=1e-5)}
+    shift = ActionShift(found.action)
+    records = list(drive_held_run(loop, HeldRunPlan("nudge", 5, TIMES, substitute=shift)))
+    held = slice(TIMES.press, TIMES.press + TIMES.held)
+    assert not any(record.stimulation.units for record in records[held])
 
 
 def test_a_substitute_acts_only_while_the_behavior_is_held() -> None:
