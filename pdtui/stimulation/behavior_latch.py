@@ -82,17 +82,7 @@ class BehaviorLatch:
     @property
     def active(self) -> tuple[ActiveBehavior, ...]:
         """The latched behaviors, in the order in which they were latched, without those that only fade."""
-        return tuple(
-            ActiveBehavior(
-                one.behavior.name,
-                one.remaining,
-                one.factor,
-                *((pid.target, pid.value, pid.error, pid.magnitude) if (pid := one.controller) else ()),
-                waiting=one.waiting,
-            )
-            for one in self._latched
-            if not one.fading
-        )
+        return tuple(one.view() for one in self._latched if not one.fading)
 
     @property
     def is_acting(self) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.core.step_record import ActiveBehavior
 from pdtui.stimulation.interventions.bound_intervention import BoundIntervention
 from pdtui.stimulation.interventions.gait_clock import GaitClock, GaitMark
 from pdtui.stimulation.pid_magnitude import PidMagnitude
@@ -47,6 +48,15 @@ class LatchedBehavior:
     def share(self) -> float:
         """How much of it is left while it fades."""
         return (self.remaining or 0) / (self.fading + 1) if self.fading else 1.0
+
+    def view(self) -> ActiveBehavior:
+        """Return what the screen shows of it, and sessions record."""
+        target = value = error = magnitude = None
+        if (pid := self.controller) is not None:
+            target, value, error, magnitude = pid.target, pid.value, pid.error, pid.magnitude
+        return ActiveBehavior(
+            self.behavior.name, self.remaining, self.factor, target, value, error, magnitude, self.waiting
+        )
 
     def let_go(self, dt: float) -> list[LatchedBehavior]:
         """Return what is left of it once it is let go: nothing, unless it fades."""

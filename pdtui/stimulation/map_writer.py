@@ -8,47 +8,34 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import AoT, InlineTable, Table
 
 from pdtui.core.atomic_file import write_file
-from pdtui.core.attributes import BehaviorAim
 from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.robots.options.robot_option import RobotOptions
-from pdtui.stimulation.interventions.intervention_fields import (
-    compose_intervention,
-    compose_onset,
-    compose_vectors,
+from pdtui.stimulation.interventions.intervention_fields import compose_vectors
+from pdtui.stimulation.map_fields import (
+    behavior_fields,
+    effect_table,
+    policy_fields,
+    primitive_fields,
+    table_of,
 )
 from pdtui.stimulation.map_reader import ROBOT_OPTIONS, parse_map
 from pdtui.stimulation.seed_ranges import format_seed_ranges, merge_seed_ranges, parse_seed_range
-from pdtui.stimulation.stimulation_map import (
-    SCHEMA,
-    Behavior,
-    MeasuredEffect,
-    MotorPrimitive,
-    PidGains,
-    StimulationMap,
-)
+from pdtui.stimulation.stimulation_map import SCHEMA, Behavior, MeasuredEffect, PidGains, StimulationMap
 
 Value = TypeVar("Value")
 _HEADER = re.compile(r"^[ \t]*\[", re.MULTILINE)
 _POLICY_HEADER = re.compile(r"[ \t]*\[[ \t]*[\"']?policy[\"']?[ \t]*\]")
 _MAX_POLICY_PART = 20_000
 """Characters of the table of the policy, or of the map up to its first table."""
-_MAX_INLINE = 5
-"""Units that are written on one line; more of them get a line each."""
-_OPTIONAL_FIELDS = (
-    "says mode period task onset fade magnitudes base commands interventions together pid aim measured"
-)
-"""Fields of a behavior in the order in which they are written."""
 
 
 def compose_map(stimulation_map: StimulationMap, comments: Sequence[str] = ()) -> str:
@@ -61,17 +48,17 @@ def compose_map(stimulation_map: StimulationMap, comments: Sequence[str] = ()) -
     if stimulation_map.seeds:
         document.add("seeds", tomlkit.item(format_seed_ranges(stimulation_map.seeds)))
     if stimulation_map.robot_options:
-        document.add(ROBOT_OPTIONS, _table_of(stimulation_map.robot_options))
+        document.add(ROBOT_OPTIONS, table_of(stimulation_map.robot_options))
     policy = stimulation_map.policy, stimulation_map.policy_hash, stimulation_map.import_options
-    document.add("policy", _table_of(_policy_fields(*policy)))
-    document.add("keys", _table_of({"default": stimulation_map.default_key}))
-    primitives = [_primitive_fields(one) for one in stimulation_map.primitives.values()]
-    behaviors = [_behavior_fields(one) for one in stimulation_map.behaviors.values()]
+    document.add("policy", table_of(policy_fields(*policy)))
+    document.add("keys", table_of({"default": stimulation_map.default_key}))
+    primitives = [primitive_fields(one) for one in stimulation_map.primitives.values()]
+    behaviors = [behavior_fields(one) for one in stimulation_map.behaviors.values()]
     vectors = [compose_vectors(one) for one in stimulation_map.vectors.values()]
     for name, tables in (("vectors", vectors), ("primitives", primitives), ("behaviors", behaviors)):
         array = tomlkit.aot()
         for fields in tables:
-            array.append(_table_of(fields))
+            array.append(table_of(fields))
         if tables:
             document.add(name, array)
     text = tomlkit.dumps(document)
@@ -83,7 +70,7 @@ def replace_effects(text: str, measured: Mapping[str, MeasuredEffect], source: s
     """Return the text of a map with other measured effects of behaviors, given by name."""
 
     def replace(behavior: Any, effect: MeasuredEffect) -> None:
-        behavior["measured"] = _effect_table(effect)
+        behavior["measured"] = effect_table(effect)
 
     return _edit_behaviors(text, source, measured, replace)
 
@@ -112,7 +99,7 @@ def replace_policy(text: str, name: str, import_options: ImportOptions, source: 
             raise KeyError("policy")
         part = tomlkit.parse(text[start:end])
         policy: Any = part["policy"]
-        policy.update(_policy_fields(name, policy["sha256"], import_options))
+        policy.update(policy_fields(name, policy["sha256"], import_options))
     except (TOMLKitError, KeyError, AttributeError) as error:
         raise MapError(f"{source}: expected the policy in a table [policy] of its own") from error
     changed = f"{text[:start]}{tomlkit.dumps(part)}{text[end:]}"
@@ -126,24 +113,24 @@ def replace_robot_options(text: str, options: RobotOptions, source: str) -> str:
     def replace(document: Any) -> None:
         document.pop(ROBOT_OPTIONS, None)
         if options:
-            document.add(ROBOT_OPTIONS, _table_of(options))
+            document.add(ROBOT_OPTIONS, table_of(options))
 
     return _edit(text, source, replace)
 
 
 def add_behavior(text: str, behavior: Behavior, source: str) -> str:
     """Return the text of a map with one more behavior; one of the same name is replaced but keeps its key."""
-    fields = _behavior_fields(behavior)
+    fields = behavior_fields(behavior)
 
     def add(document: Any) -> None:
         behaviors = document.setdefault("behaviors", tomlkit.aot())
         table = next((one for one in behaviors if one["name"] == behavior.name), None)
         if table is None:
-            behaviors.append(_table_of(fields))
+            behaviors.append(table_of(fields))
             return
         for name in [name for name in table if name not in ("name", "key")]:
             del table[name]
-        for name, value in _table_of(fields).items():
+        for name, value in table_of(fields).items():
             if name not in ("name", "key"):
                 table[name] = value
 
@@ -196,68 +183,3 @@ def _edit(text: str, source: str, change: Callable[[Any], None]) -> str:
     changed = tomlkit.dumps(document)
     parse_map(changed, source)
     return changed
-
-
-def _policy_fields(name: str, sha256: str, import_options: ImportOptions) -> dict[str, Any]:
-    """Return the fields of the policy's table. Import options that say nothing are left out."""
-    options = {option: value for option, value in asdict(import_options).items() if value}
-    return {"name": name, "sha256": sha256, **options}
-
-
-def _primitive_fields(primitive: MotorPrimitive) -> dict[str, Any]:
-    """Return the fields of a motor primitive. What is not known is left out."""
-    return {name: _to_toml(value) for name, value in vars(primitive).items() if value is not None}
-
-
-def _behavior_fields(behavior: Behavior) -> dict[str, Any]:
-    """Return the fields of a behavior. Those that have their default are left out."""
-    fields: dict[str, Any] = {"name": behavior.name, "key": behavior.key}
-    for name in _OPTIONAL_FIELDS.split():
-        value = getattr(behavior, name)
-        if name == "interventions" and value:
-            fields[name] = _tables_of(map(compose_intervention, value))
-        elif name == "onset" and value:
-            fields[name] = _inline(compose_onset(value))
-        elif value and (name, value) != ("mode", "fixed"):
-            fields[name] = _to_toml(value)
-    return fields
-
-
-def _to_toml(value: Any) -> Any:
-    if isinstance(value, MeasuredEffect):
-        return _effect_table(value)
-    if isinstance(value, PidGains | BehaviorAim):
-        return _inline(asdict(value))
-    if isinstance(value, dict):
-        return _inline(value) if len(value) <= _MAX_INLINE else _table_of(value)
-    return list(value) if isinstance(value, tuple) else value
-
-
-def _effect_table(measured: MeasuredEffect) -> InlineTable:
-    """Return an effect with four significant digits, and the falls where they were counted."""
-    numbers = {name: float(f"{getattr(measured, name):.4g}") for name in ("effect", "low", "high")}
-    if measured.falls is None or measured.of is None:
-        return _inline(numbers)
-    return _inline({**numbers, "falls": measured.falls, "of": measured.of})
-
-
-def _table_of(fields: Mapping[str, Any]) -> Table:
-    """Return a table with a line for each field. Subtables come last, as TOML requires."""
-    table = tomlkit.table()
-    for name, value in sorted(fields.items(), key=lambda field: isinstance(field[1], Table | AoT)):
-        table.add(name, value)
-    return table
-
-
-def _tables_of(entries: Iterable[Mapping[str, Any]]) -> AoT:
-    """Return an array of tables whose tables of a few numbers are on one line."""
-    array = tomlkit.aot()
-    for fields in entries:
-        array.append(_table_of({name: _to_toml(value) for name, value in fields.items()}))
-    return array
-
-
-def _inline(values: Mapping[str, Any]) -> InlineTable:
-    table = tomlkit.inline_table()
-    table.update(values)
-    return table

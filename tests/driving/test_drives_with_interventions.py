@@ -90,4 +90,4 @@ def test_the_session_holds_what_an_imprint_came_to(further_map: Path) -> None:
     driven = drive("ant", further_map, keys={5: "a"}, steps=20, seed=3)
     stimulation = driven.stimulations[12]
     values = driven.activations[12, list(stimulation.units)]
-    np.testing.assert_array_equal(np.float32(stimulation.values), values)
+    np.testing.assert_array_equal(np.array(stimulation.values, np.float32), values)

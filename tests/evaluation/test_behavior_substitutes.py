@@ -82,7 +82,9 @@ def test_the_push_is_measured_where_the_behavior_is_held(loop: ControlLoop, poli
 
 
 def test_an_intervention_is_measured_and_replaced_as_constants_are(map_text: str) -> None:
-    text = map_text + """
+    text = (
+        map_text
+        + """
 [[behaviors]]
 name = "nudge"
 key = "k"
@@ -91,6 +93,7 @@ aim = { attribute = "vy", direction = "increase" }
 kind = "add"
 values = { "0:3" = 0.3, "0:4" = -0.4 }
 """
+    )
     loop = build_control_loop(DriveConfig("ant", parse_map(text, "m"), 0))
     found = measure_intervention(loop, HeldRunPlan("nudge", 5, TIMES)).size
     assert found is not None
