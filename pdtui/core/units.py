@@ -112,7 +112,7 @@ class UnitEdit(ABC):
     def change(self, outputs: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
         """Return the new outputs of the units, given their outputs so far, each of shape (n,)."""
 
-    def bind(
+    def prepare(
         self, observation: NDArray[Any], activations: Callable[[NDArray[Any], int], NDArray[np.float32]]
     ) -> UnitEdit:
         """Return the edit for one control step; most do not depend on these arguments.

@@ -10,7 +10,7 @@ from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.runtime.policy_fit import check_policy_fit
+from pdtui.policies.runtime.policy_compatibility import check_policy_fit
 from pdtui.policies.weights.import_options import ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot

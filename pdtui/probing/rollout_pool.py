@@ -11,7 +11,7 @@ from typing import TypeVar
 from pdtui.core.closable import Closable
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
 from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.runtime.policy_fit import check_policy_fit
+from pdtui.policies.runtime.policy_compatibility import check_policy_fit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.probing.start_states import StartState

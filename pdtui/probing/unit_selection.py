@@ -37,7 +37,7 @@ class PrimitiveCandidate:
     sign: float
 
 
-def select_outputs_by_action(
+def select_outputs_by_action_change(
     robot: Robot,
     policy: Policy,
     values: Sequence[float],

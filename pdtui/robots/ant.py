@@ -14,7 +14,7 @@ from pdtui.core.outcome import fall_info
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
 from pdtui.robots.observation_edits.heading_edit import quaternion_heading_edits
-from pdtui.robots.observation_edits.observation_edit import add_to_number
+from pdtui.robots.observation_edits.observation_edit import offset_observed_number
 from pdtui.robots.robot import TrainingRecipe
 from pdtui.robots.simulators.mujoco_robot import (
     MujocoRobot,
@@ -42,7 +42,7 @@ class Ant(MujocoRobot, AntEnv):
     title = "Ant (MuJoCo)"
     observation_edits = (
         *quaternion_heading_edits(quaternion=1, velocity=13),
-        add_to_number(0, "height", "m", "the torso is higher by this much"),
+        offset_observed_number(0, "height offset", "m", "the torso is higher by this much"),
     )
     training_recipe = TrainingRecipe(options={"forward": "x"})
 

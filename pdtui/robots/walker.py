@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.core.outcome import fall_info
 from pdtui.robots.joint_and_trunk_attributes import torque_attributes
-from pdtui.robots.observation_edits.observation_edit import add_to_number, set_number
+from pdtui.robots.observation_edits.observation_edit import offset_observed_number, set_observed_number
 from pdtui.robots.robot import TrainingRecipe
 from pdtui.robots.simulators.mujoco_robot import (
     MujocoRobot,
@@ -143,10 +143,10 @@ class Walker(MujocoRobot, Walker2dEnv):
     tasks = WALKER_TASKS
     state_arrays = ("_in_air",)
     observation_edits = (
-        add_to_number(0, "height", "m", "the torso is higher by this much"),
-        add_to_number(1, "pitch", "rad", "the torso leans forward by this much more"),
-        set_number(8, "vx", "m/s", "it moves forward at this speed"),
-        add_to_number(8, "faster", "m/s", "it moves forward faster by this much"),
+        offset_observed_number(0, "height offset", "m", "the torso is higher by this much"),
+        offset_observed_number(1, "pitch offset", "rad", "the torso leans forward by this much more"),
+        set_observed_number(8, "vx", "m/s", "it moves forward at this speed"),
+        offset_observed_number(8, "speed offset", "m/s", "it moves forward faster by this much"),
     )
     training_recipe = TrainingRecipe({"alternate": True, "top_speed": 3.4}, {"discount": 0.995})
 

@@ -13,7 +13,7 @@ from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import Stimulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_pool import RolloutPool
-from pdtui.probing.unit_selection import select_outputs_by_action
+from pdtui.probing.unit_selection import select_outputs_by_action_change
 from pdtui.robots.robot import Robot
 from pdtui.robots.task import Task, TaskVerdict
 from pdtui.search.evolutionary_search import Deadline, EvolutionarySearch, EvolutionProblem
@@ -184,7 +184,7 @@ class TaskSearch:
         if self._units is None and limit is not None and limit < units:
             options = {"start": self._task.start} if self._task.start else None
             values = sorted({*settings.values, *settings.strong_values})
-            chosen = select_outputs_by_action(
+            chosen = select_outputs_by_action_change(
                 self._pool.robot, self._pool.policy, values, limit, seed=self._seed, options=options
             )
             return list(chosen)

@@ -164,7 +164,7 @@ class BehaviorLatch:
                 else:
                     values |= own
             for one in latched.interventions:
-                edits += one.make_edits(factor, latched.age, attributes, self._clocks, latched.share)
+                edits += one.make_edits(factor, latched.age, attributes, self._clocks, latched.fade_factor)
         return Stimulation(tuple(values), tuple(values.values()), tuple(edits))
 
     def end_step(self, activations: NDArray[np.float32] | None = None) -> None:
@@ -212,7 +212,7 @@ class BehaviorLatch:
         onset = latched.behavior.onset
         if onset is None or latched.waiting is None:
             return True
-        left = self._clocks[onset.mark].steps_until(round(onset.delay / self._dt))
+        left = self._clocks[onset.mark].control_steps_until(round(onset.delay / self._dt))
         latched.waiting = None if left == 0 else _NOT_YET if left is None else left
         return latched.waiting is None
 

@@ -45,7 +45,7 @@ class LatchedBehavior:
     controller: PidMagnitude | None = None
 
     @property
-    def share(self) -> float:
+    def fade_factor(self) -> float:
         """How much of it is left while it fades."""
         return (self.remaining or 0) / (self.fading + 1) if self.fading else 1.0
 

@@ -11,7 +11,7 @@ from tomlkit.items import AoT, InlineTable, Table
 
 from pdtui.core.attributes import BehaviorAim
 from pdtui.policies.weights.import_options import ImportOptions
-from pdtui.stimulation.interventions.intervention_fields import compose_intervention, compose_onset
+from pdtui.stimulation.interventions.intervention_fields import intervention_fields, onset_fields
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect, MotorPrimitive, PidGains
 
 _MAX_INLINE = 5
@@ -39,9 +39,9 @@ def behavior_fields(behavior: Behavior) -> dict[str, Any]:
     for name in _OPTIONAL_FIELDS.split():
         value = getattr(behavior, name)
         if name == "interventions" and value:
-            fields[name] = _tables_of(map(compose_intervention, value))
+            fields[name] = _tables_of(map(intervention_fields, value))
         elif name == "onset" and value:
-            fields[name] = _inline(compose_onset(value))
+            fields[name] = _inline(onset_fields(value))
         elif value and (name, value) != ("mode", "fixed"):
             fields[name] = _to_toml(value)
     return fields

@@ -19,7 +19,7 @@ from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.robots.options.robot_option import RobotOptions
-from pdtui.stimulation.interventions.intervention_fields import compose_vectors
+from pdtui.stimulation.interventions.intervention_fields import vectors_fields
 from pdtui.stimulation.map_fields import (
     behavior_fields,
     effect_table,
@@ -54,7 +54,7 @@ def compose_map(stimulation_map: StimulationMap, comments: Sequence[str] = ()) -
     document.add("keys", table_of({"default": stimulation_map.default_key}))
     primitives = [primitive_fields(one) for one in stimulation_map.primitives.values()]
     behaviors = [behavior_fields(one) for one in stimulation_map.behaviors.values()]
-    vectors = [compose_vectors(one) for one in stimulation_map.vectors.values()]
+    vectors = [vectors_fields(one) for one in stimulation_map.vectors.values()]
     for name, tables in (("vectors", vectors), ("primitives", primitives), ("behaviors", behaviors)):
         array = tomlkit.aot()
         for fields in tables:

@@ -23,7 +23,7 @@ together = ["nudge"]
 [[behaviors.interventions]]
 kind = "imprint"
 units = ["0:*"]
-rates = {turn = -0.8}
+rates = {"heading offset" = -0.8}
 [[behaviors]]
 name = "nudge"
 key = "k"
@@ -40,7 +40,7 @@ pid = {attribute = "yaw", kp = 0.4, ki = 0.25, kd = 0.0, limit = 100.0, step = 0
 [[behaviors.interventions]]
 kind = "imprint"
 units = ["0:1", "0:2"]
-values = {turn = -1.0}
+values = {"heading offset" = -1.0}
 """
 
 

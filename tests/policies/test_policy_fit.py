@@ -9,7 +9,7 @@ from torch import nn
 from pdtui.core.errors import PolicyError
 from pdtui.policies.runtime.action_decoders import decode_categorical_action, decode_mean_action
 from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.runtime.policy_fit import check_policy_fit
+from pdtui.policies.runtime.policy_compatibility import check_policy_fit
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots import make_robot
 

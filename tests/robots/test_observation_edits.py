@@ -43,7 +43,7 @@ def _turn_ant(robot: Any, angle: float) -> np.ndarray:
 @pytest.mark.parametrize("angle", [0.7, -2.5])
 def test_an_edit_turns_the_ant_as_turning_it_does(angle: float) -> None:
     robot, observation = _walked("ant")
-    edited = _edit(robot, "turn").apply(observation, angle)
+    edited = _edit(robot, "heading offset").apply(observation, angle)
     np.testing.assert_allclose(edited, _turn_ant(robot, angle), atol=1e-9)
 
 
@@ -63,7 +63,7 @@ def test_edits_leave_the_observation_that_they_are_given() -> None:
             np.testing.assert_array_equal(observation, before)
 
 
-@pytest.mark.parametrize(("edit", "coordinate"), [("height", 1), ("pitch", 2)])
+@pytest.mark.parametrize(("edit", "coordinate"), [("height offset", 1), ("pitch offset", 2)])
 def test_edits_of_the_walkers_posture(edit: str, coordinate: int) -> None:
     robot, observation = _walked("walker")
     edited = _edit(robot, edit).apply(observation, 0.05)
@@ -73,7 +73,7 @@ def test_edits_of_the_walkers_posture(edit: str, coordinate: int) -> None:
 
 def test_edits_of_the_walkers_speed() -> None:
     robot, observation = _walked("walker")
-    faster, fixed = (_edit(robot, name).apply(observation, 1.5) for name in ("faster", "vx"))
+    faster, fixed = (_edit(robot, name).apply(observation, 1.5) for name in ("speed offset", "vx"))
     robot.data.qvel[0] += 1.5
     np.testing.assert_allclose(faster, robot.observe(), atol=1e-9)
     robot.data.qvel[0] = 1.5
@@ -82,11 +82,11 @@ def test_edits_of_the_walkers_speed() -> None:
 
 def test_edits_of_anymals_motion() -> None:
     robot, observation = _walked("anymal")
-    yaw_rate = _edit(robot, "yaw rate").apply(observation, 0.6)
+    yaw_rate = _edit(robot, "yaw rate offset").apply(observation, 0.6)
     robot.data.qvel[5] += 0.6
     np.testing.assert_allclose(yaw_rate, robot.observe(), atol=1e-6)
     robot.data.qvel[5] -= 0.6
-    higher = _edit(robot, "height").apply(observation, 0.1)
+    higher = _edit(robot, "height offset").apply(observation, 0.1)
     robot.data.qpos[2] += 0.1
     np.testing.assert_allclose(higher, robot.observe(), atol=1e-6)
 
@@ -102,13 +102,13 @@ def test_edits_of_the_a1_move_yaw_and_displacements_together() -> None:
     robot, observation = _walked("a1", 8)
     yaw = robot.attribute_index("yaw")
     assert observation[11] == pytest.approx(robot.read_attributes()[yaw], abs=0.05)  # it is 2 ms old
-    turned = _edit(robot, "turn").apply(observation, 0.5)
+    turned = _edit(robot, "heading offset").apply(observation, 0.5)
     for place in (11, 15, 19):
         assert turned[place] == pytest.approx(observation[place] + 0.5)
     for place in (0, 3, 6):
         here, there = complex(*observation[place : place + 2]), complex(*turned[place : place + 2])
         assert there == pytest.approx(here * np.exp(0.5j))
-    faster = _edit(robot, "faster").apply(observation, 2.0)
+    faster = _edit(robot, "speed offset").apply(observation, 2.0)
     moved = faster[:2] - observation[:2]
     assert np.hypot(*moved) == pytest.approx(2.0 * robot.control_dt)
     assert math.atan2(moved[1], moved[0]) == pytest.approx(observation[11])

@@ -208,7 +208,7 @@ class Policy:
                     f"the policy has {describe_layers(self.layers)}"
                 )
         if stimulation.edits:
-            edits = tuple([edit.bind(observation, self.activations_for) for edit in stimulation.edits])
+            edits = tuple([edit.prepare(observation, self.activations_for) for edit in stimulation.edits])
             stimulation = Stimulation(stimulation.units, stimulation.values, edits)
         output, activations, natural = self._forward(observation, stimulation)
         if stimulation.edits:
@@ -216,17 +216,17 @@ class Policy:
         action = self._decode(output, rng)
         return PolicyStep(action, activations, stimulation, tuple(natural[places].tolist()))
 
-    def activations_for(self, observation: NDArray[Any], last: int | None = None) -> NDArray[np.float32]:
+    def activations_for(self, observation: NDArray[Any], last_unit: int | None = None) -> NDArray[np.float32]:
         """Return what the hidden units would put out for an observation, shape (U,).
 
         Nothing is overwritten, and the recurrent state stays as it is.
 
         Args:
             observation: An observation of the policy's shape.
-            last: Flat index of the last unit that is asked for; layers after its own are undefined.
+            last_unit: Flat index of the last unit that is asked for; layers after its own are undefined.
         """
         if self._fast_mlp is not None:
-            return self._fast_mlp.run_layers(observation, self.units - 1 if last is None else last)
+            return self._fast_mlp.run_layers(observation, self.units - 1 if last_unit is None else last_unit)
         state = self.snapshot()
         activations = self._forward(observation, NO_STIMULATION)[1]
         self.restore(state)

@@ -1,4 +1,4 @@
-"""Edits of the heading in an observation: "heading" sets it and "turn" adds to it, both in rad.
+"""Edits of the heading in an observation: "heading" sets it and "heading offset" adds to it, both in rad.
 
 The velocity in the world turns with the trunk, so that the robot seems to do the same in another direction.
 """
@@ -14,7 +14,7 @@ from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 
 
 def quaternion_heading_edits(quaternion: int, velocity: int) -> tuple[ObservationEdit, ObservationEdit]:
-    """Return the edits "heading" and "turn" of an observation that holds the trunk's quaternion.
+    """Return the edits "heading" and "heading offset" of an observation that holds the trunk's quaternion.
 
     Args:
         quaternion: Index in the observation of the trunk's quaternion w x y z.
@@ -40,7 +40,7 @@ def quaternion_heading_edits(quaternion: int, velocity: int) -> tuple[Observatio
 def yaw_heading_edits(
     yaws: Sequence[int], velocities: Sequence[int]
 ) -> tuple[ObservationEdit, ObservationEdit]:
-    """Return the edits "heading" and "turn" of an observation that holds the trunk's yaw.
+    """Return the edits "heading" and "heading offset" of an observation that holds the trunk's yaw.
 
     Args:
         yaws: Indices in the observation of the yaw, now and in earlier steps; the first is the present one.
@@ -63,7 +63,7 @@ def yaw_heading_edits(
 
 
 def displacement_edit(yaws: Sequence[int], displacements: Sequence[int], dt: float) -> ObservationEdit:
-    """Return the edit "faster" of an observation that holds yaw and displacement of several steps.
+    """Return the edit "speed offset" of an observation that holds yaw and displacement of several steps.
 
     Args:
         yaws, displacements: Indices in the observation of each step's yaw, and of its displacement x y.
@@ -78,7 +78,7 @@ def displacement_edit(yaws: Sequence[int], displacements: Sequence[int], dt: flo
             edited[index + 1] += y
         return edited
 
-    return ObservationEdit("faster", "m/s", "it moves the way that it faces faster by this much", move)
+    return ObservationEdit("speed offset", "m/s", "it moves the way that it faces faster by this much", move)
 
 
 def _rotate(x: float, y: float, angle: float) -> tuple[float, float]:
@@ -94,6 +94,10 @@ def _name_edits(
             "heading", "rad", "the torso, and its velocity with it, heads in this direction", face, wraps=True
         ),
         ObservationEdit(
-            "turn", "rad", "torso and velocity are turned to the left by this much", turn, wraps=True
+            "heading offset",
+            "rad",
+            "torso and velocity are turned to the left by this much",
+            turn,
+            wraps=True,
         ),
     )

@@ -27,7 +27,7 @@ class ObservationEdit:
     wraps: bool = False
 
 
-def set_number(index: int, name: str, unit: str, says: str, scale: float = 1.0) -> ObservationEdit:
+def set_observed_number(index: int, name: str, unit: str, says: str, scale: float = 1.0) -> ObservationEdit:
     """Return an edit that sets one number of the observation to size × scale."""
 
     def apply(observation: Floats, size: float) -> Floats:
@@ -38,7 +38,9 @@ def set_number(index: int, name: str, unit: str, says: str, scale: float = 1.0) 
     return ObservationEdit(name, unit, says, apply)
 
 
-def add_to_number(index: int, name: str, unit: str, says: str, scale: float = 1.0) -> ObservationEdit:
+def offset_observed_number(
+    index: int, name: str, unit: str, says: str, scale: float = 1.0
+) -> ObservationEdit:
     """Return an edit that adds size × scale to one number of the observation."""
 
     def apply(observation: Floats, size: float) -> Floats:

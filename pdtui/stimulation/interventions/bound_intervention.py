@@ -189,7 +189,7 @@ def _bind_direction(
 ) -> _MakeEdits:
     units, rows = _layer_units(intervention.vectors, layers, vectors, owner)
     coordinates = np.array(intervention.coordinates)
-    if intervention.sets:
+    if intervention.sets_coordinates:
         return lambda strength, _, share: (SetCoordinates(units, rows, share * strength * coordinates),)
     added = coordinates @ rows
     return lambda strength, _, share: (AddToUnits(units, share * strength * added),)
@@ -199,7 +199,7 @@ def _bind_affine(
     intervention: Intervention, layers: Sequence[int], vectors: Mapping[str, LayerVectors], owner: str
 ) -> _MakeEdits:
     units, write = _layer_units(intervention.vectors, layers, vectors, owner)
-    read_units, read = _layer_units(intervention.read, layers, vectors, owner)
+    read_units, read = _layer_units(intervention.readout, layers, vectors, owner)
     bias = np.zeros(len(units), np.float32)
     if intervention.bias:
         bias_units, (bias, *_) = _layer_units(intervention.bias, layers, vectors, owner)
@@ -207,7 +207,7 @@ def _bind_affine(
             raise PolicyError(f"{owner}: '{intervention.bias}' is of another layer than the rest of the edit")
     if read_units[0] != units[0] or len(read) != len(write):
         raise PolicyError(
-            f"{owner}: '{intervention.read}': expected {len(write)} vectors of the layer of "
+            f"{owner}: '{intervention.readout}': expected {len(write)} vectors of the layer of "
             f"'{intervention.vectors}'"
         )
     return lambda strength, _, share: (AddAffine(units, write, read, bias, share * strength),)

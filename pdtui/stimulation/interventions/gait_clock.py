@@ -16,20 +16,20 @@ class GaitMark:
         signal: Name of an attribute, or address of a hidden unit.
         crosses: Direction of the crossing.
         level: The level, in the signal's unit.
-        apart: Least time between two moments, s, so that a foot that bounces counts once.
+        minimum_spacing: Least time between two moments, s, so that a foot that bounces counts once.
     """
 
     signal: str
     crosses: CrossingDirection = "up"
     level: float = 0.0
-    apart: float = 0.1
+    minimum_spacing: float = 0.1
 
 
 class GaitClock:
     """Counts the control steps since the last moment of a mark.
 
     Attributes:
-        since: Control steps since the last moment, 0 in the step in which it comes; None before the first.
+        control_steps_since: Steps since the last moment, 0 in which it comes; None before the first.
         period: Control steps between the last two moments; None before the second.
 
     Args:
@@ -38,38 +38,38 @@ class GaitClock:
     """
 
     def __init__(self, mark: GaitMark, dt: float) -> None:
-        self._mark, self._apart = mark, mark.apart / dt
+        self._mark, self._apart = mark, mark.minimum_spacing / dt
         self._last: float | None = None
-        self.since: int | None = None
+        self.control_steps_since: int | None = None
         self.period: int | None = None
 
     @property
     def phase(self) -> float | None:
         """The phase in [0, 1): 0 at the moment, and just under 1 when the next is due or late."""
-        if self.since is None or self.period is None:
+        if self.control_steps_since is None or self.period is None:
             return None
-        return min(self.since / self.period, 1.0 - 1e-9)
+        return min(self.control_steps_since / self.period, 1.0 - 1e-9)
 
     def update(self, value: float) -> None:
         """Take the signal's value before a control step; call it once per control step."""
         level, last = self._mark.level, self._last
         self._last = value
-        if self.since is not None:
-            self.since += 1
+        if self.control_steps_since is not None:
+            self.control_steps_since += 1
         if last is None:
             return
         crossed = last <= level < value if self._mark.crosses == "up" else last >= level > value
-        if crossed and (self.since is None or self.since >= self._apart):
-            self.period, self.since = self.since, 0
+        if crossed and (self.control_steps_since is None or self.control_steps_since >= self._apart):
+            self.period, self.control_steps_since = self.control_steps_since, 0
 
-    def steps_until(self, delay: int) -> int | None:
+    def control_steps_until(self, delay: int) -> int | None:
         """Return the control steps until a delay after a moment is over, as the last period predicts it.
 
         Returns:
             0 in the very step; None while that cannot be known.
         """
-        if self.since is None:
+        if self.control_steps_since is None:
             return None
-        if self.since <= delay:
-            return delay - self.since
-        return None if self.period is None else max(1, self.period - self.since) + delay
+        if self.control_steps_since <= delay:
+            return delay - self.control_steps_since
+        return None if self.period is None else max(1, self.period - self.control_steps_since) + delay

@@ -72,13 +72,13 @@ class TimeGate:
         times: When each factor begins to hold, s, increasing from 0.
         factors: The factors.
         repeat: Time after which the table begins again, s; None holds the last factor.
-        ramps: Whether the factor changes linearly from one time to the next, instead of in steps.
+        interpolate: Whether the factor changes linearly from one time to the next, instead of in steps.
     """
 
     times: tuple[float, ...]
     factors: tuple[float, ...]
     repeat: float | None = None
-    ramps: bool = False
+    interpolate: bool = False
 
     def factor(self, seconds: float) -> float:
         """Return the factor at a time since the behavior began."""
@@ -86,7 +86,7 @@ class TimeGate:
         seconds += 5e-7
         if self.repeat is not None:
             seconds %= self.repeat
-        if self.ramps:
+        if self.interpolate:
             return float(np.interp(seconds, self.times, self.factors))
         return self.factors[int(np.searchsorted(self.times, seconds, side="right")) - 1]
 
@@ -130,10 +130,10 @@ class Intervention:
         ranges: Low and high end by unit address, for a clamp.
         units: Addresses of the units that an imprint patches; ``0:*`` stands for a whole layer.
         vectors: U of a direction, or W of an affine edit, by name.
-        read: V of an affine edit, by name.
+        readout: V of an affine edit, by name.
         bias: b of an affine edit, by name; empty for none.
         coordinates: α of a direction, one for each vector.
-        sets: Whether a direction sets coordinates; otherwise it adds to them.
+        sets_coordinates: Whether a direction sets coordinates; otherwise it adds to them.
         phase_gate, range_gate, time_gate: What the strength depends on besides; None for nothing.
     """
 
@@ -144,10 +144,10 @@ class Intervention:
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
     units: tuple[str, ...] = ()
     vectors: str = ""
-    read: str = ""
+    readout: str = ""
     bias: str = ""
     coordinates: tuple[float, ...] = ()
-    sets: bool = False
+    sets_coordinates: bool = False
     phase_gate: PhaseGate | None = None
     range_gate: RangeGate | None = None
     time_gate: TimeGate | None = None

@@ -10,21 +10,31 @@ from pdtui.stimulation.interventions.gait_clock import GaitMark
 from pdtui.stimulation.interventions.intervention import Intervention, LayerVectors, Onset
 
 
-def compose_vectors(vectors: LayerVectors) -> dict[str, Any]:
+def vectors_fields(vectors: LayerVectors) -> dict[str, Any]:
     """Return the fields of vectors."""
     data = base64.b64encode(vectors.rows.astype("<f4").tobytes()).decode("ascii")
     return {"name": vectors.name, "layer": vectors.layer, "count": len(vectors.rows), "data": data}
 
 
-def compose_onset(onset: Onset) -> dict[str, Any]:
+def onset_fields(onset: Onset) -> dict[str, Any]:
     """Return the fields of an onset."""
     return {**_mark_fields(onset.mark), "delay": onset.delay}
 
 
-def compose_intervention(one: Intervention) -> dict[str, Any]:
+def intervention_fields(one: Intervention) -> dict[str, Any]:
     """Return the fields of an intervention that it uses."""
     fields: dict[str, Any] = {"kind": one.kind}
-    for name in ("values", "base", "rates", "units", "vectors", "read", "bias", "coordinates", "sets"):
+    for name in (
+        "values",
+        "base",
+        "rates",
+        "units",
+        "vectors",
+        "readout",
+        "bias",
+        "coordinates",
+        "sets_coordinates",
+    ):
         if value := getattr(one, name):
             fields[name] = value
     if one.ranges:
@@ -40,7 +50,12 @@ def compose_intervention(one: Intervention) -> dict[str, Any]:
 
 
 def _mark_fields(mark: GaitMark) -> dict[str, Any]:
-    return {"signal": mark.signal, "crosses": mark.crosses, "level": mark.level, "apart": mark.apart}
+    return {
+        "signal": mark.signal,
+        "crosses": mark.crosses,
+        "level": mark.level,
+        "minimum_spacing": mark.minimum_spacing,
+    }
 
 
 def _listed(value: Any) -> Any:

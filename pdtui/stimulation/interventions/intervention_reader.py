@@ -80,7 +80,7 @@ def _read_intervention(table: MapTableReader, vectors: Mapping[str, LayerVectors
             found = Intervention(kind, ranges=_read_ranges(table))
         case "direction":
             name = _take_vectors(table, "vectors", vectors)
-            coordinates, sets = table.number_list("coordinates"), table.take("sets", bool, False)
+            coordinates, sets = table.number_list("coordinates"), table.take("sets_coordinates", bool, False)
             rows = vectors[name].rows
             if len(coordinates) != len(rows):
                 raise table.error(
@@ -88,13 +88,13 @@ def _read_intervention(table: MapTableReader, vectors: Mapping[str, LayerVectors
                 )
             if sets and orthonormality_error(rows) > _TOLERANCE:
                 raise table.error("vectors", f"'{name}': expected orthonormal vectors to set coordinates")
-            found = Intervention(kind, vectors=name, coordinates=coordinates, sets=sets)
+            found = Intervention(kind, vectors=name, coordinates=coordinates, sets_coordinates=sets)
         case "affine":
-            write, read = (_take_vectors(table, field, vectors) for field in ("vectors", "read"))
+            write, read = (_take_vectors(table, field, vectors) for field in ("vectors", "readout"))
             bias = _take_vectors(table, "bias", vectors) if table.has("bias") else ""
             if len(vectors[write].rows) != len(vectors[read].rows):
-                raise table.error("read", f"expected as many vectors as '{write}' has")
-            found = Intervention(kind, vectors=write, read=read, bias=bias)
+                raise table.error("readout", f"expected as many vectors as '{write}' has")
+            found = Intervention(kind, vectors=write, readout=read, bias=bias)
         case "imprint":
             values, base = table.numbers("values", {}), table.numbers("base", {})
             rates = table.numbers("rates", {})
@@ -149,10 +149,10 @@ def _read_ranges(table: MapTableReader) -> dict[str, tuple[float, float]]:
 
 def _read_mark(table: MapTableReader) -> GaitMark:
     crosses = cast(CrossingDirection, table.choice("crosses", get_args(CrossingDirection), "up"))
-    apart = table.number("apart", 0.1)
-    if apart < 0.0:
-        raise table.error("apart", f"expected 0 s or more, found {apart:g}")
-    return GaitMark(table.text("signal"), crosses, table.number("level", 0.0), apart)
+    minimum_spacing = table.number("minimum_spacing", 0.1)
+    if minimum_spacing < 0.0:
+        raise table.error("minimum_spacing", f"expected 0 s or more, found {minimum_spacing:g}")
+    return GaitMark(table.text("signal"), crosses, table.number("level", 0.0), minimum_spacing)
 
 
 def _read_phase_gate(parent: MapTableReader) -> PhaseGate | None:
@@ -182,7 +182,7 @@ def _read_time_gate(parent: MapTableReader) -> TimeGate | None:
     if table is None:
         return None
     times, factors = table.number_list("times"), table.number_list("factors")
-    repeat, ramps = table.number("repeat", None), table.take("ramps", bool, False)
+    repeat, interpolate = table.number("repeat", None), table.take("interpolate", bool, False)
     if not times or times[0] != 0.0 or any(b <= a for a, b in pairwise(times)):
         raise table.error("times", "expected times that increase from 0")
     if len(times) != len(factors):
@@ -190,4 +190,4 @@ def _read_time_gate(parent: MapTableReader) -> TimeGate | None:
     if repeat is not None and repeat <= times[-1]:
         raise table.error("repeat", f"expected more than {times[-1]:g} s, found {repeat:g}")
     table.done()
-    return TimeGate(times, factors, repeat, ramps)
+    return TimeGate(times, factors, repeat, interpolate)

@@ -88,7 +88,7 @@ class ImprintUnits(UnitEdit):
     def change(self, outputs: Outputs) -> NDArray[np.floating[Any]]:
         raise AssertionError(f"an imprint of {len(outputs)} units is bound to an observation first")
 
-    def bind(
+    def prepare(
         self, observation: NDArray[Any], activations: Callable[[NDArray[Any], int], Outputs]
     ) -> UnitEdit:
         imprinted = activations(self._edit_observation(observation.astype(np.float64)), int(self.units[-1]))

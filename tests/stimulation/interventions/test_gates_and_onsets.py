@@ -120,7 +120,7 @@ def test_a_time_gate_makes_pulses() -> None:
 
 
 def test_a_time_gate_ramps() -> None:
-    gate = "time_gate = {times = [0.0, 0.4], factors = [0.0, 1.0], ramps = true}"
+    gate = "time_gate = {times = [0.0, 0.4], factors = [0.0, 1.0], interpolate = true}"
     np.testing.assert_allclose(_added(_latch(ADD + gate), 7), [0, 0.25, 0.5, 0.75, 1, 1, 1], atol=1e-5)
 
 
@@ -138,7 +138,7 @@ def test_a_phase_gate_follows_the_gait() -> None:
 
 
 def test_a_foot_that_bounces_counts_once() -> None:
-    latch = _latch(ONSET.replace("delay = 0.4", "delay = 0.4, apart = 1.0"))
+    latch = _latch(ONSET.replace("delay = 0.4", "delay = 0.4, minimum_spacing = 1.0"))
     heights = {5: 0.1, 6: -0.1, 7: 0.1}
     latch.latch_behavior("it", _gait(0))
     begins = None
@@ -200,7 +200,7 @@ values = {turn = 6.0}
         if step == 1:
             latch.clear()
         for one in latch.stimulate(_gait(step)).edits:
-            one.bind(np.zeros(2), lambda _observation, _last: np.zeros(4, np.float32))
+            one.prepare(np.zeros(2), lambda _observation, _last: np.zeros(4, np.float32))
         latch.end_step()
     short = 6.0 - 2 * np.pi
     np.testing.assert_allclose(sizes, [6.0, short * 2 / 3, short / 3])

@@ -14,7 +14,7 @@ from pdtui.core.errors import MapError, PolicyError, RobotError
 from pdtui.core.units import Stimulation
 from pdtui.policies.runtime.policy import Policy, PolicyStep
 from pdtui.robots import make_robot
-from pdtui.robots.observation_edits.observation_edit import add_to_number, set_number
+from pdtui.robots.observation_edits.observation_edit import offset_observed_number, set_observed_number
 from pdtui.stimulation.behavior_latch import BehaviorLatch
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.map_writer import compose_map
@@ -24,8 +24,8 @@ Array = NDArray[np.floating]
 ATTRIBUTES = make_robot("walker").attributes
 AT_REST = np.zeros(len(ATTRIBUTES))
 EDITS = (
-    set_number(0, "first", "m", "the first number has this value", scale=2.0),
-    add_to_number(1, "second", "m", "the second number is larger by this much"),
+    set_observed_number(0, "first", "m", "the first number has this value", scale=2.0),
+    offset_observed_number(1, "second", "m", "the second number is larger by this much"),
 )
 WIDTH, INPUTS = 8, 5
 
@@ -128,7 +128,7 @@ values = {"0:0" = 1.0, "0:5" = 1.0}
 def test_a_direction_sets_or_adds_coordinates(network: Policy) -> None:
     rows = np.linalg.qr(np.random.default_rng(1).normal(size=(WIDTH, 2)))[0].T
     table = '[[behaviors.interventions]]\nkind = "direction"\nvectors = "u"\ncoordinates = [0.4, -0.2]\n'
-    acted, natural = _act(network, table + "sets = true", _vectors("u", rows))
+    acted, natural = _act(network, table + "sets_coordinates = true", _vectors("u", rows))
     h = natural[:WIDTH]
     np.testing.assert_allclose(rows @ acted.activations[:WIDTH], [0.4, -0.2], atol=1e-5)
     expected = h + rows.T @ (np.array([0.4, -0.2]) - rows @ h)
@@ -142,7 +142,7 @@ def test_an_affine_edit_reads_and_writes_vectors(network: Policy) -> None:
     write, read, bias = rng.normal(size=(2, WIDTH)), rng.normal(size=(2, WIDTH)), rng.normal(size=(1, WIDTH))
     acted, natural = _act(
         network,
-        '[[behaviors.interventions]]\nkind = "affine"\nvectors = "w"\nread = "v"\nbias = "b"',
+        '[[behaviors.interventions]]\nkind = "affine"\nvectors = "w"\nreadout = "v"\nbias = "b"',
         _vectors("w", write) + _vectors("v", read) + _vectors("b", bias),
         factor=0.1,
     )
@@ -257,7 +257,7 @@ def test_vectors_of_another_layers_width_are_refused(network: Policy) -> None:
     with pytest.raises(PolicyError, match="expected the 8 numbers of layer 0, found 3"):
         _act(network, table, _vectors("u", np.ones((1, 3))))
     with pytest.raises(MapError, match="orthonormal"):
-        _act(network, table + "\nsets = true", _vectors("u", np.ones((1, WIDTH))))
+        _act(network, table + "\nsets_coordinates = true", _vectors("u", np.ones((1, WIDTH))))
 
 
 def test_a_map_with_interventions_is_written_as_it_is_read() -> None:
@@ -278,13 +278,13 @@ fade = 1.5
 kind = "direction"
 vectors = "u"
 coordinates = [0.5, 1.0]
-sets = true
-time_gate = {{times = [0.0, 1.0], factors = [1.0, 0.0], repeat = 2.0, ramps = true}}
+sets_coordinates = true
+time_gate = {{times = [0.0, 1.0], factors = [1.0, 0.0], repeat = 2.0, interpolate = true}}
 [[behaviors.interventions]]
 kind = "imprint"
 units = ["0:1", "1:*"]
-base = {{height = 0.1}}
-rates = {{pitch = 0.2}}
+base = {{"height offset" = 0.1}}
+rates = {{"pitch offset" = 0.2}}
 phase_gate = {{signal = "0:3", factors = [1.0, 0.0, 0.5]}}
 [[behaviors.interventions]]
 kind = "clamp"
