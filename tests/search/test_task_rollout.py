@@ -147,7 +147,7 @@ def test_standing_up_is_walking_at_the_end() -> None:
 
 
 def test_an_unknown_task_lists_the_robots_own() -> None:
-    with pytest.raises(MapError, match="walker: no task 'fly'; available: slow down, hop"):
+    with pytest.raises(MapError, match="walker: no task 'fly'; available: slow down, stop and go, hop"):
         make_robot("walker").find_task("fly")
     with pytest.raises(MapError, match="ant: no task 'fly'; it has none"):
         make_robot("ant").find_task("fly")

@@ -108,7 +108,7 @@ async def test_contents_and_pages() -> None:
         await pilot.press("t", *"holding a target", "enter")
         assert await shows(pilot, app, "maps")
         await pilot.press("right_square_bracket")
-        assert await shows(pilot, app, "dissecting")
+        assert await shows(pilot, app, "interventions")
         await pilot.press("left_square_bracket", "left_square_bracket")
         assert await shows(pilot, app, "sessions")
 
