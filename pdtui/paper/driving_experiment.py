@@ -52,7 +52,8 @@ def run_driving_experiment(request: ExperimentRequest) -> ExperimentReport:
 def list_compared(given: Sequence[DriveConfig]) -> tuple[list[DriveConfig], dict[str, str]]:
     """Return the drives of all policies of the table, and why others are left out.
 
-    Several maps, or one that is not the car's own, are compared as they are.
+    Several maps, or one that is not the car's own, are compared as they are; a map that is given twice
+    counts once.
     """
     from dataclasses import replace
 
@@ -61,6 +62,8 @@ def list_compared(given: Sequence[DriveConfig]) -> tuple[list[DriveConfig], dict
     from pdtui.stimulation.map_policy_lookup import resolve_map_policy
     from pdtui.stimulation.map_reader import load_map
 
+    maps = {(Path(one.stimulation_map.source).stem, one.stimulation_map.text): one for one in reversed(given)}
+    given = list(reversed(maps.values()))
     first = given[0]
     if len(given) > 1 or Path(first.stimulation_map.source).stem != POLICIES[0] or first.policy:
         return list(given), {}

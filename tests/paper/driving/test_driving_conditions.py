@@ -53,6 +53,7 @@ def test_maps_that_are_named_are_compared_alone() -> None:
     other = replace(OWN, stimulation_map=parse_map(MAP, "mine.toml"))
     assert list_compared([other]) == ([other], {})
     assert list_compared([OWN, other]) == ([OWN, other], {})
+    assert list_compared([other, other]) == ([other], {})
 
 
 def test_what_the_operator_needs_is_named() -> None:
