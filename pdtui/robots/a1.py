@@ -17,7 +17,7 @@ from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
 from pdtui.robots.legged.terrain import RoughGround, draw_rough_ground, scatter_trees
-from pdtui.robots.observation_edits.heading_edit import displacement_edit, yaw_heading_edits
+from pdtui.robots.observation_edits.a1_observation_edits import a1_observation_edits
 from pdtui.robots.robot import ResetResult, StepResult, TrainingRecipe
 from pdtui.robots.simulators import bullet_robot
 from pdtui.robots.simulators.bullet_robot import BulletRobot
@@ -41,8 +41,6 @@ _FRICTION = {"lateralFriction": 1.0, "spinningFriction": 0.01, "rollingFriction"
 # Distance from the trunk to a trunk of a tree within which the legs may touch the tree, m.
 _REACH = 0.8
 _STEPS_BETWEEN_HITS = 31  # half a second
-# Where the observation holds the yaw and the displacement x y of the last 3 control steps.
-_OBSERVED_YAWS, _OBSERVED_DISPLACEMENTS = (11, 15, 19), (0, 3, 6)
 _ALIVE_REWARD, _FALL_PENALTY, _ENERGY_WEIGHT = 0.3, 10.0, 0.0005
 
 
@@ -75,10 +73,7 @@ class A1(BulletRobot):
 
     name = "a1"
     title = "Unitree A1 (PyBullet)"
-    observation_edits = (
-        *yaw_heading_edits(_OBSERVED_YAWS, _OBSERVED_DISPLACEMENTS),
-        displacement_edit(_OBSERVED_YAWS, _OBSERVED_DISPLACEMENTS, _DT * _SUBSTEPS),
-    )
+    observation_edits = a1_observation_edits(_DT * _SUBSTEPS)
     tasks: tuple[Task, ...] = A1_TASKS
     # A policy that runs faster cannot be steered between trees. PyBullet holds Python's lock while it steps,
     # and its steps are slow: batches smaller than the paper's 16384 learn from fewer. A robot takes 70 MB.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pkgutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -206,6 +207,11 @@ class PolicyTrainer(ABC, Generic[Config]):
         """Rescale actions from (−1, 1) to the robot's bounds."""
         scaled = self._low + (squashed + 1.0) * 0.5 * (self._high - self._low)
         return scaled.astype(np.float32)
+
+    def make_own_batch(self, seed: int) -> RobotBatch | None:
+        """Return the batch of all robots that the recipe has a class for, if it has one."""
+        name = self.sample.training_recipe.robot_batch
+        return pkgutil.resolve_name(name)(self.sample, self.config.worlds, seed) if name else None
 
     def _score(self, actor: Actor, first_seed: int) -> ActorScore:
         seeds = range(first_seed, first_seed + self.config.evaluate_episodes)

@@ -5,7 +5,6 @@ MuJoCo releases Python's lock while it steps. For a simulator that does not, eac
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -39,9 +38,8 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
     def build(self) -> None:
         share, recipe = self.config.worlds // THREADS, self.sample.training_recipe
         seeds = [self.seed * 10 + 1 + n for n in range(THREADS)]
-        if recipe.robot_batch:
-            batch = pkgutil.resolve_name(recipe.robot_batch)
-            self.batches = [batch(self.sample, self.config.worlds, seeds[0])]
+        if (own := self.make_own_batch(seeds[0])) is not None:
+            self.batches = [own]
         elif self.config.processes:
             self.batches = [RemoteRobotBatch(self.robot, self.robot_options, share, seed) for seed in seeds]
         else:

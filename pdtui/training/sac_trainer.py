@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pkgutil
 from typing import Any
 
 import numpy as np
@@ -59,12 +58,8 @@ class SacTrainer(PolicyTrainer[SacConfig]):
 
     def build(self) -> None:
         config = self.config
-        recipe = self.sample.training_recipe
-        if recipe.robot_batch:
-            batch = pkgutil.resolve_name(recipe.robot_batch)
-            self.batches = [batch(self.sample, config.worlds, self.seed)]
-        else:
-            self.batches = [RobotBatch(self.make, config.worlds, self.seed)]
+        own = self.make_own_batch(self.seed)
+        self.batches = [own or RobotBatch(self.make, config.worlds, self.seed)]
         self.learner = SacLearner(config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self.replay = ReplayBuffer(config.capacity, self.observations, self.actions)

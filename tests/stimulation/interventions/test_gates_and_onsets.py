@@ -9,6 +9,7 @@ from pdtui.core.attributes import Attribute
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 from pdtui.stimulation.behavior_latch import BehaviorLatch
 from pdtui.stimulation.map_reader import parse_map
+from tests.stimulation.interventions.walker_map import MAP_HEAD
 
 ATTRIBUTES = (Attribute("foot clearance", "m"), Attribute("speed", "m/s"))
 PERIOD = 20  # control steps of a made-up gait
@@ -16,13 +17,7 @@ DT = 0.1
 
 
 def _latch(behavior: str) -> BehaviorLatch:
-    text = f"""
-schema = 1
-robot = "walker"
-[policy]
-name = "walker"
-sha256 = ""
-[[behaviors]]
+    text = f"""{MAP_HEAD}[[behaviors]]
 name = "it"
 key = "a"
 {behavior}
@@ -178,12 +173,9 @@ def test_a_turn_fades_by_the_shorter_way() -> None:
         sizes.append(size)
         return observation
 
-    text = """
-schema = 1
-robot = "walker"
-[policy]
-name = "walker"
-sha256 = ""
+    text = (
+        MAP_HEAD
+        + """
 [[behaviors]]
 name = "it"
 key = "a"
@@ -193,6 +185,7 @@ kind = "imprint"
 units = ["0:1"]
 values = {turn = 6.0}
 """
+    )
     edit = ObservationEdit("turn", "rad", "it is turned", note, wraps=True)
     latch = BehaviorLatch(parse_map(text, "m"), (4,), ATTRIBUTES, DT, (edit,))
     latch.latch_behavior("it", _gait(0))

@@ -18,6 +18,7 @@ from pdtui.robots.observation_edits.observation_edit import offset_observed_numb
 from pdtui.stimulation.behavior_latch import BehaviorLatch
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.map_writer import compose_map
+from tests.stimulation.interventions.walker_map import MAP_HEAD
 
 Array = NDArray[np.floating]
 
@@ -54,13 +55,7 @@ def network(request: pytest.FixtureRequest) -> Policy:
 
 def _act(network: Policy, behavior: str, top: str = "", factor: float = 1.0) -> tuple[PolicyStep, Array]:
     """Latch the behavior, act once, and return the step and what the units put out without it."""
-    text = f"""
-schema = 1
-robot = "walker"
-[policy]
-name = "walker"
-sha256 = ""
-{top}
+    text = f"""{MAP_HEAD}{top}
 [[behaviors]]
 name = "it"
 key = "a"
@@ -204,12 +199,9 @@ def test_a_recurrent_state_does_not_notice_an_imprint() -> None:
 
 
 def test_what_is_latched_later_decides(network: Policy) -> None:
-    text = """
-schema = 1
-robot = "walker"
-[policy]
-name = "walker"
-sha256 = ""
+    text = (
+        MAP_HEAD
+        + """
 [[behaviors]]
 name = "adds"
 key = "a"
@@ -222,6 +214,7 @@ name = "sets"
 key = "b"
 magnitudes = {"0:1" = 1.0}
 """
+    )
     observation = np.linspace(-1.0, 1.0, INPUTS)
     for order, expected in ((("adds", "sets"), 1.0), (("sets", "adds"), 6.0)):
         latch = BehaviorLatch(parse_map(text, "m"), network.layers, ATTRIBUTES, 0.1)
@@ -262,13 +255,7 @@ def test_vectors_of_another_layers_width_are_refused(network: Policy) -> None:
 
 def test_a_map_with_interventions_is_written_as_it_is_read() -> None:
     rows = np.linalg.qr(np.random.default_rng(1).normal(size=(WIDTH, 2)))[0].T
-    text = f"""
-schema = 1
-robot = "walker"
-[policy]
-name = "walker"
-sha256 = ""
-{_vectors("u", rows)}
+    text = f"""{MAP_HEAD}{_vectors("u", rows)}
 [[behaviors]]
 name = "it"
 key = "a"
