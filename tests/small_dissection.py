@@ -7,6 +7,7 @@ from pathlib import Path
 import torch
 
 from pdtui.dissection.dissection_config import DissectionSettings
+from pdtui.dissection.steering.steering_comparison import SteeringSettings
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import save_network
 from pdtui.search.behavior_search import BehaviorSearchSettings
@@ -26,6 +27,9 @@ SMALL = DissectionSettings(
     judge_starts=3,
     controls=6,
     held_steps=20,
+    steering=SteeringSettings(
+        starts=2, units=1, values=(3.0,), lengths=(1.0,), readings=(2.0,), factors=(2.0,), random=2
+    ),
     search_starts=2,
     selection_starts=2,
     held_out_starts=2,

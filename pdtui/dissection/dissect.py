@@ -19,6 +19,9 @@ from pdtui.dissection.dissection_result import Dissection, pick_sample_episode
 from pdtui.dissection.dissection_searches import DissectionSearches
 from pdtui.dissection.primitive_judging import judge_primitives, measure_own_range
 from pdtui.dissection.probe_starts import gather_probe_starts
+from pdtui.dissection.steering.gather_candidates import gather_steering_candidates
+from pdtui.dissection.steering.linear_probes import fit_linear_probes
+from pdtui.dissection.steering.steering_comparison import compare_steering
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.effect_probe import EffectProbe
@@ -121,6 +124,28 @@ def dissect(config: DissectionConfig) -> Dissection:
             settings,
             stage("up and down"),
         )
+        probes = fit_linear_probes(episodes, robot.attributes, network.layers, movable)
+        steering = compare_steering(
+            prober,
+            movable,
+            spread,
+            gather_steering_candidates(
+                matching,
+                refined,
+                probes,
+                robot.observation_edits,
+                network.layers,
+                movable,
+                settings.steering,
+                seed,
+            ),
+            probes,
+            starts.searches.selection[: settings.steering.starts],
+            starts.searches.held_out,
+            settings.mover_steps,
+            settings.level,
+            stage("compare ways to steer"),
+        )
         searches = DissectionSearches(
             prober, robot, settings, seed, SharedTimeBudget(config.budget_minutes, began), stage, known
         )
@@ -145,6 +170,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             spread=spread,
             movable=tuple(movable),
             attribute_movers=movers,
+            steering=steering,
             behaviors=behaviors,
             controllers=controllers,
             tasks=tasks,

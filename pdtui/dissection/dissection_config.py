@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from torch import nn
 
+from pdtui.dissection.steering.steering_comparison import SteeringSettings
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.robots import RobotSpec
@@ -48,7 +49,8 @@ class DissectionSettings:
         level: Share of the confirmed pairs of a unit and an attribute that may be false.
         mover_singles, mover_pairs: Units tried alone, and second units tried beside the best of them, for
             each attribute and direction.
-        mover_steps: Control steps of those roll-outs.
+        mover_steps: Control steps of those roll-outs, and of those that compare ways to steer.
+        steering: Settings of the comparison of ways to steer.
         search_starts, selection_starts, held_out_starts: Starts of the searches: those they optimize on,
             choose among the finalists on, and are judged on.
         walk_steps: Control steps between a reset and a start.
@@ -72,6 +74,7 @@ class DissectionSettings:
     mover_singles: int = 3
     mover_pairs: int = 4
     mover_steps: int = 240
+    steering: SteeringSettings = field(default_factory=SteeringSettings)
     search_starts: int = 10
     selection_starts: int = 12
     held_out_starts: int = 16
@@ -117,6 +120,9 @@ QUICK_DISSECTION = DissectionSettings(
     refine_values=(-3.0, 0.0, 3.0), refine_starts=4, refine_steps=60,
     judge_keep=1, controls=99, judge_starts=8,
     mover_singles=2, mover_pairs=0, mover_steps=160,
+    steering=SteeringSettings(
+        starts=2, units=1, values=(3.0,), lengths=(0.5, 1.0), readings=(2.0,), factors=(2.0,), random=2,
+    ),
     search_starts=3, selection_starts=4, held_out_starts=8, walk_steps=50,
     imprints=ImprintSettings(episodes=4, steps=40, bins=3, units=(8,), factors=(1.0,)),
     behavior_search=BehaviorSearchSettings(

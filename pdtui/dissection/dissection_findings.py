@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from pdtui.core.units import describe_units
+from pdtui.dissection.steering.steering_summary import describe_steering
 
 
 def describe_findings(summary: dict[str, Any]) -> dict[str, list[str]]:
@@ -34,6 +35,7 @@ def _found(summary: dict[str, Any]) -> list[str]:
                 f"the held-out starts, with falls on {one['falls']:.0%}; the gain is {one['gain']:.2g}, and "
                 f"{one['rival']['gain']:.2g} with the best of as many random sets of units."
             )
+    lines.append(describe_steering(summary["steering"]))
     lines += [f"{one['attribute']}: can be held at a target." for one in summary["holds"] if one["holds"]]
     return lines
 

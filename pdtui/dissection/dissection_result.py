@@ -12,6 +12,7 @@ from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.primitive_judging import PrimitiveJudgement
+from pdtui.dissection.steering.steering_comparison import SteeringComparison
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.measured_effects import UnitEffects
 from pdtui.robots.options.robot_option import RobotOptions
@@ -51,6 +52,7 @@ class Dissection:
         spread: Standard deviation of every attribute over the monitored steps, shape (J,).
         movable: Columns of the attributes for which up and down were searched.
         attribute_movers: What moves each attribute up and down.
+        steering: What units, directions and imprints do to each attribute, side by side.
         behaviors: Best stimulation for each behavior goal.
         controllers: Best controllers of attributes.
         tasks: Best stimulation for each task that the robot's goals name.
@@ -78,6 +80,7 @@ class Dissection:
     spread: Floats
     movable: tuple[int, ...]
     attribute_movers: tuple[AttributeMover, ...]
+    steering: SteeringComparison
     behaviors: tuple[BehaviorSearchResult, ...]
     controllers: tuple[ControllerSearchResult, ...]
     tasks: tuple[TaskSearchResult, ...]

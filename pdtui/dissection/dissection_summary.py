@@ -9,6 +9,7 @@ from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.search_task_into_map import draft_task_behavior
+from pdtui.dissection.steering.steering_summary import summarise_steering
 from pdtui.probing.matching_hits import TOP_MATCHES, measure_matching_hits
 from pdtui.probing.primitive_confirmation import EffectVerdict, PrimitiveConfirmation
 from pdtui.robots.task import average_figures
@@ -43,6 +44,7 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
         "shortened": dissection.shortened,
         "movable": [dissection.attributes[column].name for column in dissection.movable],
         "steered": [_mover(dissection, one) for one in dissection.attribute_movers],
+        "steering": summarise_steering(dissection.steering, dissection.attributes),
         "side_effects": _side_effects(dissection),
         "behaviors": [_behavior(found, layers) for found in dissection.behaviors],
         "tasks": [_task(found, dissection) for found in dissection.tasks],

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from pdtui.core.text_tables import new_table
 from pdtui.core.units import describe_units
+from pdtui.dissection.steering.steering_summary import steering_tables
 from pdtui.probing.matching_hits import TOP_MATCHES
 
 LISTED_MATCHES = 3
@@ -23,6 +24,7 @@ def dissection_tables(summary: dict[str, Any]) -> list[Table]:
         _range_table(summary),
         _agreement_table(summary),
         _mover_table(summary),
+        *steering_tables(summary["steering"]),
     ]
     if summary["behaviors"]:
         tables.append(_behavior_table(summary))

@@ -12,6 +12,7 @@ from pdtui.core.errors import SimulationDiverged
 from pdtui.core.outcome import Outcome
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy
+from pdtui.probing.intervention_plan import ControlStepStimulation, InterventionPlan
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot import Robot
 from pdtui.stimulation.pid_magnitude import PidMagnitude
@@ -37,7 +38,7 @@ class PidStimulationPlan:
     base: tuple[float, ...] = ()
 
 
-RolloutPlan = Stimulation | PidStimulationPlan
+RolloutPlan = Stimulation | PidStimulationPlan | InterventionPlan
 RolloutJob = tuple[RolloutPlan, int]
 """A plan and the index of its start."""
 
@@ -74,13 +75,11 @@ def run_rollout(
     turned = np.zeros(len(angles))
     total, counted, errors, steps_survived, outcome = np.zeros(len(angles)), 0, 0.0, 0, None
     controller = _Controller(plan, robot, before) if isinstance(plan, PidStimulationPlan) else None
+    stimulate = _plan_stimulation(plan, controller, robot, policy)
     values = before
     for step in range(steps):
-        stimulation = plan if isinstance(plan, Stimulation) else NO_STIMULATION
-        if controller is not None:
-            stimulation = controller.stimulate(values)
         try:
-            action = policy.act(observation, stimulation).action
+            action = policy.act(observation, stimulate(step, values)).action
             observation, _, terminated, truncated, info = robot.step(action)
         except SimulationDiverged:
             outcome = Outcome.DIVERGED
@@ -99,6 +98,17 @@ def run_rollout(
     means = total / counted if counted else np.full(len(angles), np.nan)
     error = errors / counted if counted and controller is not None else float("nan")
     return RolloutOutcome(means, error, steps_survived, outcome)
+
+
+def _plan_stimulation(
+    plan: RolloutPlan, controller: _Controller | None, robot: Robot, policy: Policy
+) -> ControlStepStimulation:
+    if controller is not None:
+        return lambda _, values: controller.stimulate(values)
+    if isinstance(plan, InterventionPlan):
+        return plan.bind(robot, policy)
+    fixed = plan if isinstance(plan, Stimulation) else NO_STIMULATION
+    return lambda _step, _values: fixed
 
 
 class _Controller:
