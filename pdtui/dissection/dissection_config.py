@@ -53,7 +53,7 @@ class DissectionSettings:
         steering: Settings of the comparison of ways to steer.
         search_starts, selection_starts, held_out_starts: Starts of the searches: those they optimize on,
             choose among the finalists on, and are judged on.
-        walk_steps: Control steps between a reset and a start.
+        walk_steps: Most control steps between a reset and a start; half of them are the least.
         imprints: Settings of the imprints that the searches begin from.
         behavior_search, controller_search, task_search: Settings of the searches.
     """

@@ -71,11 +71,12 @@ def gather_probe_starts(pool: RolloutPool, settings: DissectionSettings, first_s
             )
         shortened = (
             f"Of {len(seeds)} walks, {sum(length >= wanted for length in lengths)} lasted the {wanted} steps "
-            f"asked for and {_LASTING:.0%} lasted {lasting}, so stimulation began at step "
+            f"asked for and {_LASTING:.0%} lasted {lasting}, so stimulation began by step "
             f"{settings.walk_steps} and lasted at most {settings.longest_rollout} steps. Effects beyond that "
             "were not measured."
         )
-    everything = collect_start_states(pool.robot, pool.policy, first_seed, total, at=settings.walk_steps)
+    steps = range(settings.walk_steps // 2, settings.walk_steps + 1)
+    everything = collect_start_states(pool.robot, pool.policy, first_seed, total, at=steps)
     remaining = iter(everything)
     screen, refine, judge, *searches = (tuple(islice(remaining, count)) for count in counts)
     return ProbeStarts(screen, refine, judge, SearchStartStates(*searches), settings, shortened)

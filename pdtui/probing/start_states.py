@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.core.outcome import Outcome, count_outcomes, describe_outcomes
 from pdtui.core.robot_links_and_state import RobotState
@@ -30,28 +32,32 @@ class StartState:
 
 
 def collect_start_states(
-    robot: Robot, policy: Policy, first_seed: int, count: int, *, at: int = 100
+    robot: Robot, policy: Policy, first_seed: int, count: int, *, at: int | range = 100
 ) -> list[StartState]:
     """Take one state from each of several unstimulated walks, which differ in heading and phase of the gait.
 
-    The state is taken `at` control steps after the reset. Seeds whose walk ends before, by a failure or
-    because the robot has arrived, are skipped,
-    but not those whose walk would end later: to leave out those that fall would flatter every stimulation.
+    The state is taken `at` control steps after the reset; from a range, the walk's seed draws the step.
+    Where resets hardly differ, walks are at the same phase of the gait at the same step, and intervals over
+    them would be too narrow. Seeds whose walk ends before, by a failure or because the robot has arrived,
+    are skipped, but not those whose walk would end later: to leave out those that fall would flatter every
+    stimulation.
 
     Raises:
         RobotError: too few of ``4 * count`` walks last that long.
     """
+    steps = range(at, at + 1) if isinstance(at, int) else at
     starts: list[StartState] = []
     ends: list[Outcome | None] = []
     for seed in range(first_seed, first_seed + 4 * count):
-        for step in _walk(robot, policy, seed, at, ends):
-            if step == at:
-                starts.append(StartState(seed, at, robot.snapshot(), policy.snapshot()))
+        taken = steps[int(np.random.default_rng(seed).integers(len(steps)))]
+        for step in _walk(robot, policy, seed, taken, ends):
+            if step == taken:
+                starts.append(StartState(seed, taken, robot.snapshot(), policy.snapshot()))
         if len(starts) == count:
             return starts
     raise RobotError(
-        f"{robot.name}: expected {count} walks of {at} steps among {4 * count} seeds, found {len(starts)}: "
-        f"{describe_outcomes(count_outcomes(ends))}; dissection needs longer walks"
+        f"{robot.name}: expected {count} walks of {steps[-1]} steps among {4 * count} seeds, found "
+        f"{len(starts)}: {describe_outcomes(count_outcomes(ends))}; dissection needs longer walks"
     )
 
 

@@ -22,6 +22,17 @@ def test_starts_are_where_the_walk_was(policy_file: Path) -> None:
     assert robot.digest() == walked
 
 
+def test_steps_of_a_range_are_spread_by_the_seed_of_the_walk(policy_file: Path) -> None:
+    robot, policy = make_robot("ant"), load_policy(policy_file)
+    starts = collect_start_states(robot, policy, 2000, 8, at=range(5, 16))
+    steps = [start.step for start in starts]
+    assert len(set(steps)) >= 4
+    assert all(5 <= step <= 15 for step in steps)
+    # A walk keeps its step, whichever other walks there are.
+    later = collect_start_states(robot, policy, 2003, 2, at=range(5, 16))
+    assert [start.step for start in later] == steps[3:5]
+
+
 def test_a_policy_that_always_falls_is_refused(policy_file: Path) -> None:
     robot, policy = make_robot("ant"), load_policy(policy_file)
     robot._healthy_z_range = (0.9, 1.0)  # type: ignore[attr-defined]
