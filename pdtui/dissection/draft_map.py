@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import string
-
 import numpy as np
 
-from pdtui.core.attributes import BehaviorAim
-from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.core.units import Stimulation, describe_units, format_unit
 from pdtui.dissection.dissection_config import SEEDS_PER_DISSECTION
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.search_task_into_map import draft_task_behavior
+from pdtui.dissection.steering.attribute_behaviors import draft_attribute_behaviors
 from pdtui.robots.robot_goals import HoldBehaviorGoal
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult
@@ -44,7 +41,8 @@ def draft_map(dissection: Dissection) -> str:
         for found in dissection.tasks
         if _does_task(found)
     ]
-    behaviors += _draft_movers(dissection, {one.key for one in behaviors})
+    further, vectors = draft_attribute_behaviors(dissection, {one.key for one in behaviors})
+    behaviors += further
     stimulation_map = StimulationMap(
         dissection.robot,
         dissection.policy,
@@ -61,6 +59,7 @@ def draft_map(dissection: Dissection) -> str:
             ]
         ),
         robot_options=dict(dissection.robot_options),
+        vectors={one.name: one for one in vectors},
     )
     return compose_map(stimulation_map, _comments(dissection, {one.attribute for one in primitives}))
 
@@ -153,38 +152,6 @@ def _draft_behavior(
     return Behavior(goal.name, goal.key, goal.says, magnitudes, aim=goal.aim, measured=found.change)
 
 
-def _draft_movers(dissection: Dissection, taken: set[str]) -> list[Behavior]:
-    """Return up and down for every attribute that no goal moves that way, as long as keys are free."""
-    aimed = {(one.goal.aim.attribute, one.goal.aim.sign) for one in dissection.behaviors if one.reached}
-    keys, pairs, behaviors = KeyAllocator(taken), dict[str, tuple[str, str] | None](), []
-    for mover in dissection.attribute_movers:
-        name, up = dissection.attributes[mover.column].name, mover.sign > 0
-        if (name, mover.sign) in aimed:
-            continue
-        if name not in pairs:
-            pairs[name] = keys.take_pair(name)
-        pair = pairs[name]
-        if pair is None:
-            continue
-        says = f"{'raises' if up else 'lowers'} {name}"
-        if mover.alone is not None:
-            says += (
-                f"; the second unit reduces side effects from {mover.alone:.2g} to {mover.side:.2g} standard "
-                "deviations"
-            )
-        behaviors.append(
-            Behavior(
-                f"{name} {'up' if up else 'down'}",
-                pair[0 if up else 1],
-                says,
-                mover.stimulation.by_address(dissection.layers),
-                aim=BehaviorAim(name, "raise" if up else "lower"),
-                measured=mover.measured,
-            )
-        )
-    return behaviors
-
-
 def _draft_controller(found: ControllerSearchResult, dissection: Dissection) -> Behavior:
     goal, layers = _hold_goal(found, dissection), dissection.layers
     pid = found.pid
@@ -203,23 +170,3 @@ def _draft_controller(found: ControllerSearchResult, dissection: Dissection) -> 
 
 def _hold_goal(found: ControllerSearchResult, dissection: Dissection) -> HoldBehaviorGoal:
     return next(goal for goal in dissection.goals.holds if goal.attribute == found.pid.attribute)
-
-
-class KeyAllocator:
-    """Hands out keys that are neither reserved nor taken by other behaviors."""
-
-    def __init__(self, taken: set[str]) -> None:
-        self._taken: set[str] = {*taken, *RESERVED_KEYS}
-
-    def take_pair(self, name: str) -> tuple[str, str] | None:
-        """Return a capital letter, for more of something, and its small letter, for less, if any is free.
-
-        The first free letter of the first letters of the name's words, of the name, and of the alphabet. If
-        either case of a letter is taken or reserved, the letter is not free.
-        """
-        initials = "".join(word[0] for word in name.split())
-        for letter in (initials + name).lower() + string.ascii_lowercase:
-            if letter in string.ascii_lowercase and not {letter, letter.upper()} & self._taken:
-                self._taken |= {letter, letter.upper()}
-                return letter.upper(), letter
-        return None

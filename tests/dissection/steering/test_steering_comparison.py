@@ -23,6 +23,7 @@ from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.intervention_plan import InterventionPlan
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
+from pdtui.probing.stimulated_rollout import RolloutPlan
 from pdtui.stimulation.interventions.intervention import Intervention, LayerVectors
 from tests.compass_world import SPIN, TURN, UNITS, Compass, compass_policy
 
@@ -130,7 +131,7 @@ def test_plans_that_differ_only_in_their_vectors_are_told_apart() -> None:
 def test_an_intervention_of_a_roll_out_does_what_the_same_stimulation_does() -> None:
     with RolloutPool(Compass(), compass_policy(), 1) as pool:
         starts = collect_start_states(pool.robot, pool.policy, 1000, 2, at=5)
-        plans = [
+        plans: list[RolloutPlan] = [
             Stimulation((SPIN,), (2.0,)),
             InterventionPlan(Intervention("overwrite", values={f"0:{SPIN}": 2.0})),
         ]
