@@ -102,7 +102,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             prober,
             robot.attributes,
             choose_primitive_candidates(
-                refined, matching, columns, settings.screen_values, settings.judge_keep
+                screen, refined, matching, columns, settings.screen_values, settings.judge_keep
             ),
             sample_control_units(screen.units, settings.controls, seed),
             measure_own_range(episodes),

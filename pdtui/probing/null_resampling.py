@@ -70,7 +70,7 @@ class NullResampler:
         discrepancy[:, self.controls] = self.matching.discrepancy[:, self.controls]
         matching = replace(self.matching, discrepancy=discrepancy)
         candidates = choose_primitive_candidates(
-            chooser, matching, range(len(discrepancy)), self.values, self.keep
+            chooser, chooser, matching, range(len(discrepancy)), self.values, self.keep
         )
         names = dict(zip(self.controls, renamed, strict=True))
         verdicts = judge_candidates(

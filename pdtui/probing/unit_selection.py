@@ -16,6 +16,10 @@ from pdtui.spectra.matching import UnitDiscrepancies
 
 RANDOM_QUANTILE = 0.9
 """A unit exceeds random units if it moves the attribute more than this share of all units does."""
+_ENOUGH = 0.7
+"""Share of how far a unit stands out at most that a smaller output has to reach to be preferred."""
+_LEAST_EFFECT = 1e-9
+"""Effect, in the attribute's unit, below which nothing is measured."""
 _OBSERVED_STEPS, _STEPS_APART = 60, 10
 """Control steps of the walk on which actions are compared, and steps from one comparison to the next."""
 
@@ -118,20 +122,26 @@ def sample_control_units(units: Sequence[int], count: int, seed: int) -> tuple[i
 
 
 def choose_primitive_candidates(
+    screen: UnitEffects,
     refined: UnitEffects,
     matching: UnitDiscrepancies,
     columns: Sequence[int],
     values: Sequence[float],
     keep: int,
 ) -> tuple[PrimitiveCandidate, ...]:
-    """Choose for each attribute its first match and the `keep` units that move it most reliably.
+    """Choose for each attribute its first match and the `keep` units that stand out most.
 
-    Each comes with its best output among those of `values` at which units were refined.
+    How far a unit stands out is its robust effect, divided by what `RANDOM_QUANTILE` of all screened units
+    stay below at such an output: an output that makes half of all units brake singles out no brake. Each unit
+    comes with the smallest of its outputs, among those of `values`, at which it stands out nearly as far as
+    at any.
     """
     doses = [dose for dose, value in enumerate(refined.values) if value in values]
     candidates = []
     for column in columns:
         robust = np.maximum(refined.robust_effects(column, 1.0), refined.robust_effects(column, -1.0))
+        usual = np.array([_random_effect(value, column, screen) for value in refined.values])
+        robust = robust / np.maximum(usual, _LEAST_EFFECT)
         strengths = robust[:, doses].max(axis=1)
         order = np.argsort(-strengths, kind="stable")[:keep]
         rows = [int(row) for row in order if strengths[row] > 0]
@@ -140,7 +150,8 @@ def choose_primitive_candidates(
         for row in dict.fromkeys([*first, *rows]):
             # A unit without a reliable effect is judged where its mean effect is largest.
             scores = robust[row] if strengths[row] > 0 else np.abs(means[row])
-            dose = doses[int(np.argmax(scores[doses]))]
+            enough = [one for one in doses if scores[one] >= _ENOUGH * scores[doses].max()]
+            dose = min(enough, key=lambda one: (abs(refined.values[one]), -scores[one]))
             sign = 1.0 if means[row, dose] >= 0 else -1.0
             candidates.append(PrimitiveCandidate(refined.units[row], column, refined.values[dose], sign))
     return tuple(candidates)
@@ -148,8 +159,13 @@ def choose_primitive_candidates(
 
 def exceeds_random_units(effect: float, value: float, column: int, screen: UnitEffects) -> bool:
     """Return whether an effect exceeds that of `RANDOM_QUANTILE` of all units at the nearest screened |v|."""
+    return abs(effect) > _random_effect(value, column, screen)
+
+
+def _random_effect(value: float, column: int, screen: UnitEffects) -> float:
+    """Return what the effects of `RANDOM_QUANTILE` of all units stay below at the nearest screened |v|."""
     magnitude = min((abs(v) for v in screen.values), key=lambda size: abs(size - abs(value)))
     doses = [dose for dose, v in enumerate(screen.values) if abs(v) == magnitude]
     # A fall before the measured steps leaves NaN, which counts as no effect.
     sizes = np.abs(np.nan_to_num(screen.effects[:, doses, :, column]).mean(axis=-1))
-    return bool(abs(effect) > np.quantile(sizes, RANDOM_QUANTILE))
+    return float(np.quantile(sizes, RANDOM_QUANTILE))
