@@ -34,6 +34,11 @@ from pdtui.cli.shared_options import (
 @click.option("--quick", is_flag=True, help="Take a first look: few units, hardly any search.")
 @integer_option("--units", help="Try only the N units that change the policy's action most; default: all.")
 @click.option(
+    "--onset",
+    is_flag=True,
+    help="Also search for the phase of the gait at which the behavior should begin once its key is pressed.",
+)
+@click.option(
     "-o",
     "--output",
     type=FILE_PATH,
@@ -49,6 +54,7 @@ def pursue_command(
     policy: str,
     quick: bool,
     units: int | None,
+    onset: bool,
     output: Path | None,
     as_json: bool,
     **search: Any,
@@ -61,7 +67,7 @@ def pursue_command(
     from pdtui.robots import RobotSpec, robot_file_stem
     from pdtui.search.task_search_settings import QUICK_TASK_SEARCH, TaskSearchSettings
 
-    settings = QUICK_TASK_SEARCH if quick else TaskSearchSettings()
+    settings = replace(QUICK_TASK_SEARCH if quick else TaskSearchSettings(), onset=onset)
     world = RobotSpec(robot, parse_robot_options(robot, robot_options))
     with progress_bar("pursuing", quiet=as_json) as advance:
         found = search_task_into_map(

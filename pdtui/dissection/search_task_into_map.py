@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from rich.text import Text
 
 from pdtui.core.atomic_file import check_writable, write_file
 from pdtui.core.errors import MapError
+from pdtui.core.reserved_keys import KeyAllocator
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
@@ -22,6 +23,7 @@ from pdtui.search.evolutionary_search import SharedTimeBudget
 from pdtui.search.task_rollout import StimulationWithDuration
 from pdtui.search.task_search import TaskSearch, TaskSearchResult
 from pdtui.search.task_search_settings import TaskSearchSettings
+from pdtui.stimulation.interventions.intervention import Onset
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.map_robot_options import map_robot
 from pdtui.stimulation.map_writer import add_behavior, add_seeds, compose_map, rewrite_map
@@ -35,12 +37,14 @@ class WrittenBehavior:
     Attributes:
         units: Outputs by unit address.
         seconds: Activation period, s; None lasts until another key is pressed.
+        onset: The moment of the gait at which it begins; None begins at once.
     """
 
     result: TaskSearchResult
     units: dict[str, float]
     seconds: float | None
     output: Path
+    onset: Onset | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the form that ``--json`` prints."""
@@ -49,6 +53,7 @@ class WrittenBehavior:
             "task": self.result.task.name,
             "magnitudes": self.units,
             "period": self.seconds,
+            "onset": None if self.onset is None else asdict(self.onset),
             "held_out": {
                 "walks": len(verdicts),
                 "done": self.result.done,
@@ -64,6 +69,9 @@ class WrittenBehavior:
         summary = self.as_dict()
         held_out = summary["held_out"]
         lasts = "" if self.seconds is None else f" for {self.seconds:g} s"
+        if self.onset is not None:
+            mark = self.onset.mark
+            lasts += f", from {self.onset.delay:g} s after {mark.signal} rises above {mark.level:g}"
         figures = ", ".join(f"{name} {value:.2f}" for name, value in held_out["figures"].items())
         return Text(
             f"{summary['task']}: {len(self.units)} units{lasts}. Done on {held_out['done']} of "
@@ -118,6 +126,8 @@ def search_task_into_map(
             robot_options=dict(pool.robot.build_options),
         )
     behavior = draft_task_behavior(result, layers, dt)
+    if known is not None:
+        behavior = _fit_into_map(behavior, known)
 
     def change(text: str) -> str:
         return add_seeds(add_behavior(text, behavior, str(output)), result.seeds, str(output))
@@ -126,7 +136,7 @@ def search_task_into_map(
         write_file(output, change(compose_map(new_map)), MapError)
     else:
         rewrite_map(output, change)
-    return WrittenBehavior(result, dict(behavior.magnitudes), behavior.period, output)
+    return WrittenBehavior(result, dict(behavior.magnitudes), behavior.period, output, behavior.onset)
 
 
 def draft_task_behavior(result: TaskSearchResult, layers: tuple[int, ...], dt: float) -> Behavior:
@@ -134,7 +144,23 @@ def draft_task_behavior(result: TaskSearchResult, layers: tuple[int, ...], dt: f
     task, steps = result.task, result.plan.steps
     period = None if steps is None else round(steps * dt, 6)
     units = result.plan.stimulation.by_address(layers)
-    return Behavior(task.name, task.key, task.says, units, period=period, task=task.name)
+    return Behavior(
+        task.name, task.key, task.says, units, period=period, task=task.name, onset=result.plan.onset
+    )
+
+
+def _fit_into_map(behavior: Behavior, known: StimulationMap) -> Behavior:
+    """Return the behavior with the name and key of the one that it replaces, or with a key that is free."""
+    others = known.behaviors.values()
+    for other in others:
+        if other.task == behavior.task and other.mode == "fixed":
+            return replace(behavior, name=other.name, key=other.key)
+    keys = {other.key for other in others}
+    if behavior.key in keys:
+        pair = KeyAllocator(keys).take_pair(behavior.name)
+        if pair is not None:
+            return replace(behavior, key=pair[1])
+    return behavior
 
 
 def _robot_of_map(known: StimulationMap, robot: RobotSpec) -> RobotSpec:
@@ -159,5 +185,5 @@ def _known_plans(
             addressed = stimulation_map.units_of(behavior).items()
             values = {parse_unit(address, pool.policy.layers): value for address, value in addressed}
             steps = None if behavior.period is None else round(behavior.period / pool.robot.control_dt)
-            plans.append(StimulationWithDuration(Stimulation.of(values), steps))
+            plans.append(StimulationWithDuration(Stimulation.of(values), steps, behavior.onset))
     return plans

@@ -14,6 +14,11 @@ from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot
 from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
+from pdtui.stimulation.interventions.gait_clock import GaitClock
+from pdtui.stimulation.interventions.intervention import Onset
+
+LONGEST_WAIT = 2.0
+"""Time for which a task waits for the onset of its behavior, s; one that has not begun by then has failed."""
 
 
 @dataclass(frozen=True)
@@ -23,10 +28,12 @@ class StimulationWithDuration:
     Attributes:
         stimulation: units and outputs.
         steps: duration in control steps; None for the whole roll-out.
+        onset: the moment of the gait at which it begins; None begins at once.
     """
 
     stimulation: Stimulation = NO_STIMULATION
     steps: int | None = None
+    onset: Onset | None = None
 
 
 def count_walk_steps(task: Task, seed: int) -> int:
@@ -53,13 +60,17 @@ def judge_stimulations(
     for plan in plans:
         robot.restore(start)
         policy.restore(state)
-        verdicts.append(task.judge(_watch(robot, policy, task, plan, walked)))
+        verdicts.append(_judge_plan(robot, policy, task, plan, walked))
     return verdicts
 
 
-def _watch(
-    robot: Robot, policy: Policy, task: Task, plan: StimulationWithDuration, walked: list[Floats]
-) -> TaskRunTrace:
+def _judge_plan(
+    robot: Robot, policy: Policy, task: Task, plan: StimulationWithDuration, walked: Sequence[Floats]
+) -> TaskVerdict:
+    """Judge a plan from the control step in which it begins."""
+    before = [*walked]
+    if plan.onset is not None and not _wait_for_onset(robot, policy, plan.onset, before):
+        return TaskVerdict(False, 0.0, {})
     observation, outcome = robot.observe(), None
     values: list[Floats] = []
     for step in range(task.steps):
@@ -75,4 +86,29 @@ def _watch(
         if terminated or truncated:
             break
     rows = np.array(values).reshape(-1, len(robot.attributes))
-    return TaskRunTrace(robot.attributes, np.array(walked), unwrap_angles(rows, robot.attributes), outcome)
+    smooth = unwrap_angles(rows, robot.attributes)
+    return task.judge(TaskRunTrace(robot.attributes, np.array(before), smooth, outcome))
+
+
+def _wait_for_onset(robot: Robot, policy: Policy, onset: Onset, walked: list[Floats]) -> bool:
+    """Walk on until a behavior that was armed begins, as in a drive, and return whether it ever does.
+
+    The attributes on the way are added to those that were walked before.
+    """
+    column, dt = robot.attribute_index(onset.mark.signal), robot.control_dt
+    clock, delay = GaitClock(onset.mark, dt), round(onset.delay / dt)
+    for row in walked:
+        clock.update(float(row[column]))
+    observation = robot.observe()
+    for _ in range(round(LONGEST_WAIT / dt)):
+        if clock.control_steps_until(delay) == 0:
+            return True
+        try:
+            observation, _, terminated, truncated, _ = robot.step(policy.act(observation).action)
+        except SimulationDiverged:
+            return False
+        walked.append(robot.read_attributes())
+        clock.update(float(walked[-1][column]))
+        if terminated or truncated:
+            return False
+    return False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -17,6 +17,7 @@ from pdtui.probing.unit_selection import select_outputs_by_action_change
 from pdtui.robots.robot import Robot
 from pdtui.robots.task import Task, TaskVerdict
 from pdtui.search.evolutionary_search import Deadline, EvolutionarySearch, EvolutionProblem
+from pdtui.search.onsets.onset_search import search_onset
 from pdtui.search.stimulation_sampler import CROSSED, StimulationSampler
 from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
 from pdtui.search.task_search_settings import TaskSearchSettings
@@ -66,7 +67,8 @@ class TaskSearchResult:
 class TaskSearch:
     """Search for a stimulation, and its duration, that does a task.
 
-    The walks of the search have the seeds from ``seed`` on, those of the selection from ``seed + 1000`` on.
+    The walks of the search have the seeds from ``seed`` on, those of the selection from ``seed + 1000`` on,
+    and those on which an onset is compared with none from ``seed + 2000`` on.
     The figures are measured on the last of the seeds for judging, which nothing is chosen on.
 
     Args:
@@ -113,6 +115,9 @@ class TaskSearch:
             final=self._count_successes,
         )
         search_score, best = self._search_again_and_again(problem, deadline, progress)
+        if settings.onset:
+            seeds, fresh = (self._seeds(stage, settings.selection_seeds) for stage in (1, 2))
+            best = search_onset(self._pool, best, seeds, fresh, self._judge)
         plans, seeds = [best, StimulationWithDuration()], JUDGING_SEEDS[-settings.held_out_seeds :]
         verdicts, untouched = map(tuple, self._judge(plans, seeds))
         return TaskSearchResult(
@@ -146,11 +151,11 @@ class TaskSearch:
         kind = rng.random()
         if kind < CROSSED:
             crossed = sampler.cross_over(parent.stimulation, other.stimulation, max_units)
-            return StimulationWithDuration(crossed, parent.steps)
+            return replace(parent, stimulation=crossed)
         if kind < _RETIMED and parent.steps is not None and self._task.period is not None:
             steps = round(parent.steps * float(np.exp(rng.normal(0.0, _PERIOD_SPREAD))))
-            return StimulationWithDuration(parent.stimulation, int(np.clip(steps, 2, self._task.period)))
-        return StimulationWithDuration(sampler.mutate(parent.stimulation, max_units), parent.steps)
+            return replace(parent, steps=int(np.clip(steps, 2, self._task.period)))
+        return replace(parent, stimulation=sampler.mutate(parent.stimulation, max_units))
 
     def _count_successes(self, plans: Sequence[StimulationWithDuration]) -> list[tuple[int, float]]:
         """Return on how many walks of the selection the task was done; scores decide between equals."""
@@ -195,7 +200,9 @@ class TaskSearch:
         """The seeds on which something is chosen."""
         settings = self._settings
         searched = max(settings.screen_seeds, settings.quick_seeds, settings.full_seeds)
-        return self._seeds(0, searched), self._seeds(1, settings.selection_seeds)
+        stages = (1, 2) if settings.onset else (1,)
+        chosen = (self._seeds(stage, settings.selection_seeds) for stage in stages)
+        return self._seeds(0, searched), *chosen
 
     def _seeds(self, stage: int, count: int) -> range:
         first = self._seed + stage * _SEEDS_APART

@@ -21,6 +21,7 @@ class TaskSearchSettings(EvolutionSettings):
         selection_seeds: walks of the final score.
         held_out_seeds: walks of the figures.
         unit_cost: score that each unit has to bring.
+        onset: whether the search ends with one for the phase of the gait at which the behavior should begin.
         restarts: how often the search starts anew if it ends before its time, and the task is not yet done on
             every walk of the selection.
     """
@@ -39,6 +40,7 @@ class TaskSearchSettings(EvolutionSettings):
     selection_seeds: int = 20
     held_out_seeds: int = 20
     unit_cost: float = 0.002
+    onset: bool = False
     restarts: int = 100
 
 

@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.core.attributes import Attribute
-from pdtui.core.reserved_keys import RESERVED_KEYS
+from pdtui.core.reserved_keys import RESERVED_KEYS, KeyAllocator
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_attribute_columns
 from pdtui.dissection.dissection_config import QUICK_DISSECTION
-from pdtui.dissection.steering.attribute_behaviors import KeyAllocator
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import string
 from dataclasses import replace
 
 from pdtui.core.attributes import BehaviorAim
-from pdtui.core.reserved_keys import RESERVED_KEYS
+from pdtui.core.reserved_keys import KeyAllocator
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.steering.steering_comparison import SteeringResult
@@ -89,23 +88,3 @@ def _draft_behavior(
     says = f"{verb} {attribute}: {found.method}, {found.candidate.source}, {found.candidate.dose:+g}"
     behavior = Behavior(name, key, says, {}, aim=aim, measured=found.measured, interventions=(intervention,))
     return behavior, [replace(one, name=renamed[one.name]) for one in plan.vectors]
-
-
-class KeyAllocator:
-    """Hands out keys that are neither reserved nor taken by other behaviors."""
-
-    def __init__(self, taken: set[str]) -> None:
-        self._taken: set[str] = {*taken, *RESERVED_KEYS}
-
-    def take_pair(self, name: str) -> tuple[str, str] | None:
-        """Return a capital letter, for more of something, and its small letter, for less, if any is free.
-
-        The first free letter of the first letters of the name's words, of the name, and of the alphabet. If
-        either case of a letter is taken or reserved, the letter is not free.
-        """
-        initials = "".join(word[0] for word in name.split())
-        for letter in (initials + name).lower() + string.ascii_lowercase:
-            if letter in string.ascii_lowercase and not {letter, letter.upper()} & self._taken:
-                self._taken |= {letter, letter.upper()}
-                return letter.upper(), letter
-        return None

@@ -3,7 +3,7 @@
 Each seed is driven with the behavior and without it. What is needed after another task, such as standing up
 after a flip, is also driven there, on the seeds on which the behavior for that task succeeds. A behavior that
 lasts until it is released is also held for as long as one with an aim, and the task's judge sees the last
-part of that hold, too.
+part of that hold, too. A behavior with an onset is judged from the control step in which it begins.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ import numpy as np
 
 from pdtui.core.attributes import unwrap_angles
 from pdtui.core.outcome import Outcome
+from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.evaluation.disturbance_conditions import UNDISTURBED, find_condition
 from pdtui.evaluation.evaluation_plan import MEASURED_SEEDS, EvaluationPlan, SubstituteKind
 from pdtui.evaluation.held_run import HeldRunPlan, InterventionMeasurement, begin_held_run
 from pdtui.evaluation.protocol_settings import RunTimes, plan_run_times
 from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
-from pdtui.search.task_rollout import count_walk_steps
+from pdtui.search.task_rollout import LONGEST_WAIT, count_walk_steps
 
 
 class TaskRunKey(NamedTuple):
@@ -103,13 +104,19 @@ def list_task_runs(plan: EvaluationPlan) -> list[TaskRunKey]:
 
 def count_task_steps(plan: EvaluationPlan, run: TaskRunKey) -> int:
     """Return how many control steps a run of a task has; an episode that ends early makes it fewer."""
-    return _press_step(plan.loop, run) + run.steps
+    return _press_step(plan.loop, run) + run.steps + _most_waiting_steps(plan.loop, run)
 
 
 def _press_step(loop: ControlLoop, run: TaskRunKey) -> int:
     """Return the control step before which the behavior is pressed."""
     first = _task_of(loop, run.after or run.behavior)
     return count_walk_steps(first, run.seed) + (first.steps if run.after else 0)
+
+
+def _most_waiting_steps(loop: ControlLoop, run: TaskRunKey) -> int:
+    """Return for how many control steps a pressed behavior may wait for its onset."""
+    waits = run.pressed and loop.map.behaviors[run.behavior].onset is not None
+    return round(LONGEST_WAIT / loop.robot.control_dt) if waits else 0
 
 
 def _task_of(loop: ControlLoop, behavior: str) -> Task:
@@ -150,7 +157,8 @@ def plan_task_episode(
     loop, dt = plan.loop, plan.loop.robot.control_dt
     task, first = _task_of(loop, run.behavior), _task_of(loop, run.after or run.behavior)
     bin_steps = plan_run_times(plan.settings, run.seed, dt).bin
-    times = RunTimes(_press_step(loop, run), run.steps, 0, task.steps, bin_steps, dt)
+    steps = run.steps + _most_waiting_steps(loop, run)
+    times = RunTimes(_press_step(loop, run), steps, 0, task.steps, bin_steps, dt)
     earlier = ((count_walk_steps(first, run.seed), run.after),) if run.after else ()
     substitute = plan.draw_substitute(run.kind, run.behavior, run.draw, measured)
     if run.kind != "units" and substitute is None:
@@ -181,7 +189,9 @@ def run_task_episode(built: ControlLoop, episode: TaskEpisode) -> TaskRunResult:
         records = list(driven)
     rows = np.array([before, *(record.attributes for record in records)])
     outcome = next((record.outcome for record in reversed(records) if record.outcome), None)
-    if len(rows) <= press + 1:
+    waited = _count_waiting_steps(records[press:], run.behavior)
+    press += waited
+    if len(rows) <= press + 1 or waited > _most_waiting_steps(built, run):
         return TaskRunResult(TaskVerdict(False, 0.0, {}), outcome, began=not run.after)
     if run.after:
         walk = episode.plan.earlier[0][0]
@@ -189,7 +199,8 @@ def run_task_episode(built: ControlLoop, episode: TaskEpisode) -> TaskRunResult:
         first = _task_of(built, run.after).judge(TaskRunTrace(attributes, rows[: walk + 1], done))
         if not first.success:
             return TaskRunResult(TaskVerdict(False, 0.0, {}), outcome, began=False)
-    after = unwrap_angles(rows[press + 1 :], attributes)
+    after = unwrap_angles(rows[press + 1 : press + 1 + run.steps], attributes)
+    outcome = outcome if len(rows) <= press + 1 + run.steps else None
     at_once = after[: task.steps]
     outcome_at_once = outcome if len(after) <= task.steps else None
     verdict = task.judge(TaskRunTrace(attributes, rows[: press + 1], at_once, outcome_at_once))
@@ -198,3 +209,9 @@ def run_task_episode(built: ControlLoop, episode: TaskEpisode) -> TaskRunResult:
     # An episode that ended early without failing is judged by its last part.
     still = task.judge(TaskRunTrace(attributes, rows[: press + 1], after[-task.steps :], outcome))
     return TaskRunResult(verdict, outcome, still)
+
+
+def _count_waiting_steps(records: Sequence[StepRecord], behavior: str) -> int:
+    """Return in how many control steps from the press on a behavior was armed before it began."""
+    armed = [any(one.name == behavior and one.waiting is not None for one in r.behaviors) for r in records]
+    return armed.index(False) if False in armed else len(armed)
