@@ -13,10 +13,10 @@ _LEVELS = (0.25, 0.5, 0.75)
 """Quantiles of a signal whose crossings are looked at."""
 _LEAST_CYCLES = 5
 """Cycles of a walk from which the regularity of a signal can be told."""
-_MOST_IRREGULAR = 0.15
+_MOST_IRREGULAR = 0.25
 """Largest standard deviation of the lengths of a regular signal's cycles, as a share of their mean."""
-_SHORTEST_CYCLE, _LONGEST_CYCLE = 0.15, 2.0
-"""Lengths of a cycle of a gait, s."""
+_SHORTEST_CYCLE, _LONGEST_CYCLE = 0.2, 2.0
+"""Lengths of a cycle of a gait, s. Noise has cycles, too, which are hardly longer than the least spacing."""
 _APART = 0.6
 """Least time between two moments of a mark, as a share of the cycle, so that ripples count once."""
 
@@ -53,7 +53,7 @@ def _find_mark(
     values: Sequence[Floats], signal: str, level: float, dt: float
 ) -> tuple[float, GaitMark, float] | None:
     """Return how irregular a signal is at a level, the mark and the length of its cycle, if it is regular."""
-    level, apart = float(f"{level:.3g}"), _SHORTEST_CYCLE
+    level, apart = float(f"{level:.3g}"), _SHORTEST_CYCLE / 2
     # The second look counts a moment once per cycle, even where the signal ripples.
     for _ in range(2):
         mark = GaitMark(signal, "up", level, round(apart, 3))
@@ -63,7 +63,8 @@ def _find_mark(
         apart = float(_APART * np.quantile(cycles, 0.75))
     length = float(cycles.mean())
     irregular = float(cycles.std()) / length
-    return (irregular, mark, length) if irregular <= _MOST_IRREGULAR and length <= _LONGEST_CYCLE else None
+    gait = irregular <= _MOST_IRREGULAR and _SHORTEST_CYCLE <= length <= _LONGEST_CYCLE
+    return (irregular, mark, length) if gait else None
 
 
 def _cycle_lengths(values: Sequence[Floats], mark: GaitMark, dt: float) -> Floats:

@@ -172,7 +172,7 @@ def _config_of_one(robot: str, behavior: str) -> DriveConfig:
     ("robot", "behavior"),
     [
         ("bipedal_walker", "rise from split"),
-        pytest.param("walker", "risky brake", marks=pytest.mark.slow),
+        pytest.param("walker", "brake", marks=pytest.mark.slow),
         pytest.param("a1", "bend left", marks=[pytest.mark.slow, NEEDS_BULLET]),
     ],
 )
