@@ -59,6 +59,11 @@ if TYPE_CHECKING:
     "--target", metavar="ATTRIBUTE", help="Measure how precisely targets of this attribute are held."
 )
 @click.option("--policy-only", is_flag=True, help="Measure the policy alone, one episode per seed.")
+@click.option(
+    "--gait",
+    is_flag=True,
+    help="Measure how the policy alone walks: contacts, clearance and slip of each foot.",
+)
 @start_option
 @click.option(
     "--update", is_flag=True, help="Write the effects of the behaviors into the map; its comments are kept."
@@ -104,6 +109,7 @@ def evaluate_command(
     seeds: range,
     target: str | None,
     policy_only: bool,
+    gait: bool,
     start: str,
     update: bool,
     quick: bool,
@@ -120,13 +126,16 @@ def evaluate_command(
     """Measure what each behavior of ROBOT, a robot's name or a map file, does beside the policy alone."""
     own_options = {name: value for name, value in own_options.items() if value not in (None, ())}
     _check_modes(
-        {"--policy-only": policy_only, "--target": target, "--experiment": experiment},
+        {"--policy-only": policy_only, "--gait": gait, "--target": target, "--experiment": experiment},
         {"--update": update, "--quick": quick, "--hold": hold, "--strip": strip, "--watch": watch},
     )
     if experiment is None and (others or pictures):
         raise click.UsageError(f"{'more than one map' if others else '-o'} needs --experiment")
-    if start and not policy_only:
-        raise click.UsageError("--start needs --policy-only; tasks and experiments have their own starts")
+    alone = policy_only or gait
+    if start and not alone:
+        raise click.UsageError(
+            "--start needs --policy-only or --gait; tasks and experiments have their own starts"
+        )
     if update and force:
         raise MapError("--update cannot be used with --force: the map would get another policy's figures")
     if update and robot_options:
@@ -145,10 +154,10 @@ def evaluate_command(
         import_options,
         force=force,
         start=start,
-        without_map=policy_only,
+        without_map=alone,
         robot_options=robot_options,
     )
-    if not policy_only:
+    if not alone:
         check_judging_seeds(config, seeds)
     if experiment is not None:
         rest = [build_drive_config(other, None, "", import_options, force=force) for other in others]
@@ -176,8 +185,15 @@ def evaluate_command(
         from pdtui.evaluation.policy_evaluation import evaluate_policy
 
         with progress_bar("evaluating", quiet=as_json) as advance:
-            alone = evaluate_policy(config, seeds, progress=advance)
-        print_result(asdict(alone), as_json, lambda: policy_evaluation_table(alone))
+            measured = evaluate_policy(config, seeds, progress=advance)
+        print_result(asdict(measured), as_json, lambda: policy_evaluation_table(measured))
+    elif gait:
+        from pdtui.evaluation.gait.gait_evaluation import evaluate_gait
+        from pdtui.evaluation.gait.gait_tables import gait_tables
+
+        with progress_bar("walking", quiet=as_json) as advance:
+            walked = evaluate_gait(config, seeds, progress=advance)
+        print_result(asdict(walked), as_json, lambda: gait_tables(walked))
     else:
         from pdtui.evaluation.protocol_settings import QUICK_SEEDS, choose_protocol
 

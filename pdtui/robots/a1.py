@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.core.outcome import fall_info
+from pdtui.core.robot_links_and_state import Foot, FootPlace
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
@@ -24,7 +25,7 @@ from pdtui.robots.simulators.bullet_robot import BulletRobot
 from pdtui.robots.simulators.urdf_link_shapes import read_urdf_link_shapes
 from pdtui.robots.task import Task
 
-_LEGS = {"FR": "front right", "FL": "front left", "RR": "rear right", "RL": "rear left"}
+_LEGS: dict[str, FootPlace] = {"FR": "front right", "FL": "front left", "RR": "rear right", "RL": "rear left"}
 _JOINTS = tuple(f"{leg}_{part}" for leg in _LEGS for part in ("hip", "upper", "lower"))
 # Joint angles at action 0, and their change per unit of action, rad.
 _STANCE = np.array([0.0, 0.9, -1.8] * 4)
@@ -73,6 +74,7 @@ class A1(BulletRobot):
 
     name = "a1"
     title = "Unitree A1 (PyBullet)"
+    feet = tuple(Foot(place, f"{leg}_toe", place, f"{place} contact") for leg, place in _LEGS.items())
     observation_edits = a1_observation_edits(_DT * _SUBSTEPS)
     tasks: tuple[Task, ...] = A1_TASKS
     # A policy that runs faster cannot be steered between trees. PyBullet holds Python's lock while it steps,
