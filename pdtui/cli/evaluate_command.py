@@ -17,6 +17,7 @@ from pdtui.cli.evaluate.paper_experiments import (
     run_experiment,
 )
 from pdtui.cli.evaluate.run_watching import watch_runs
+from pdtui.cli.evaluate.single_measurements import print_policy_alone, print_releases, print_target_tracking
 from pdtui.cli.options.robot_option_flag import robot_option_flag
 from pdtui.cli.shared_options import (
     FILE_PATH,
@@ -64,6 +65,9 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Measure how the policy alone walks: contacts, clearance and slip of each foot.",
 )
+@click.option(
+    "--let-go", is_flag=True, help="Measure whether the robot stays up after each behavior is let go."
+)
 @start_option
 @click.option(
     "--update", is_flag=True, help="Write the effects of the behaviors into the map; its comments are kept."
@@ -110,6 +114,7 @@ def evaluate_command(
     target: str | None,
     policy_only: bool,
     gait: bool,
+    let_go: bool,
     start: str,
     update: bool,
     quick: bool,
@@ -126,13 +131,20 @@ def evaluate_command(
     """Measure what each behavior of ROBOT, a robot's name or a map file, does beside the policy alone."""
     own_options = {name: value for name, value in own_options.items() if value not in (None, ())}
     _check_modes(
-        {"--policy-only": policy_only, "--gait": gait, "--target": target, "--experiment": experiment},
-        {"--update": update, "--quick": quick, "--hold": hold, "--strip": strip, "--watch": watch},
+        {
+            "--policy-only": policy_only,
+            "--gait": gait,
+            "--let-go": let_go,
+            "--target": target,
+            "--experiment": experiment,
+        },
+        {"--update": update, "--quick": quick, "--strip": strip, "--watch": watch}
+        | ({} if let_go else {"--hold": hold}),
     )
     if experiment is None and (others or pictures):
         raise click.UsageError(f"{'more than one map' if others else '-o'} needs --experiment")
-    alone = policy_only or gait
-    if start and not alone:
+    without_map = policy_only or gait
+    if start and not without_map:
         raise click.UsageError(
             "--start needs --policy-only or --gait; tasks and experiments have their own starts"
         )
@@ -154,10 +166,10 @@ def evaluate_command(
         import_options,
         force=force,
         start=start,
-        without_map=alone,
+        without_map=without_map,
         robot_options=robot_options,
     )
-    if not alone:
+    if not without_map:
         check_judging_seeds(config, seeds)
     if experiment is not None:
         rest = [build_drive_config(other, None, "", import_options, force=force) for other in others]
@@ -174,26 +186,11 @@ def evaluate_command(
             options=own_options,
         )
     elif target is not None:
-        from pdtui.evaluation.evaluation_tables import tracking_table
-        from pdtui.evaluation.target_tracking import evaluate_target_tracking
-
-        with progress_bar("holding targets", quiet=as_json) as advance:
-            tracking = evaluate_target_tracking(config, target, seeds, workers=workers, progress=advance)
-        print_result(asdict(tracking), as_json, lambda: tracking_table(tracking))
-    elif policy_only:
-        from pdtui.evaluation.evaluation_tables import policy_evaluation_table
-        from pdtui.evaluation.policy_evaluation import evaluate_policy
-
-        with progress_bar("evaluating", quiet=as_json) as advance:
-            measured = evaluate_policy(config, seeds, progress=advance)
-        print_result(asdict(measured), as_json, lambda: policy_evaluation_table(measured))
-    elif gait:
-        from pdtui.evaluation.gait.gait_evaluation import evaluate_gait
-        from pdtui.evaluation.gait.gait_tables import gait_tables
-
-        with progress_bar("walking", quiet=as_json) as advance:
-            walked = evaluate_gait(config, seeds, progress=advance)
-        print_result(asdict(walked), as_json, lambda: gait_tables(walked))
+        print_target_tracking(config, target, seeds, workers, as_json)
+    elif without_map:
+        print_policy_alone(config, seeds, as_json, gait=gait)
+    elif let_go:
+        print_releases(config, seeds, hold, workers, as_json)
     else:
         from pdtui.evaluation.protocol_settings import QUICK_SEEDS, choose_protocol
 

@@ -186,7 +186,7 @@ units = ["0:1"]
 values = {turn = 6.0}
 """
     )
-    edit = ObservationEdit("turn", "rad", "it is turned", note, wraps=True)
+    edit = ObservationEdit("turn", "rad", "it is turned", note, period=2 * np.pi)
     latch = BehaviorLatch(parse_map(text, "m"), (4,), ATTRIBUTES, DT, (edit,))
     latch.latch_behavior("it", _gait(0))
     for step in range(3):
