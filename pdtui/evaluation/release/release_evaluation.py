@@ -108,7 +108,7 @@ def evaluate_releases(
         loop.policy.name,
         tuple(seeds),
         FOLLOWED_STEPS,
-        tuple(_summarise(name, seeds, times, traces, column) for name in names),
+        tuple(summarise_release(name, seeds, times, traces, column) for name in names),
     )
 
 
@@ -119,13 +119,22 @@ def _plan_times(loop: ControlLoop, name: str, seed: int, held: int) -> RunTimes:
     return RunTimes(usual.press, steps, FOLLOWED_STEPS, usual.window, usual.bin, dt)
 
 
-def _summarise(
+def summarise_release(
     name: str,
     seeds: Sequence[int],
     times: Mapping[tuple[str, int], RunTimes],
     traces: Mapping[tuple[str, int], HeldRunTrace],
     column: int | None,
 ) -> BehaviorRelease:
+    """Return the figures of one behavior.
+
+    Args:
+        name: The behavior.
+        seeds: The seeds.
+        times: Times of each run by behavior and seed.
+        traces: Its run by behavior and seed; that without a press has an empty name.
+        column: Column of the attribute ``speed``; None if there is none.
+    """
     held = times[name, seeds[0]].held
     ends = [_failed_at(traces[name, seed]) for seed in seeds]
     alone = [_failed_at(traces["", seed]) for seed in seeds]

@@ -166,7 +166,12 @@ def test_a_period_that_ends_fades_too() -> None:
     np.testing.assert_allclose(added, [1, 1, 1, 0.8, 0.6, 0.4, 0.2, 0, 0], atol=1e-6)
 
 
-def test_a_turn_fades_by_the_shorter_way() -> None:
+@pytest.mark.parametrize(
+    ("period", "short"),
+    [(2 * np.pi, 6.0 - 2 * np.pi), (4 * np.pi, 6.0), (0.0, 6.0)],
+    ids=["angle", "quaternion", "length"],
+)
+def test_an_imprint_fades_by_the_shorter_way(period: float, short: float) -> None:
     sizes: list[float] = []
 
     def note(observation: np.ndarray, size: float) -> np.ndarray:
@@ -186,7 +191,7 @@ units = ["0:1"]
 values = {turn = 6.0}
 """
     )
-    edit = ObservationEdit("turn", "rad", "it is turned", note, period=2 * np.pi)
+    edit = ObservationEdit("turn", "rad", "it is turned", note, period)
     latch = BehaviorLatch(parse_map(text, "m"), (4,), ATTRIBUTES, DT, (edit,))
     latch.latch_behavior("it", _gait(0))
     for step in range(3):
@@ -195,5 +200,4 @@ values = {turn = 6.0}
         for one in latch.stimulate(_gait(step)).edits:
             one.prepare(np.zeros(2), lambda _observation, _last: np.zeros(4, np.float32))
         latch.end_step()
-    short = 6.0 - 2 * np.pi
     np.testing.assert_allclose(sizes, [6.0, short * 2 / 3, short / 3])
