@@ -44,7 +44,7 @@ class Stepper(Robot):
         Link("left sole", 1, "sphere", (0.05,), (0.0, 0.0, 0.0), UPRIGHT),
         Link("right sole", 2, "sphere", (0.05,), (0.0, 0.0, 0.0), UPRIGHT),
     )
-    feet = (Foot("left foot", "left sole"), Foot("right foot", "right sole"))
+    feet: tuple[Foot, ...] = (Foot("left foot", "left sole"), Foot("right foot", "right sole"))
     attributes = (Attribute("left contact", ""), Attribute("right contact", ""))
     observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float64)
     action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,))
