@@ -17,7 +17,7 @@ from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
-from pdtui.robots.legged.terrain import RoughGround, draw_rough_ground, scatter_trees
+from pdtui.robots.legged.terrain import draw_rough_ground, scatter_trees
 from pdtui.robots.observation_edits.a1_observation_edits import a1_observation_edits
 from pdtui.robots.robot import ResetResult, StepResult, TrainingRecipe
 from pdtui.robots.simulators import bullet_robot
@@ -130,14 +130,13 @@ class A1(BulletRobot):
         bullet.setTimeStep(_DT)
         bullet.setPhysicsEngineParameter(numSolverIterations=18, enableConeFriction=0)
         angles = _STANCE + rng.uniform(-_START_NOISE, _START_NOISE, 12)
-        self.ground: RoughGround | None = None
-        if start == "plane":
+        self.ground = None if start == "plane" else draw_rough_ground(rng, self._roughness)
+        if self.ground is None:
             bullet_robot.add_ground_plane(bullet, _FRICTION)
         else:
-            self.ground = draw_rough_ground(rng, self._roughness)
             bullet_robot.add_rough_ground(bullet, self.ground, _FRICTION)
-        trees = scatter_trees(rng, self._density) if start == "forest" else None
-        self.scenery = NO_SCENERY if trees is None else Scenery(cylinders=trees)
+        has_trees = start == "forest"
+        self.scenery = Scenery(cylinders=scatter_trees(rng, self._density)) if has_trees else NO_SCENERY
         self._trees = bullet_robot.add_trees(bullet, self.scenery.cylinders)
         flags = bullet.URDF_IGNORE_VISUAL_SHAPES
         robot: int = bullet.loadURDF(str(self._urdf), [0, 0, _START_HEIGHT], flags=flags)
@@ -195,9 +194,7 @@ class A1(BulletRobot):
         self._untouched = np.where(touched, 0.0, self._untouched + 1.0)
         reason = self._find_fall()
         forward = min(float(moved[0]) / self.control_dt, self._top_speed)
-        reward = forward + _ALIVE_REWARD - _ENERGY_WEIGHT * energy / _SUBSTEPS
-        if reason:
-            reward -= _FALL_PENALTY
+        reward = forward + _ALIVE_REWARD - _ENERGY_WEIGHT * energy / _SUBSTEPS - _FALL_PENALTY * bool(reason)
         return self.observe(), reward, bool(reason), False, {"cost": cost, **fall_info(reason)}
 
     def observe(self) -> Floats:
