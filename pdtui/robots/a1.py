@@ -109,8 +109,12 @@ class A1(BulletRobot):
         super().__init__()
         if terrain not in self.starts:
             raise RobotError(f"{self.name}: no terrain '{terrain}'; available: {', '.join(self.starts)}")
-        self._terrain, self._roughness, self._density = terrain, roughness, density
-        self._top_speed = top_speed
+        self._terrain, self._roughness, self._density, self._top_speed = (
+            terrain,
+            roughness,
+            density,
+            top_speed,
+        )
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93,), np.float64)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (6,), np.float32)
         self._urdf = bullet_robot.bullet_data_folder() / "a1" / "a1.urdf"
@@ -135,8 +139,8 @@ class A1(BulletRobot):
             bullet_robot.add_ground_plane(bullet, _FRICTION)
         else:
             bullet_robot.add_rough_ground(bullet, self.ground, _FRICTION)
-        has_trees = start == "forest"
-        self.scenery = Scenery(cylinders=scatter_trees(rng, self._density)) if has_trees else NO_SCENERY
+        trees = scatter_trees(rng, self._density) if start == "forest" else None
+        self.scenery = NO_SCENERY if trees is None else Scenery(cylinders=trees)
         self._trees = bullet_robot.add_trees(bullet, self.scenery.cylinders)
         flags = bullet.URDF_IGNORE_VISUAL_SHAPES
         robot: int = bullet.loadURDF(str(self._urdf), [0, 0, _START_HEIGHT], flags=flags)
