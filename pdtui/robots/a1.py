@@ -39,9 +39,8 @@ _START_HEIGHT, _START_NOISE = 0.28, 0.05  # of the trunk, m, and of the joints, 
 # Below this height (m), or with less than this share of its vertical axis upright, the robot has fallen.
 _MIN_HEIGHT, _MIN_UPRIGHT = 0.2, 0.6
 _FRICTION = {"lateralFriction": 1.0, "spinningFriction": 0.01, "rollingFriction": 0.01}
-# Distance from the trunk to a trunk of a tree within which the legs may touch the tree, m.
-_REACH = 0.8
-_STEPS_BETWEEN_HITS = 31  # half a second
+# Distance to a trunk of a tree within which the legs may touch it (m), and control steps between two hits.
+_REACH, _STEPS_BETWEEN_HITS = 0.8, 31
 _ALIVE_REWARD, _FALL_PENALTY, _ENERGY_WEIGHT = 0.3, 10.0, 0.0005
 
 
@@ -109,12 +108,8 @@ class A1(BulletRobot):
         super().__init__()
         if terrain not in self.starts:
             raise RobotError(f"{self.name}: no terrain '{terrain}'; available: {', '.join(self.starts)}")
-        self._terrain, self._roughness, self._density, self._top_speed = (
-            terrain,
-            roughness,
-            density,
-            top_speed,
-        )
+        self._terrain, self._roughness, self._density = terrain, roughness, density
+        self._top_speed = top_speed
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93,), np.float64)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (6,), np.float32)
         self._urdf = bullet_robot.bullet_data_folder() / "a1" / "a1.urdf"
