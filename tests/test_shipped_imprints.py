@@ -32,6 +32,14 @@ def test_a_key_steers_until_it_is_let_go(
     assert not low <= drive[attribute][40:100].mean() <= high
 
 
+@pytest.mark.parametrize("key", ["a", "d"])
+def test_the_ant_runs_on_when_a_spin_is_let_go(key: str) -> None:
+    drive = pdtui.drive("ant", "ant-imprints", keys={100: key, 600: "space"}, steps=900, seed=1803)
+    assert not drive.endings
+    assert abs(drive["yaw"][600] - drive["yaw"][100]) > 0.5  # another heading
+    assert drive["vx"][-60:].mean() > 3.5
+
+
 def test_the_ant_faces_where_the_arrow_keys_point() -> None:
     left = dict.fromkeys(range(61, 69), "left")
     drive = pdtui.drive("ant", "ant-imprints", keys={60: "h", **left}, steps=600, seed=SEED)

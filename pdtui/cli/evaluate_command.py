@@ -17,6 +17,7 @@ from pdtui.cli.evaluate.paper_experiments import (
     run_experiment,
 )
 from pdtui.cli.evaluate.run_watching import watch_runs
+from pdtui.cli.evaluate.single_measurements import print_policy_alone, print_releases, print_target_tracking
 from pdtui.cli.options.robot_option_flag import robot_option_flag
 from pdtui.cli.shared_options import (
     FILE_PATH,
@@ -59,6 +60,14 @@ if TYPE_CHECKING:
     "--target", metavar="ATTRIBUTE", help="Measure how precisely targets of this attribute are held."
 )
 @click.option("--policy-only", is_flag=True, help="Measure the policy alone, one episode per seed.")
+@click.option(
+    "--gait",
+    is_flag=True,
+    help="Measure how the policy alone walks: contacts, clearance and slip of each foot.",
+)
+@click.option(
+    "--let-go", is_flag=True, help="Measure whether the robot stays up after each behavior is let go."
+)
 @start_option
 @click.option(
     "--update", is_flag=True, help="Write the effects of the behaviors into the map; its comments are kept."
@@ -104,6 +113,8 @@ def evaluate_command(
     seeds: range,
     target: str | None,
     policy_only: bool,
+    gait: bool,
+    let_go: bool,
     start: str,
     update: bool,
     quick: bool,
@@ -120,13 +131,23 @@ def evaluate_command(
     """Measure what each behavior of ROBOT, a robot's name or a map file, does beside the policy alone."""
     own_options = {name: value for name, value in own_options.items() if value not in (None, ())}
     _check_modes(
-        {"--policy-only": policy_only, "--target": target, "--experiment": experiment},
-        {"--update": update, "--quick": quick, "--hold": hold, "--strip": strip, "--watch": watch},
+        {
+            "--policy-only": policy_only,
+            "--gait": gait,
+            "--let-go": let_go,
+            "--target": target,
+            "--experiment": experiment,
+        },
+        {"--update": update, "--quick": quick, "--strip": strip, "--watch": watch}
+        | ({} if let_go else {"--hold": hold}),
     )
     if experiment is None and (others or pictures):
         raise click.UsageError(f"{'more than one map' if others else '-o'} needs --experiment")
-    if start and not policy_only:
-        raise click.UsageError("--start needs --policy-only; tasks and experiments have their own starts")
+    without_map = policy_only or gait
+    if start and not without_map:
+        raise click.UsageError(
+            "--start needs --policy-only or --gait; tasks and experiments have their own starts"
+        )
     if update and force:
         raise MapError("--update cannot be used with --force: the map would get another policy's figures")
     if update and robot_options:
@@ -145,10 +166,10 @@ def evaluate_command(
         import_options,
         force=force,
         start=start,
-        without_map=policy_only,
+        without_map=without_map,
         robot_options=robot_options,
     )
-    if not policy_only:
+    if not without_map:
         check_judging_seeds(config, seeds)
     if experiment is not None:
         rest = [build_drive_config(other, None, "", import_options, force=force) for other in others]
@@ -165,19 +186,11 @@ def evaluate_command(
             options=own_options,
         )
     elif target is not None:
-        from pdtui.evaluation.evaluation_tables import tracking_table
-        from pdtui.evaluation.target_tracking import evaluate_target_tracking
-
-        with progress_bar("holding targets", quiet=as_json) as advance:
-            tracking = evaluate_target_tracking(config, target, seeds, workers=workers, progress=advance)
-        print_result(asdict(tracking), as_json, lambda: tracking_table(tracking))
-    elif policy_only:
-        from pdtui.evaluation.evaluation_tables import policy_evaluation_table
-        from pdtui.evaluation.policy_evaluation import evaluate_policy
-
-        with progress_bar("evaluating", quiet=as_json) as advance:
-            alone = evaluate_policy(config, seeds, progress=advance)
-        print_result(asdict(alone), as_json, lambda: policy_evaluation_table(alone))
+        print_target_tracking(config, target, seeds, workers, as_json)
+    elif without_map:
+        print_policy_alone(config, seeds, as_json, gait=gait)
+    elif let_go:
+        print_releases(config, seeds, hold, workers, as_json)
     else:
         from pdtui.evaluation.protocol_settings import QUICK_SEEDS, choose_protocol
 

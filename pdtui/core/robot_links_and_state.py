@@ -1,4 +1,4 @@
-"""Plain data about robots: shapes, whole states, commands for the policy and controls for the operator."""
+"""Plain data about robots: shapes, feet, whole states, commands for the policy, controls for the operator."""
 
 from __future__ import annotations
 
@@ -65,6 +65,30 @@ class Link:
     size: tuple[float, ...]
     position: tuple[float, float, float]
     quaternion: tuple[float, float, float, float]
+
+
+FootPlace = Literal["", "front left", "front right", "rear left", "rear right"]
+
+
+@dataclass(frozen=True)
+class Foot:
+    """A part of the robot that it walks on.
+
+    Attributes:
+        name: name in tables.
+        link: name of the link whose lowest point is the sole.
+        place: which of four feet it is, so that a gait can be named; empty for robots with other feet.
+        contact: name of the attribute that is above 0 while the foot touches the ground; empty if there is
+            none. MuJoCo's contacts need none.
+        contact_delay: control steps by which contacts are late. Box2D reports what touched before its last
+            physics step, which matters where that is the whole control step.
+    """
+
+    name: str
+    link: str
+    place: FootPlace = ""
+    contact: str = ""
+    contact_delay: int = 0
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.core.outcome import fall_info
+from pdtui.core.robot_links_and_state import Foot, FootPlace
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
-from pdtui.robots.legged.terrain import RoughGround, draw_rough_ground, scatter_trees
+from pdtui.robots.legged.terrain import draw_rough_ground, scatter_trees
 from pdtui.robots.observation_edits.a1_observation_edits import a1_observation_edits
 from pdtui.robots.robot import ResetResult, StepResult, TrainingRecipe
 from pdtui.robots.simulators import bullet_robot
@@ -24,7 +25,7 @@ from pdtui.robots.simulators.bullet_robot import BulletRobot
 from pdtui.robots.simulators.urdf_link_shapes import read_urdf_link_shapes
 from pdtui.robots.task import Task
 
-_LEGS = {"FR": "front right", "FL": "front left", "RR": "rear right", "RL": "rear left"}
+_LEGS: dict[str, FootPlace] = {"FR": "front right", "FL": "front left", "RR": "rear right", "RL": "rear left"}
 _JOINTS = tuple(f"{leg}_{part}" for leg in _LEGS for part in ("hip", "upper", "lower"))
 # Joint angles at action 0, and their change per unit of action, rad.
 _STANCE = np.array([0.0, 0.9, -1.8] * 4)
@@ -38,9 +39,8 @@ _START_HEIGHT, _START_NOISE = 0.28, 0.05  # of the trunk, m, and of the joints, 
 # Below this height (m), or with less than this share of its vertical axis upright, the robot has fallen.
 _MIN_HEIGHT, _MIN_UPRIGHT = 0.2, 0.6
 _FRICTION = {"lateralFriction": 1.0, "spinningFriction": 0.01, "rollingFriction": 0.01}
-# Distance from the trunk to a trunk of a tree within which the legs may touch the tree, m.
-_REACH = 0.8
-_STEPS_BETWEEN_HITS = 31  # half a second
+# Distance to a trunk of a tree within which the legs may touch it (m), and control steps between two hits.
+_REACH, _STEPS_BETWEEN_HITS = 0.8, 31
 _ALIVE_REWARD, _FALL_PENALTY, _ENERGY_WEIGHT = 0.3, 10.0, 0.0005
 
 
@@ -73,6 +73,7 @@ class A1(BulletRobot):
 
     name = "a1"
     title = "Unitree A1 (PyBullet)"
+    feet = tuple(Foot(place, f"{leg}_toe", place, f"{place} contact") for leg, place in _LEGS.items())
     observation_edits = a1_observation_edits(_DT * _SUBSTEPS)
     tasks: tuple[Task, ...] = A1_TASKS
     # A policy that runs faster cannot be steered between trees. PyBullet holds Python's lock while it steps,
@@ -128,11 +129,10 @@ class A1(BulletRobot):
         bullet.setTimeStep(_DT)
         bullet.setPhysicsEngineParameter(numSolverIterations=18, enableConeFriction=0)
         angles = _STANCE + rng.uniform(-_START_NOISE, _START_NOISE, 12)
-        self.ground: RoughGround | None = None
-        if start == "plane":
+        self.ground = None if start == "plane" else draw_rough_ground(rng, self._roughness)
+        if self.ground is None:
             bullet_robot.add_ground_plane(bullet, _FRICTION)
         else:
-            self.ground = draw_rough_ground(rng, self._roughness)
             bullet_robot.add_rough_ground(bullet, self.ground, _FRICTION)
         trees = scatter_trees(rng, self._density) if start == "forest" else None
         self.scenery = NO_SCENERY if trees is None else Scenery(cylinders=trees)
@@ -193,9 +193,7 @@ class A1(BulletRobot):
         self._untouched = np.where(touched, 0.0, self._untouched + 1.0)
         reason = self._find_fall()
         forward = min(float(moved[0]) / self.control_dt, self._top_speed)
-        reward = forward + _ALIVE_REWARD - _ENERGY_WEIGHT * energy / _SUBSTEPS
-        if reason:
-            reward -= _FALL_PENALTY
+        reward = forward + _ALIVE_REWARD - _ENERGY_WEIGHT * energy / _SUBSTEPS - _FALL_PENALTY * bool(reason)
         return self.observe(), reward, bool(reason), False, {"cost": cost, **fall_info(reason)}
 
     def observe(self) -> Floats:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.outcome import fall_info
+from pdtui.core.robot_links_and_state import Foot
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
 from pdtui.robots.observation_edits.heading_edit import quaternion_heading_edits
@@ -40,6 +41,12 @@ class Ant(MujocoRobot, AntEnv):
 
     name = "ant"
     title = "Ant (MuJoCo)"
+    feet = (
+        Foot("front left", "left_ankle_geom", "front left"),
+        Foot("front right", "fourth_ankle_geom", "front right"),
+        Foot("back left", "right_ankle_geom", "rear left"),
+        Foot("back right", "third_ankle_geom", "rear right"),
+    )
     observation_edits = (
         *quaternion_heading_edits(quaternion=1, velocity=13),
         offset_observed_number(0, "height offset", "m", "the torso is higher by this much"),

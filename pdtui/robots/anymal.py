@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.outcome import fall_info
-from pdtui.core.robot_links_and_state import CommandRange
+from pdtui.core.robot_links_and_state import CommandRange, Foot
 from pdtui.robots.geometry import roll_pitch_yaw, rotate_vectors
 from pdtui.robots.legged.legged_observation_edits import TRUNK_EDITS, command_edits
 from pdtui.robots.legged.observations_and_rewards import (
@@ -72,6 +72,12 @@ class Anymal(MujocoRobot):
     name = "anymal"
     title = "ANYmal-C (MuJoCo)"
     frame_skip = SUBSTEPS
+    feet = (
+        Foot("LF", "LF_FOOT", "front left"),
+        Foot("RF", "RF_FOOT", "front right"),
+        Foot("LH", "LH_FOOT", "rear left"),
+        Foot("RH", "RH_FOOT", "rear right"),
+    )
     _action: Floats
     _last_action: Floats
     _air_time: Floats

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.core.errors import RobotError
 from pdtui.core.outcome import Outcome, fall_info
-from pdtui.core.robot_links_and_state import Link
+from pdtui.core.robot_links_and_state import Foot, Link
 from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
 from pdtui.robots.joint_and_trunk_attributes import torque_attributes
@@ -133,6 +133,9 @@ class BipedalWalker(GymnasiumRobot):
 
     name = "bipedal_walker"
     title = "BipedalWalker (Box2D)"
+    feet = tuple(
+        Foot(f"foot {leg}", f"shin {leg}", contact=f"foot {leg} contact", contact_delay=1) for leg in (1, 2)
+    )
     tasks = BIPEDAL_WALKER_TASKS
     # A fall costs only a third of what the whole way earns, so rewards are scaled up from PPO's usual 0.02.
     training_recipe = TrainingRecipe(settings={"reward_scale": 0.1, "evaluate_steps": 1600})

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import RobotError
 from pdtui.core.outcome import Outcome, outcome_of_step
-from pdtui.core.robot_links_and_state import CommandRange, Link, ManualControl, RobotState
+from pdtui.core.robot_links_and_state import CommandRange, Foot, Link, ManualControl, RobotState
 from pdtui.core.scenery import NO_SCENERY, NO_TRAFFIC, Scenery, Traffic
+from pdtui.robots.legged.foot_contacts import read_contact_attributes
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions, format_robot_options
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
@@ -60,6 +61,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         title: Name for people.
         attributes: What `read_attributes` measures.
         links: Shapes to draw.
+        feet: The links that it walks on; empty for a robot that does not walk, or does not say.
         starts: States besides the usual one in which `reset` can start, by its option ``start``.
         commands: What a policy can be commanded, and its default, by name; empty for most robots.
         command_ranges: Ranges in which the policy was trained to follow the commands.
@@ -80,6 +82,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     title: str
     attributes: tuple[Attribute, ...]
     links: tuple[Link, ...]
+    feet: tuple[Foot, ...] = ()
     starts: tuple[str, ...] = ()
     commands: Mapping[str, float] = MappingProxyType({})
     command_ranges: Mapping[str, CommandRange] = MappingProxyType({})
@@ -115,6 +118,10 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     @abstractmethod
     def read_poses(self) -> Floats:
         """Return the world pose of every body, shape (B, 7): x y z in m, then a quaternion w x y z."""
+
+    def read_foot_contacts(self) -> list[bool] | None:
+        """Return whether each of `feet` touches the ground; None if neither simulator nor attributes tell."""
+        return read_contact_attributes(self)
 
     def read_traffic(self) -> Traffic:
         """Return the boxes around the robot that may move, appear and vanish; a drive asks once per step."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.core.outcome import fall_info
+from pdtui.core.robot_links_and_state import Foot
 from pdtui.robots.joint_and_trunk_attributes import torque_attributes
 from pdtui.robots.observation_edits.observation_edit import offset_observed_number, set_observed_number
 from pdtui.robots.robot import TrainingRecipe
@@ -140,6 +141,7 @@ class Walker(MujocoRobot, Walker2dEnv):
 
     name = "walker"
     title = "Walker (MuJoCo)"
+    feet = tuple(Foot(f"{side} foot", geom) for side, geom in _FEET.items())
     tasks = WALKER_TASKS
     state_arrays = ("_in_air",)
     observation_edits = (

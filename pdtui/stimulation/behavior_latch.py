@@ -14,6 +14,7 @@ from pdtui.core.units import ADDRESS, NO_STIMULATION, Stimulation, UnitEdit, par
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 from pdtui.stimulation.interventions.bound_intervention import bind_intervention, overwrite_by_layer
 from pdtui.stimulation.interventions.gait_clock import GaitClock, GaitMark
+from pdtui.stimulation.interventions.unit_edits import EditObservation, ImprintUnits
 from pdtui.stimulation.latched_behavior import LatchedBehavior, LatchState
 from pdtui.stimulation.pid_magnitude import PidMagnitude
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -146,6 +147,7 @@ class BehaviorLatch:
             return NO_STIMULATION
         values: dict[int, float] = {}
         edits: list[UnitEdit] = []
+        fading: list[EditObservation] = []
         for latched in self._latched:
             if not self._has_begun(latched):
                 continue
@@ -164,7 +166,11 @@ class BehaviorLatch:
                 else:
                     values |= own
             for one in latched.interventions:
-                edits += one.make_edits(factor, latched.age, attributes, self._clocks, latched.fade_factor)
+                made = one.make_edits(factor, latched.age, attributes, self._clocks, latched.fade_factor)
+                # What fades is not cut off by an imprint of the same units: that begins where it is now.
+                edits += [e.seen_through(fading) if isinstance(e, ImprintUnits) else e for e in made]
+                if latched.fading:
+                    fading += {e.edit_observation: None for e in made if isinstance(e, ImprintUnits)}
         return Stimulation(tuple(values), tuple(values.values()), tuple(edits))
 
     def end_step(self, activations: NDArray[np.float32] | None = None) -> None:

@@ -33,6 +33,14 @@ kind = "add"
 values = {"1:3" = 1.0, "1:4" = -1.0}
 time_gate = {times = [0.0, 0.2], factors = [1.0, 0.0], repeat = 0.4}
 [[behaviors]]
+name = "whirl"
+key = "l"
+fade = 0.6
+[[behaviors.interventions]]
+kind = "imprint"
+units = ["0:*"]
+rates = {"heading offset" = -12.0}
+[[behaviors]]
 name = "face"
 key = "f"
 mode = "pid"
@@ -91,3 +99,26 @@ def test_the_session_holds_what_an_imprint_came_to(further_map: Path) -> None:
     stimulation = driven.stimulations[12]
     values = driven.activations[12, list(stimulation.units)]
     np.testing.assert_array_equal(np.array(stimulation.values, np.float32), values)
+
+
+def test_a_fade_after_more_than_a_turn_replays_and_rewinds(further_map: Path, tmp_path: Path) -> None:
+    session = tmp_path / "drive.rrd"
+    keys = {5: "l", 15: "space", 80: "backspace"}  # back by 3 s, into the fade
+    driven = drive("ant", further_map, keys=keys, steps=100, seed=3, record=session)
+    acts = [bool(stimulation.units) for stimulation in driven.stimulations]
+    assert acts[5:28] == [True] * 22 + [False]  # 10 steps held, and 12 while it fades
+    assert acts[80:88] == acts[20:28]
+    assert replay(session).identical
+
+
+def test_a_rewind_into_a_fade_goes_on_fading(policy: Policy, map_text: str) -> None:
+    def drive_on(rewinds: bool) -> list[int]:
+        loop = ControlLoop(make_robot("ant"), policy, parse_map(map_text + FURTHER, "m"), 3)
+        events = {5: DriveEvent(5, "behavior", "whirl"), 16: DriveEvent(16, "default")}
+        digests = [loop.advance([events[step]] if step in events else []).digest for step in range(26)]
+        if rewinds:  # to step 20, in the middle of the fade
+            back = loop.advance([DriveEvent(26, "rewind", value=20.0)])
+            digests = [*digests[:20], back.digest, *(loop.advance().digest for _ in range(5))]
+        return digests
+
+    assert drive_on(rewinds=True) == drive_on(rewinds=False)

@@ -114,3 +114,30 @@ def test_edits_of_the_a1_move_yaw_and_displacements_together() -> None:
     assert math.atan2(moved[1], moved[0]) == pytest.approx(observation[11])
     untouched = [place for place in range(93) if place not in (0, 1, 3, 4, 6, 7)]
     np.testing.assert_array_equal(faster[untouched], observation[untouched])
+
+
+def test_a_quaternion_is_the_same_after_two_turns_and_not_after_one() -> None:
+    robot, observation = _walked("ant")
+    offset = _edit(robot, "heading offset")
+    np.testing.assert_allclose(offset.apply(observation, 0.4 + 4 * np.pi), offset.apply(observation, 0.4))
+    once = offset.apply(observation, 0.4 + 2 * np.pi)
+    np.testing.assert_allclose(once[1:5], -offset.apply(observation, 0.4)[1:5])
+    np.testing.assert_allclose(once[5:], offset.apply(observation, 0.4)[5:], atol=1e-12)
+    for size in (5.0, -6.0, 7.0, 21.25, -21.25):
+        short = offset.shortest(size)
+        assert abs(short) <= 2 * np.pi
+        np.testing.assert_allclose(offset.apply(observation, short), offset.apply(observation, size))
+
+
+def test_a_heading_is_set_in_the_same_way_however_often_the_robot_has_turned() -> None:
+    robot, observation = _walked("ant")
+    turned = _edit(robot, "heading offset").apply(observation, 2 * np.pi)
+    heading = _edit(robot, "heading")
+    np.testing.assert_allclose(heading.apply(turned, 0.5), heading.apply(observation, 0.5), atol=1e-9)
+
+
+def test_an_angle_is_the_same_after_one_turn_and_a_length_never() -> None:
+    pytest.importorskip("pybullet", reason="PyBullet has no wheels for every Python")
+    robot, _ = _walked("a1", 4)
+    assert _edit(robot, "heading offset").shortest(7.0) == pytest.approx(7.0 - 2 * np.pi)
+    assert _edit(robot, "speed offset").shortest(7.0) == 7.0

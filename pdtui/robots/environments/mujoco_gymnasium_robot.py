@@ -12,6 +12,7 @@ import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
+from pdtui.robots.legged.foot_contacts import read_mujoco_contacts
 from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions
 from pdtui.robots.robot import ResetResult
 from pdtui.robots.simulators import mujoco_robot
@@ -104,6 +105,9 @@ class MujocoGymnasiumRobot(GymnasiumRobot):
         posed.mocap_quat[:] = world.data.mocap_quat
         mujoco.mj_kinematics(world.model, posed)
         return mujoco_robot.read_body_poses(posed)
+
+    def read_foot_contacts(self) -> list[bool]:
+        return read_mujoco_contacts(self.world.model, self.world.data, self.feet)
 
     def digest(self) -> int:
         if self._repeats:

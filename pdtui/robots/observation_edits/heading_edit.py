@@ -1,6 +1,10 @@
 """Edits of the heading in an observation: "heading" sets it and "heading offset" adds to it, both in rad.
 
 The velocity in the world turns with the trunk, so that the robot seems to do the same in another direction.
+
+A quaternion and its negative are the same heading, and not the same observation: a robot that has turned once
+round observes the negative of what it observed before. A policy that never did so in training falls at once.
+An offset therefore counts whole turns: it makes the same observation again only after two of them.
 """
 
 from __future__ import annotations
@@ -32,9 +36,12 @@ def quaternion_heading_edits(quaternion: int, velocity: int) -> tuple[Observatio
 
     def face(observation: Floats, heading: float) -> Floats:
         *_, yaw = roll_pitch_yaw(*observation[quaternion : quaternion + 4].tolist())
-        return turn(observation, heading - yaw)
+        edited = turn(observation, heading - yaw)
+        if edited[quaternion] < 0.0:  # however often the robot has turned
+            edited[quaternion : quaternion + 4] *= -1.0
+        return edited
 
-    return _name_edits(face, turn)
+    return _name_edits(face, turn, 4.0 * math.pi)
 
 
 def yaw_heading_edits(
@@ -59,7 +66,7 @@ def yaw_heading_edits(
     def face(observation: Floats, heading: float) -> Floats:
         return turn(observation, heading - float(observation[yaws[0]]))
 
-    return _name_edits(face, turn)
+    return _name_edits(face, turn, 2.0 * math.pi)
 
 
 def displacement_edit(yaws: Sequence[int], displacements: Sequence[int], dt: float) -> ObservationEdit:
@@ -87,17 +94,17 @@ def _rotate(x: float, y: float, angle: float) -> tuple[float, float]:
 
 
 def _name_edits(
-    face: Callable[[Floats, float], Floats], turn: Callable[[Floats, float], Floats]
+    face: Callable[[Floats, float], Floats], turn: Callable[[Floats, float], Floats], period: float
 ) -> tuple[ObservationEdit, ObservationEdit]:
     return (
         ObservationEdit(
-            "heading", "rad", "the torso, and its velocity with it, heads in this direction", face, wraps=True
+            "heading",
+            "rad",
+            "the torso, and its velocity with it, heads in this direction",
+            face,
+            2.0 * math.pi,
         ),
         ObservationEdit(
-            "heading offset",
-            "rad",
-            "torso and velocity are turned to the left by this much",
-            turn,
-            wraps=True,
+            "heading offset", "rad", "torso and velocity are turned to the left by this much", turn, period
         ),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -17,14 +18,19 @@ class ObservationEdit:
         unit: Unit of its size.
         says: What it makes the observation say, as in "the torso is turned by so much".
         apply: Returns the edited observation, given the observation and the size; it copies.
-        wraps: Whether its size is an angle, of which whole turns make no difference.
+        period: Size that makes no difference to the observation, 2π rad for an angle; 4π rad where the
+            angle turns a quaternion, whose sign changes with every whole turn. 0 if there is none.
     """
 
     name: str
     unit: str
     says: str
     apply: Callable[[Floats, float], Floats]
-    wraps: bool = False
+    period: float = 0.0
+
+    def shortest(self, size: float) -> float:
+        """Return the size nearest to 0 that gives the same observation."""
+        return math.remainder(size, self.period) if self.period else size
 
 
 def set_observed_number(index: int, name: str, unit: str, says: str, scale: float = 1.0) -> ObservationEdit:

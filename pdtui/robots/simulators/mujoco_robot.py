@@ -14,6 +14,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.core.robot_links_and_state import Link, RobotState
+from pdtui.robots.legged.foot_contacts import read_mujoco_contacts
 from pdtui.robots.robot import Robot
 from pdtui.robots.simulators.mujoco_disturbances import find_push_directions, push_root, scale_model
 
@@ -153,6 +154,9 @@ class MujocoRobot(Robot):
         # After a step, MuJoCo's poses are those of the state before the last physics step.
         mujoco.mj_kinematics(self.model, self.data)
         return read_body_poses(self.data)
+
+    def read_foot_contacts(self) -> list[bool]:
+        return read_mujoco_contacts(self.model, self.data, self.feet)
 
     def snapshot(self) -> RobotState:
         state = read_mujoco_state(self.model, self.data)

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.core.attributes import Attribute, Floats, attribute_column, wrap_angle
+from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.errors import MapError, PolicyError
 from pdtui.core.units import UnitEdit, parse_unit, split_flat_index
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
@@ -238,7 +238,7 @@ def _bind_imprint(
             grown = intervention.values.get(name, 0.0) + seconds * intervention.rates.get(name, 0.0)
             size = intervention.base.get(name, 0.0) + strength * grown
             if share < 1.0:  # the shorter way back
-                size = share * (wrap_angle(size) if by_name[name].wraps else size)
+                size = share * by_name[name].shortest(size)
             observation = by_name[name].apply(observation, size)
         return observation
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -83,7 +83,17 @@ class ImprintUnits(UnitEdit):
     """Overwrites units by what they would put out for an edited observation."""
 
     def __init__(self, units: NDArray[np.int64], edit_observation: EditObservation) -> None:
-        self.units, self._edit_observation = units, edit_observation
+        self.units, self.edit_observation = units, edit_observation
+
+    def seen_through(self, earlier: Sequence[EditObservation]) -> ImprintUnits:
+        """Return the imprint of an observation to which other edits come first."""
+
+        def edit_observation(observation: Floats) -> Floats:
+            for edit in (*earlier, self.edit_observation):
+                observation = edit(observation)
+            return observation
+
+        return ImprintUnits(self.units, edit_observation) if earlier else self
 
     def change(self, outputs: Outputs) -> NDArray[np.floating[Any]]:
         raise AssertionError(f"an imprint of {len(outputs)} units is bound to an observation first")
@@ -91,5 +101,5 @@ class ImprintUnits(UnitEdit):
     def prepare(
         self, observation: NDArray[Any], activations: Callable[[NDArray[Any], int], Outputs]
     ) -> UnitEdit:
-        imprinted = activations(self._edit_observation(observation.astype(np.float64)), int(self.units[-1]))
+        imprinted = activations(self.edit_observation(observation.astype(np.float64)), int(self.units[-1]))
         return OverwriteUnits(self.units, imprinted[self.units])

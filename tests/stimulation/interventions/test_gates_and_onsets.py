@@ -166,7 +166,12 @@ def test_a_period_that_ends_fades_too() -> None:
     np.testing.assert_allclose(added, [1, 1, 1, 0.8, 0.6, 0.4, 0.2, 0, 0], atol=1e-6)
 
 
-def test_a_turn_fades_by_the_shorter_way() -> None:
+@pytest.mark.parametrize(
+    ("period", "short"),
+    [(2 * np.pi, 6.0 - 2 * np.pi), (4 * np.pi, 6.0), (0.0, 6.0)],
+    ids=["angle", "quaternion", "length"],
+)
+def test_an_imprint_fades_by_the_shorter_way(period: float, short: float) -> None:
     sizes: list[float] = []
 
     def note(observation: np.ndarray, size: float) -> np.ndarray:
@@ -186,7 +191,7 @@ units = ["0:1"]
 values = {turn = 6.0}
 """
     )
-    edit = ObservationEdit("turn", "rad", "it is turned", note, wraps=True)
+    edit = ObservationEdit("turn", "rad", "it is turned", note, period)
     latch = BehaviorLatch(parse_map(text, "m"), (4,), ATTRIBUTES, DT, (edit,))
     latch.latch_behavior("it", _gait(0))
     for step in range(3):
@@ -195,5 +200,34 @@ values = {turn = 6.0}
         for one in latch.stimulate(_gait(step)).edits:
             one.prepare(np.zeros(2), lambda _observation, _last: np.zeros(4, np.float32))
         latch.end_step()
-    short = 6.0 - 2 * np.pi
     np.testing.assert_allclose(sizes, [6.0, short * 2 / 3, short / 3])
+
+
+def test_an_imprint_begins_where_one_that_fades_is() -> None:
+    shown: list[float] = []
+    turn = ObservationEdit("turn", "rad", "it is turned", lambda observation, size: observation + size)
+    imprint = """
+[[behaviors.interventions]]
+kind = "imprint"
+units = ["0:1"]
+values = {turn = SIZE}
+"""
+    first = '[[behaviors]]\nname = "it"\nkey = "a"\nfade = 0.3\n' + imprint.replace("SIZE", "4.0")
+    second = '[[behaviors]]\nname = "other"\nkey = "b"\nfade = 0.1\n' + imprint.replace("SIZE", "-1.0")
+    latch = BehaviorLatch(parse_map(MAP_HEAD + first + second, "m"), (4,), ATTRIBUTES, DT, (turn,))
+
+    def note(observation: np.ndarray, _last: int) -> np.ndarray:
+        shown.append(float(observation[0]))
+        return np.zeros(4, np.float32)
+
+    latch.latch_behavior("it", _gait(0))
+    for step in range(7):
+        if step == 1:
+            latch.latch_behavior("other", _gait(0))
+        if step == 5:
+            latch.clear()
+        edits = latch.stimulate(_gait(step)).edits
+        if edits:  # the last decides
+            edits[-1].prepare(np.zeros(2), note)
+        latch.end_step()
+    np.testing.assert_allclose(shown, [4.0, 3.0 - 1.0, 2.0 - 1.0, 1.0 - 1.0, -1.0, -0.5])
