@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("jax", reason="the extra 'train' is not installed")
 
 from pdtui.robots.anymal import Anymal, AnymalForward
-from pdtui.training.anymal_batch import AnymalBatch
+from pdtui.training.legged_robot_batch import LeggedRobotBatch
 
 
 def _actions(count: int, worlds: int, seed: int = 0) -> np.ndarray:
@@ -16,7 +16,7 @@ def _actions(count: int, worlds: int, seed: int = 0) -> np.ndarray:
 
 
 def test_a_world_moves_as_a_robot_alone_does() -> None:
-    worlds, robot = AnymalBatch(Anymal(), 8, 0, 1000), Anymal()
+    worlds, robot = LeggedRobotBatch(Anymal(), 8, 0, 1000), Anymal()
     robot.reset(seed=0)
     start = worlds.state().snapshots[0].state[3]
     robot.model.geom_friction[:, 0] = worlds.frictions[3]
@@ -30,7 +30,7 @@ def test_a_world_moves_as_a_robot_alone_does() -> None:
 
 
 def test_a_restored_state_goes_on_the_same() -> None:
-    worlds, other = (AnymalBatch(AnymalForward(), 6, 0, 40), AnymalBatch(AnymalForward(), 6, 9, 40))
+    worlds, other = (LeggedRobotBatch(AnymalForward(), 6, 0, 40), LeggedRobotBatch(AnymalForward(), 6, 9, 40))
     for actions in _actions(15, 6):
         worlds.step(actions)
     other.restore(worlds.state())
@@ -42,7 +42,7 @@ def test_a_restored_state_goes_on_the_same() -> None:
 
 
 def test_worlds_start_over_after_a_fall_and_at_the_end_of_an_episode() -> None:
-    worlds = AnymalBatch(Anymal(), 16, 0, 50)
+    worlds = LeggedRobotBatch(Anymal(), 16, 0, 50)
     restarts = sum(int((worlds.step(actions), worlds.restarted)[1].sum()) for actions in 2 * _actions(60, 16))
     assert restarts >= 16
     assert np.isfinite(worlds.observations).all()
