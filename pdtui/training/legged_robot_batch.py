@@ -27,7 +27,7 @@ _PUSH_EVERY, _MAX_PUSH = 400, 0.8
 # Control steps between new commands, and share of robots that are commanded to stand.
 _COMMAND_EVERY, _STANDING_SHARE = 250, 0.1
 # Half width of the uniform noise on height (m), velocity (m/s), angular velocity (rad/s), direction of
-# gravity, joint angles (rad), joint velocities (rad/s) and scanned heights (m), each scaled as it is observed.
+# gravity, joint angles (rad), joint velocities (rad/s) and scanned heights (m), each scaled as observed.
 _VELOCITY_NOISE = (legged.LINEAR_SCALE * 0.05, legged.ANGULAR_SCALE * 0.1)
 _NOISE = (0.01, *_VELOCITY_NOISE, 0.03, 0.01, legged.JOINT_SPEED_SCALE * 0.5)
 _SCAN_NOISE = 0.02
