@@ -112,8 +112,10 @@ class LeggedRobotBatch:
         following = self._observe(motion)
         self._grounds.change_levels(self.restarted, fell, self._rng)
         self._start_over(self.restarted)
-        self._disturb()
-        self.observations = self._observe(self._motion(sensors[:, -1], torque))
+        self.observations = following.copy()
+        changed = self.restarted | self._disturb()
+        if changed.any():  # scanning the ground for all of them again would take as long as the rest
+            self.observations[changed] = self._observe(self._motion(sensors[:, -1], torque, changed))
         outcome = (reward.astype(np.float32), (~fell).astype(np.float32), np.nan_to_num(following))
         return TransitionBatch(before, actions, *outcome)
 
@@ -141,15 +143,18 @@ class LeggedRobotBatch:
         self._grounds.set_levels(levels.astype(np.intp))
         self._rng.bit_generator.state = kept.rng
 
-    def _motion(self, sensors: Floats, torque: Floats) -> LeggedRobotState:
+    def _motion(
+        self, sensors: Floats, torque: Floats, which: NDArray[np.bool_] | slice = slice(None)
+    ) -> LeggedRobotState:
+        physics = self._physics[which]
         return self._reader.read(
-            self._physics[:, 1 : 1 + self._nq],
-            self._physics[:, 1 + self._nq :],
-            (self._action, self._last_action),
-            self._command,
-            torque,
-            sensors,
-            self._grounds.heights_at,
+            physics[:, 1 : 1 + self._nq],
+            physics[:, 1 + self._nq :],
+            (self._action[which], self._last_action[which]),
+            self._command[which],
+            torque[which],
+            sensors[which],
+            self._grounds.heights_under(which),
         )
 
     def _observe(self, motion: LeggedRobotState) -> NDArray[np.float32]:
@@ -188,8 +193,8 @@ class LeggedRobotBatch:
             drawn[:, 2] += compute_yaws(self._physics[which, 1 : 1 + self._nq])
         self._command[which] = drawn
 
-    def _disturb(self) -> None:
-        """Give new commands and pushes to the robots whose turn it is."""
+    def _disturb(self) -> NDArray[np.bool_]:
+        """Give new commands and pushes to the robots whose turn it is, and return which ones that were."""
         intervals = (_COMMAND_EVERY, _PUSH_EVERY)
         again, pushed = ((self._age % interval == 0) & (self._age > 0) for interval in intervals)
         if again.any():
@@ -197,3 +202,4 @@ class LeggedRobotBatch:
         if pushed.any():
             push = self._rng.uniform(-_MAX_PUSH, _MAX_PUSH, (int(pushed.sum()), 2))
             self._physics[pushed, 1 + self._nq : 3 + self._nq] += push
+        return again | pushed

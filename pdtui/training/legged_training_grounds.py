@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.robots.legged.legged_robot import LeggedRobot
+from pdtui.robots.legged.legged_robot_state import GroundHeights
 from pdtui.robots.legged.mujoco_ground import lay_rough_ground, load_legged_model
 from pdtui.robots.legged.terrain import draw_rough_ground, interpolate_heights
 
@@ -94,8 +95,9 @@ class LeggedTrainingGrounds:
         chosen = self.levels[which]
         return places, interpolate_heights(self._heights, chosen, places[:, None], self._corner)[:, 0]
 
-    def heights_at(self, points: Floats) -> Floats:
-        """Return the heights of the ground under points of each robot, m, shape (robots, K)."""
+    def heights_under(self, which: NDArray[np.bool_] | slice) -> GroundHeights | None:
+        """Return what gives the heights of the ground under points of chosen robots; None on a plane."""
         if not self._rough:
-            return np.zeros(points.shape[:2])
-        return interpolate_heights(self._heights, self.levels, points, self._corner)
+            return None
+        levels = self.levels[which]
+        return lambda points: interpolate_heights(self._heights, levels, points, self._corner)

@@ -69,14 +69,13 @@ def interpolate_heights(
         corner: x and y of the first height of every ground, m.
     """
     _, rows, columns = grounds.shape
-    place = (points - np.array(corner)) / CELL
-    cell = np.floor(place)
-    u, v = np.moveaxis(place - cell, -1, 0)
-    i, j = np.moveaxis(cell, -1, 0)
+    x, y = np.moveaxis((points - np.array(corner)) / CELL, -1, 0)
+    i, j = np.floor(x), np.floor(y)
+    u, v = x - i, y - j
     inside = (i >= 0) & (i < rows - 1) & (j >= 0) & (j < columns - 1)
     first = np.where(inside, i * columns + j, 0).astype(np.intp) + (which * (rows * columns))[:, None]
-    flat = grounds.reshape(-1)
-    a, b, c, d = (flat[first + step] for step in (0, 1, columns, columns + 1))
+    flat = grounds.ravel()
+    a, b, c, d = (flat.take(first + step) for step in (0, 1, columns, columns + 1))
     between = (1 - u) * ((1 - v) * a + v * b) + u * ((1 - v) * c + v * d)
     heights: Floats = np.where(inside, between, 0.0)
     return heights
