@@ -119,7 +119,7 @@ class Cassie(LeggedRobot):
         return tuple(f"{side} {joint}" for side in SIDES for joint in _JOINTS)
 
     def read_attributes(self) -> Floats:
-        motion = self._motion()
+        motion = self.read_state()
         x, _, z = motion.up[0].tolist()
         # Unlike the Euler angle, it goes on beyond a right angle, so that it shows a flip.
         pitch = math.atan2(-x, z)

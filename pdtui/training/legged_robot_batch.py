@@ -42,7 +42,7 @@ class LeggedRobotBatch:
     see `LeggedTrainingGrounds`.
 
     Args:
-        robot: One of the robots. Commands that its policy cannot be given stay 0.
+        robot: One of the robots. Commands that cannot be given, or have no range, stay 0.
         count: Number of robots.
         seed: Seed of every random number.
         episode: Control steps of an episode; by default the robot's.
@@ -54,7 +54,7 @@ class LeggedRobotBatch:
         self._ranges = {
             index: robot.command_ranges[name]
             for index, name in enumerate(robot.command_names)
-            if name in robot.commands
+            if name in robot.commands and name in robot.command_ranges
         }
         self._grounds = LeggedTrainingGrounds(robot, count)
         self.frictions = self._grounds.frictions
@@ -202,4 +202,5 @@ class LeggedRobotBatch:
         if pushed.any():
             push = self._rng.uniform(-_MAX_PUSH, _MAX_PUSH, (int(pushed.sum()), 2))
             self._physics[pushed, 1 + self._nq : 3 + self._nq] += push
-        return again | pushed
+        disturbed: NDArray[np.bool_] = again | pushed
+        return disturbed

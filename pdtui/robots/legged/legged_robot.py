@@ -66,8 +66,9 @@ class LeggedRobot(MujocoRobot):
 
     def __init__(self, random_commands: bool = False, terrain: str = "plane", roughness: float = 0.0) -> None:
         one, joints = self.description, len(self.description.default_angles)
-        if terrain not in (self.starts or ("plane",)):
-            raise RobotError(f"{self.name}: no terrain '{terrain}'; available: {', '.join(self.starts)}")
+        terrains = self.starts or ("plane",)
+        if terrain not in terrains:
+            raise RobotError(f"{self.name}: no terrain '{terrain}'; available: {', '.join(terrains)}")
         self._random_commands, self.terrain, self.roughness = random_commands, terrain, roughness
         self._rough = draw_rough_ground(np.random.default_rng(0), roughness) if self.starts else None
         self.model = load_legged_model(one.model, self._rough)
@@ -149,7 +150,7 @@ class LeggedRobot(MujocoRobot):
         return self.observe(), {}
 
     def observe(self) -> Floats:
-        observation: Floats = compute_legged_observations(self._motion(), self.description)[0]
+        observation: Floats = compute_legged_observations(self.read_state(), self.description)[0]
         return observation
 
     def step(self, action: NDArray[np.float32]) -> StepResult:
@@ -158,7 +159,7 @@ class LeggedRobot(MujocoRobot):
         self.data.ctrl[:] = one.stance + one.action_scale * self._action
         mujoco.mj_step(self.model, self.data, one.substeps)
         self._check_finite()
-        motion = self._motion()
+        motion = self.read_state()
         fell = has_fallen(motion, one.fall)
         reward, self._foot_times = compute_legged_rewards(motion, self._foot_times, dt, one, fell)
         info: dict[str, Any] = {"cost": 0.0}
@@ -183,11 +184,12 @@ class LeggedRobot(MujocoRobot):
         self._action, self._last_action = np.zeros(joints), np.zeros(joints)
         self._foot_times = np.zeros((1, feet))
 
-    def _motion(self) -> LeggedRobotState:
+    def read_state(self) -> LeggedRobotState:
+        """Return what observations and rewards are computed from, as the state of one robot."""
         data, ground = self.data, None if self.ground is None else self.ground.heights_at
         actions = self._action[None], self._last_action[None]
-        rows = (array[None] for array in (self._command, data.actuator_force, data.sensordata))
-        return self._reader.read(data.qpos[None], data.qvel[None], actions, *rows, ground)
+        motion = (data.qpos[None], data.qvel[None], actions, self._command[None])
+        return self._reader.read(*motion, data.actuator_force[None], data.sensordata[None], ground)
 
     def _lay_ground(self, terrain: int, seed: int) -> None:
         """Lay the ground of a terrain, by its number, and of a seed."""

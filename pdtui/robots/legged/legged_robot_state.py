@@ -123,8 +123,8 @@ class LeggedStateReader:
             touching = sensors[:, self._touch] > 0.0
         trunk = np.zeros(count, bool) if self._trunk is None else sensors[:, self._trunk[0]] > 0.0
         velocity = sensors[:, self._velocity].reshape(count, -1, 3)
-        feet_now = (velocity, feet_height, touching)
-        return LeggedRobotState(qpos, qvel, *actions, command, torque, *feet_now, trunk, scanned, height)
+        motion = (qpos, qvel, *actions, command, torque, velocity, feet_height)
+        return LeggedRobotState(*motion, touching, trunk, scanned, height)
 
     def _columns(self, name: str, count: int) -> NDArray[np.intp]:
         if name not in self._names:
