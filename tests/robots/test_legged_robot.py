@@ -39,7 +39,7 @@ def test_it_stands_and_falls_by_its_own_rule(robot: SmallLeggedRobot) -> None:
 
 
 def test_standing_on_one_foot_is_rewarded_only_while_it_is_to_move(robot: SmallLeggedRobot) -> None:
-    weights = replace(robot.description.rewards, single_stance=2.0, swing=0.0, slip=0.0)
+    weights = replace(robot.description.rewards, single_stance=2.0, swing=0.0, slip=0.0, steps=0.0)
     one = replace(robot.description, rewards=weights)
     state = robot.read_state()
     times, fell = np.array([[0.3, -0.3]]), np.zeros(1, bool)
