@@ -48,8 +48,8 @@ def _parse_layers(text: str | None) -> tuple[int, ...] | None:
 )
 @click.option(
     "--activation",
-    type=click.Choice(["tanh", "relu"]),
-    help="Activation function of the hidden layers, for PPO; default: tanh.",
+    type=click.Choice(["tanh", "relu", "elu"]),
+    help="Activation function of the hidden layers, for PPO; default: that of the robot's recipe, or tanh.",
 )
 @click.option(
     "--initial-policy",

@@ -16,12 +16,12 @@ from pdtui.core.robot_links_and_state import Foot, FootPlace
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.geometry import roll_pitch_yaw
-from pdtui.robots.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
 from pdtui.robots.legged.terrain import draw_rough_ground, scatter_trees
 from pdtui.robots.observation_edits.a1_observation_edits import a1_observation_edits
 from pdtui.robots.robot import ResetResult, StepResult, TrainingRecipe
 from pdtui.robots.simulators import bullet_robot
 from pdtui.robots.simulators.bullet_robot import BulletRobot
+from pdtui.robots.simulators.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
 from pdtui.robots.simulators.urdf_link_shapes import read_urdf_link_shapes
 from pdtui.robots.task import Task
 

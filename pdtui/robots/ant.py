@@ -13,10 +13,10 @@ from pdtui.core.attributes import Floats
 from pdtui.core.outcome import fall_info
 from pdtui.core.robot_links_and_state import Foot
 from pdtui.robots.geometry import roll_pitch_yaw
-from pdtui.robots.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
 from pdtui.robots.observation_edits.heading_edit import quaternion_heading_edits
 from pdtui.robots.observation_edits.observation_edit import offset_observed_number
 from pdtui.robots.robot import TrainingRecipe
+from pdtui.robots.simulators.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
 from pdtui.robots.simulators.mujoco_robot import (
     MujocoRobot,
     read_model_links,

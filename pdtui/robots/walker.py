@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.core.outcome import fall_info
 from pdtui.core.robot_links_and_state import Foot
-from pdtui.robots.joint_and_trunk_attributes import torque_attributes
 from pdtui.robots.observation_edits.observation_edit import offset_observed_number, set_observed_number
 from pdtui.robots.robot import TrainingRecipe
+from pdtui.robots.simulators.joint_and_trunk_attributes import torque_attributes
 from pdtui.robots.simulators.mujoco_robot import (
     MujocoRobot,
     read_model_links,

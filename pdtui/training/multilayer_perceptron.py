@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 
 MlpParameters = list[dict[str, jax.Array]]
 """One dictionary per layer: weight ``w``, shape (inputs, outputs), bias ``b`` and, for LayerNorm, ``scale``
@@ -34,9 +35,15 @@ def relu(x: Any) -> Any:
     return x * (x > 0)
 
 
+def elu(x: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Apply the exponential linear unit to an array of NumPy."""
+    return np.maximum(x, 0.0) + np.expm1(np.minimum(x, 0.0))
+
+
 ACTIVATIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
     "tanh": (jnp.tanh, np.tanh),
     "relu": (relu, relu),
+    "elu": (jax.nn.elu, elu),
 }
 """Activation functions of hidden layers by name, for arrays of JAX and of NumPy."""
 

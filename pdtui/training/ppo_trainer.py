@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from pdtui.core.errors import TrainingError
 from pdtui.policies.weights.policy_network import PolicyNetwork
@@ -52,7 +53,9 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
 
     def advance(self) -> int:
         on_host: PpoState = jax.tree.map(np.asarray, self.state)
-        rows = [self._collect(on_host) for _ in range(self.config.chunk)]
+        # Threads that wait for each other in a busy loop take many times as long where others use the cores.
+        with threadpool_limits(1, "blas"):
+            rows = [self._collect(on_host) for _ in range(self.config.chunk)]
         rollout = PpoRollout(*(np.stack(column) for column in zip(*rows, strict=True)))
         self.state, _ = self.learner.update(self.state, rollout)
         return self.config.worlds * self.config.chunk

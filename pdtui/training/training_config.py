@@ -14,7 +14,8 @@ class TrainingConfig:
         worlds: Number of robots that are stepped together.
         chunk: Control steps of every robot between two updates.
         layers: Widths of the hidden layers.
-        activation: Activation function of the policy's hidden layers: ``tanh`` or ``relu``.
+        activation: Activation function of the policy's hidden layers: ``tanh``, ``relu`` or
+            ``elu``.
         learning_rate: Learning rate of Adam at the start.
         discount: Discount factor per control step.
         average_rate: Rate per update of the moving average of the actor, which is what a run saves: it walks

@@ -12,7 +12,7 @@ from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import MapError
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.robots import make_robot
-from pdtui.robots.anymal import DEFAULT_ANGLES, Anymal, AnymalForward
+from pdtui.robots.anymal import Anymal, AnymalForward
 from pdtui.robots.legged.observations_and_rewards import COMMAND_SCALES
 from pdtui.stimulation.map_reader import parse_map
 
@@ -83,7 +83,7 @@ def test_an_observation_has_its_parts_in_their_places(anymal: Anymal) -> None:
     np.testing.assert_allclose(seen[4:7], 0.25 * data.qvel[3:6])
     np.testing.assert_allclose(seen[7:10], -rotation[2], atol=2e-2)
     np.testing.assert_allclose(seen[10:13], COMMAND_SCALES * [0.5, -0.2, 0.8])
-    np.testing.assert_allclose(seen[13:25], data.qpos[7:] - DEFAULT_ANGLES)
+    np.testing.assert_allclose(seen[13:25], data.qpos[7:] - anymal.description.stance)
     np.testing.assert_allclose(seen[25:37], 0.05 * data.qvel[6:])
     np.testing.assert_allclose(seen[37:], 0.3, rtol=1e-6)
 

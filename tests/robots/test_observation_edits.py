@@ -55,7 +55,7 @@ def test_an_edit_sets_the_heading_of_the_ant() -> None:
 
 
 def test_edits_leave_the_observation_that_they_are_given() -> None:
-    for name in ("ant", "walker", "anymal"):
+    for name in ("ant", "walker", "anymal", "cassie"):
         robot, observation = _walked(name, 2)
         before = observation.copy()
         for edit in robot.observation_edits:
@@ -80,8 +80,9 @@ def test_edits_of_the_walkers_speed() -> None:
     np.testing.assert_allclose(fixed, robot.observe(), atol=1e-9)
 
 
-def test_edits_of_anymals_motion() -> None:
-    robot, observation = _walked("anymal")
+@pytest.mark.parametrize("name", ["anymal", "cassie"])
+def test_edits_of_a_legged_robots_motion(name: str) -> None:
+    robot, observation = _walked(name)
     yaw_rate = _edit(robot, "yaw rate offset").apply(observation, 0.6)
     robot.data.qvel[5] += 0.6
     np.testing.assert_allclose(yaw_rate, robot.observe(), atol=1e-6)

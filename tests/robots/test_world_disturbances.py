@@ -17,7 +17,7 @@ from tests.turning_robot import Vehicle
 
 NEEDS_BULLET = pytest.mark.skipif(find_spec("pybullet") is None, reason="PyBullet is not installed")
 ROBOTS = [
-    *("ant", "walker", "anymal", "HalfCheetah-v5", "bipedal_walker"),
+    *("ant", "walker", "anymal", "cassie", "HalfCheetah-v5", "bipedal_walker"),
     pytest.param("a1", marks=NEEDS_BULLET),
 ]
 
@@ -142,7 +142,7 @@ def test_a_push_changes_the_velocity_of_the_trunk_by_as_much(name: str) -> None:
     assert _value(robot, "vx") == pytest.approx(before["vx"] + 0.7)
     if "vy" in before:
         assert _value(robot, "vy") == pytest.approx(before["vy"] - 0.4)
-    assert {"ant": "vy", "anymal": "vy", "a1": "vy"}.get(name, "vx") in before
+    assert {"ant": "vy", "anymal": "vy", "cassie": "vy", "a1": "vy"}.get(name, "vx") in before
 
 
 def _names(robot: Robot) -> list[str]:

@@ -3,8 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
-from pdtui.robots.legged.observations_and_rewards import ANGULAR_SCALE, COMMAND_SCALES, LINEAR_SCALE
+import numpy as np
+
+from pdtui.core.attributes import Floats
+from pdtui.robots.legged.legged_robot_description import HeightScan, LeggedRobotDescription
+from pdtui.robots.legged.observations_and_rewards import (
+    ANGULAR_SCALE,
+    COMMAND_SCALES,
+    LINEAR_SCALE,
+    MAX_SCANNED,
+)
 from pdtui.robots.observation_edits.observation_edit import (
     ObservationEdit,
     offset_observed_number,
@@ -12,6 +22,7 @@ from pdtui.robots.observation_edits.observation_edit import (
 )
 
 _FIRST_COMMAND = 10
+_OBSERVED_COMMANDS = ("forward", "lateral", "yaw rate")
 
 TRUNK_EDITS = (
     offset_observed_number(0, "height offset", "m", "the trunk is higher by this much"),
@@ -23,6 +34,29 @@ TRUNK_EDITS = (
         6, "yaw rate offset", "rad/s", "it turns faster to the left by this much", ANGULAR_SCALE
     ),
 )
+
+
+def legged_observation_edits(description: LeggedRobotDescription) -> tuple[ObservationEdit, ...]:
+    """Return the edits of what a policy of a robot observes of its trunk and of its commands."""
+    height = (
+        TRUNK_EDITS[0] if description.scan is None else _scanned_height_edit(description, description.scan)
+    )
+    commands = _OBSERVED_COMMANDS[: description.observed_commands]
+    return (height, *TRUNK_EDITS[1:], *command_edits(commands))
+
+
+def _scanned_height_edit(description: LeggedRobotDescription, scan: HeightScan) -> ObservationEdit:
+    """Return the edit "height offset" where the distance to points of the ground is observed as well."""
+    first, largest = description.observations - scan.count**2, scan.scale * MAX_SCANNED
+
+    def lift(observation: Floats, offset: float) -> Floats:
+        edited = observation.copy()
+        edited[0] += offset
+        edited[first:] = np.clip(edited[first:] + scan.scale * offset, -largest, largest)
+        return edited
+
+    plain = TRUNK_EDITS[0]
+    return replace(plain, apply=lift)
 
 
 def command_edits(commands: Iterable[str]) -> tuple[ObservationEdit, ...]:

@@ -6,125 +6,114 @@ Minutes Using Massively Parallel Deep Reinforcement Learning", 2021).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
-from pdtui.robots.geometry import rotate_vectors
+from pdtui.robots.legged.legged_robot_description import (
+    FallRule,
+    HeightScan,
+    LeggedRewardWeights,
+    LeggedRobotDescription,
+)
+from pdtui.robots.legged.legged_robot_state import LeggedRobotState
 
 COMMAND_SCALES = np.array([2.0, 2.0, 0.25])
 """Factors on the observed commands: forward and lateral speed (m/s), yaw rate (rad/s)."""
 LINEAR_SCALE, ANGULAR_SCALE, JOINT_SPEED_SCALE = 2.0, 0.25, 0.05
 """Factors on the observed velocities: of the trunk (m/s), about its axes (rad/s), of the joints (rad/s)."""
+MAX_SCANNED = 1.0
+"""Largest deviation of a scanned height that is observed, m."""
 # Observations are clipped at ±100, as in legged_gym.
 _MAX_OBSERVATION = 100.0
 # Width of the reward for following a command, in squared m/s or rad/s.
 _TRACKING_WIDTH = 0.25
 # Commanded speed below which a robot stands and earns nothing for steps.
 _MIN_COMMAND = 0.1
-# Shortest time in the air that a step is rewarded for, s.
-_MIN_AIR_TIME = 0.35
-_FOOT_RADIUS = 0.03
-# Gap between foot and ground that counts as contact, and height that a swinging foot should reach, m.
-_CONTACT_GAP, _SWING_HEIGHT = 0.005, 0.1
-# Below this height (m), or with less than this share of its vertical axis upright, the robot has fallen.
-_MIN_HEIGHT, _MIN_UPRIGHT = 0.28, 0.5
 
 
-@dataclass(frozen=True)
-class LeggedRobotState:
-    """The state of n robots, as observations and rewards need it.
+def compute_legged_observations(motion: LeggedRobotState, description: LeggedRobotDescription) -> Floats:
+    """Return what the policy observes, shape (n, `LeggedRobotDescription.observations`).
 
-    Attributes:
-        qpos, qvel: Coordinates and velocities, free joint first, shapes (n, 19) and (n, 18).
-        action, last_action: Actions of this step and of the one before, shape (n, 12).
-        command: Commands, shape (n, 3).
-        torque: Torques of the joints, N m, shape (n, 12).
-        feet, feet_velocity: World positions (m) and velocities (m/s) of the feet, shape (n, 4, 3).
-    """
-
-    qpos: Floats
-    qvel: Floats
-    action: Floats
-    last_action: Floats
-    command: Floats
-    torque: Floats
-    feet: Floats
-    feet_velocity: Floats
-
-    @cached_property
-    def linear(self) -> Floats:
-        """The trunk's velocity in its own frame, m/s, shape (n, 3)."""
-        return rotate_vectors(self.qpos[:, 3:7] * _CONJUGATE, self.qvel[:, :3])
-
-    @cached_property
-    def up(self) -> Floats:
-        """The world's vertical in the trunk's frame, shape (n, 3)."""
-        vertical = np.broadcast_to([0.0, 0.0, 1.0], (len(self.qpos), 3))
-        return rotate_vectors(self.qpos[:, 3:7] * _CONJUGATE, vertical)
-
-
-_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
-
-
-def compute_legged_observations(motion: LeggedRobotState, default_angles: Floats, commands: int) -> Floats:
-    """Return what the policy observes, shape (n, 46 + commands).
-
-    In this order: height, velocity × 2, angular velocity × 0.25, direction of gravity, the first `commands`
-    commands, joint angles relative to the default, joint velocities × 0.05, the last action.
+    In this order: height, velocity × 2, angular velocity × 0.25, direction of gravity, the commands (forward
+    and lateral × 2, yaw rate × 0.25), joint angles relative to the default, joint velocities × 0.05, the last
+    action and, if the ground is scanned, how far each point of it is below the trunk; see `HeightScan`.
     """
     parts = [
-        motion.qpos[:, 2:3],
+        motion.height[:, None],
         LINEAR_SCALE * motion.linear,
         ANGULAR_SCALE * motion.qvel[:, 3:6],
         -motion.up,
-        (motion.command * COMMAND_SCALES)[:, :commands],
-        motion.qpos[:, 7:] - default_angles,
+        (motion.command * COMMAND_SCALES)[:, : description.observed_commands],
+        motion.qpos[:, 7:] - description.stance,
         JOINT_SPEED_SCALE * motion.qvel[:, 6:],
         motion.action,
     ]
+    if description.scan is not None:
+        parts.append(scale_heights(motion.qpos[:, 2:3] - motion.scanned, description.scan))
     clipped: Floats = np.clip(np.concatenate(parts, axis=1), -_MAX_OBSERVATION, _MAX_OBSERVATION)
     return clipped
 
 
-def has_fallen(motion: LeggedRobotState) -> NDArray[np.bool_]:
-    """Return whether the trunk is on the ground or lies on its side, shape (n,)."""
-    down: NDArray[np.bool_] = (motion.qpos[:, 2] < _MIN_HEIGHT) | (motion.up[:, 2] < _MIN_UPRIGHT)
-    return down
+def scale_heights(below: Floats, scan: HeightScan) -> Floats:
+    """Return what is observed of how far scanned points are below the trunk, m, in any shape."""
+    scaled: Floats = scan.scale * np.clip(below - scan.offset, -MAX_SCANNED, MAX_SCANNED)
+    return scaled
+
+
+def has_fallen(motion: LeggedRobotState, rule: FallRule) -> NDArray[np.bool_]:
+    """Return whether each robot has fallen, shape (n,)."""
+    low: NDArray[np.bool_] = motion.height < rule.least_height
+    return low | (motion.up[:, 2] < rule.least_upright) | motion.trunk_touches
 
 
 def compute_legged_rewards(
-    motion: LeggedRobotState, air_time: Floats, dt: float, target_height: float, default_angles: Floats
+    motion: LeggedRobotState,
+    foot_times: Floats,
+    dt: float,
+    description: LeggedRobotDescription,
+    fell: NDArray[np.bool_],
 ) -> tuple[Floats, Floats]:
-    """Return the rewards of a step and how long each foot has now been in the air, shapes (n,) and (n, 4).
+    """Return the rewards of a step and how long each foot has been where it is, shapes (n,) and (n, F).
 
-    The weights are rewards per second, as in legged_gym where it has the term. The last four terms are
-    against crouching and shuffling: a height to keep, feet that swing and do not slip, hips near the default.
-    Rewards are clipped below at 0, so that a policy that moves badly does not learn to end the episode.
+    These times are positive for a foot in the air and negative for one on the ground, s. Rewards are clipped
+    below at 0, so that a policy that moves badly does not learn to end the episode; the penalty for a fall
+    comes on top.
     """
-    touching = motion.feet[:, :, 2] - _FOOT_RADIUS < _CONTACT_GAP
+    weights = description.rewards
+    air_time = np.maximum(foot_times, 0.0)
+    touching = motion.touching
     landed = touching & (air_time > 0.0)
     moving = (np.linalg.norm(motion.command, axis=1) > _MIN_COMMAND).astype(np.float64)
     error = motion.command[:, :2] - motion.linear[:, :2]
     yaw_error = motion.command[:, 2] - motion.qvel[:, 5]
     foot_speed = np.linalg.norm(motion.feet_velocity[:, :, :2], axis=2)
-    too_low = np.minimum(0.0, motion.feet[:, :, 2] - _SWING_HEIGHT)
+    too_low = np.minimum(0.0, motion.feet_height - weights.swing_height)
+    posture = list(weights.posture_joints)
+    off = motion.qpos[:, [7 + joint for joint in posture]] - description.stance[posture]
+    times = np.where(touching, np.minimum(foot_times, 0.0) - dt, air_time + dt)
     reward = (
-        1.5 * np.exp(-np.square(error).sum(1) / _TRACKING_WIDTH)
-        + 0.8 * np.exp(-np.square(yaw_error) / _TRACKING_WIDTH)
-        - 2.0 * np.square(motion.linear[:, 2])
-        - 0.05 * np.square(motion.qvel[:, 3:5]).sum(1)
-        - 3.0 * np.square(motion.up[:, :2]).sum(1)
-        - 2e-5 * np.square(motion.torque).sum(1)
-        - 2e-4 * np.square(motion.qvel[:, 6:]).sum(1)
-        - 0.015 * np.square(motion.action - motion.last_action).sum(1)
-        - 30.0 * np.square(np.minimum(0.0, motion.qpos[:, 2] - target_height))
-        - 15.0 * np.where(touching, 0.0, foot_speed * too_low**2).sum(1)
-        - 0.08 * (touching * np.square(foot_speed)).sum(1)
-        - 0.15 * np.square(motion.qpos[:, 7::3] - default_angles[::3]).sum(1)
+        weights.velocity * np.exp(-np.square(error).sum(1) / _TRACKING_WIDTH)
+        + weights.yaw_rate * np.exp(-np.square(yaw_error) / _TRACKING_WIDTH)
+        - weights.vertical_speed * np.square(motion.linear[:, 2])
+        - weights.tilt_rate * np.square(motion.qvel[:, 3:5]).sum(1)
+        - weights.tilt * np.square(motion.up[:, :2]).sum(1)
+        - weights.torque * np.square(motion.torque).sum(1)
+        - weights.joint_speed * np.square(motion.qvel[:, 6:]).sum(1)
+        - weights.action_change * np.square(motion.action - motion.last_action).sum(1)
+        - weights.height * np.square(np.minimum(0.0, motion.height - weights.target_height))
+        - weights.swing * np.where(touching, 0.0, foot_speed * too_low**2).sum(1)
+        - weights.slip * (touching * np.square(foot_speed)).sum(1)
+        - weights.posture * np.square(off).sum(1)
     )
-    steps = ((air_time - _MIN_AIR_TIME) * landed).sum(1) * moving * 1.5
-    return np.maximum(0.0, reward * dt + steps * dt), np.where(touching, 0.0, air_time + dt)
+    steps = ((air_time - weights.least_air_time) * landed).sum(1) * moving * weights.steps
+    gait = steps + _single_stance(times, touching, weights) * moving
+    return np.maximum(0.0, reward * dt + gait * dt) - weights.fall * fell, times
+
+
+def _single_stance(times: Floats, touching: NDArray[np.bool_], weights: LeggedRewardWeights) -> Floats:
+    """Return the reward for standing on exactly one foot, per second, shape (n,)."""
+    single = touching.sum(axis=1) == 1
+    shared = np.minimum(np.abs(times).min(axis=1), weights.longest_stance)
+    rewards: Floats = weights.single_stance * single * shared
+    return rewards

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError
@@ -35,6 +36,12 @@ class RoughGround:
     heights: Floats
     corner: tuple[float, float]
 
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Its length along x and along y, m."""
+        rows, columns = self.heights.shape
+        return (rows - 1) * CELL, (columns - 1) * CELL
+
     def height(self, x: float, y: float) -> float:
         """Return the height at a point, m: interpolated within the grid, 0 outside."""
         column, row = (x - self.corner[0]) / CELL, (y - self.corner[1]) / CELL
@@ -44,6 +51,34 @@ class RoughGround:
         u, v = column - i, row - j
         (a, b), (c, d) = self.heights[i : i + 2, j : j + 2].tolist()
         return float((1 - u) * ((1 - v) * a + v * b) + u * ((1 - v) * c + v * d))
+
+    def heights_at(self, points: Floats) -> Floats:
+        """Return the heights at points x y, m, shape (..., K) for points of shape (..., K, 2)."""
+        return interpolate_heights(self.heights[None], np.zeros(1, np.intp), points, self.corner)
+
+
+def interpolate_heights(
+    grounds: Floats, which: NDArray[np.intp], points: Floats, corner: tuple[float, float]
+) -> Floats:
+    """Return the heights at points of each of n robots, on one of G grounds, as `RoughGround.height` does.
+
+    Args:
+        grounds: Heights of the grounds, m, shape (G, X, Y).
+        which: Index of the ground of each robot, shape (n,).
+        points: x and y, m, shape (n, K, 2).
+        corner: x and y of the first height of every ground, m.
+    """
+    _, rows, columns = grounds.shape
+    x, y = np.moveaxis((points - np.array(corner)) / CELL, -1, 0)
+    i, j = np.floor(x), np.floor(y)
+    u, v = x - i, y - j
+    inside = (i >= 0) & (i < rows - 1) & (j >= 0) & (j < columns - 1)
+    first = np.where(inside, i * columns + j, 0).astype(np.intp) + (which * (rows * columns))[:, None]
+    flat = grounds.ravel()
+    a, b, c, d = (flat.take(first + step) for step in (0, 1, columns, columns + 1))
+    between = (1 - u) * ((1 - v) * a + v * b) + u * ((1 - v) * c + v * d)
+    heights: Floats = np.where(inside, between, 0.0)
+    return heights
 
 
 def draw_rough_ground(rng: np.random.Generator, roughness: float) -> RoughGround:
