@@ -48,6 +48,24 @@ def test_a_headless_drive_is_recorded_and_replays_in_a_fresh_process(
     assert replay.stdout == "identical: 80 steps\n"
 
 
+def test_a_headless_drive_is_recorded_into_the_folder_of_sessions_unless_told_otherwise(
+    map_path: Path, keys: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    drive = ("drive", "ant", "--map", map_path, "--headless", "--keys", keys, "--steps", 60, "--seed", 7)
+    unrecorded = run(*drive, "--no-record")
+    assert unrecorded.exit_code == 0, unrecorded.output
+    assert not (tmp_path / "sessions").exists()
+    driven = run(*drive)
+    assert driven.exit_code == 0, driven.output
+    (session,) = Path("sessions").iterdir()
+    assert session.match("ant-*-seed7.rrd")
+    assert driven.stdout.endswith(f"recorded in {session}\n")
+    assert run("replay", session).stdout == "identical: 60 steps\n"
+    both = run(*drive, "--no-record", "--record", "a.rrd")
+    assert both.output == "pdtui: --record and --no-record are mutually exclusive\n"
+
+
 def test_a_replay_names_the_first_step_that_differs(map_path: Path, tmp_path: Path) -> None:
     """The same drive with another disturbance: a session whose robot was pushed behind the loop's back."""
     from pdtui.driving.drive_config import DriveConfig
@@ -185,7 +203,7 @@ def test_a_map_of_another_policy_needs_force(
     refused = run("drive", "ant", "--map", other, "--headless", "--steps", 5)
     assert refused.exit_code == 1
     assert f"made for a policy with SHA-256 {'0' * 64}" in refused.output
-    assert run("drive", "ant", "--map", other, "--headless", "--steps", 5, "--force").exit_code == 0
+    assert run("drive", "ant", "--map", other, "--headless", "--steps", 5, "--no-record", "--force").exit_code == 0
     for command in (
         ("evaluate", other, "--update", "--force", "--seeds", "100"),
         ("tune", other, "--all", "--force", "--seeds", "200-201", "--points", 1, "--refinements", 0),
@@ -321,5 +339,5 @@ def test_a_drive_is_shown_in_a_viewer_and_goes_on_without_one(
     assert alone.exit_code == 0, alone.output
     assert f"no viewer listens on 127.0.0.1:{nobody}: start `rerun --bind 127.0.0.1" in alone.output
     assert "80 steps" in alone.output
-    refused = run(*drive, "--viewer", nobody)
+    refused = run(*drive, "--no-record", "--viewer", nobody)
     assert "--viewer shows what is recorded" in refused.output

@@ -165,7 +165,7 @@ def test_dissect_takes_an_environment_and_its_map_drives(tmp_path: Path) -> None
     assert pictures[1] == tmp_path / "figures" / "spectrograms.png"
     assert all(path.stat().st_size > 1000 for path in pictures)
     assert load_map(output).robot == "Pendulum-v1"
-    driven = run("drive", output, "--headless", "--steps", 20)
+    driven = run("drive", output, "--headless", "--steps", 20, "--no-record")
     assert "20 steps, 1 s simulated" in driven.output, driven.output
 
 
