@@ -203,7 +203,10 @@ def test_a_map_of_another_policy_needs_force(
     refused = run("drive", "ant", "--map", other, "--headless", "--steps", 5)
     assert refused.exit_code == 1
     assert f"made for a policy with SHA-256 {'0' * 64}" in refused.output
-    assert run("drive", "ant", "--map", other, "--headless", "--steps", 5, "--no-record", "--force").exit_code == 0
+    assert (
+        run("drive", "ant", "--map", other, "--headless", "--steps", 5, "--no-record", "--force").exit_code
+        == 0
+    )
     for command in (
         ("evaluate", other, "--update", "--force", "--seeds", "100"),
         ("tune", other, "--all", "--force", "--seeds", "200-201", "--points", 1, "--refinements", 0),

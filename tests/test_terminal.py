@@ -98,9 +98,10 @@ def test_a_drive_in_a_terminal_replays_bit_for_bit(screen: pexpect.spawn[str], s
 def test_a_session_without_steps_cannot_be_watched(small_map: StimulationMap, session: Path) -> None:
     """Nowadays none is written, but earlier versions did."""
     info = build_control_loop(DriveConfig("ant", small_map, 5)).info
-    recording = RerunRecording(SessionFile(session), info)
+    created = "2026-01-01T00:00:00+00:00"
+    recording = RerunRecording(SessionFile(session), info, created)
     recording.create_file()
-    send_property_group(recording.stream, INFO, encode_drive_info(info, "2026-01-01T00:00:00+00:00"))
+    send_property_group(recording.stream, INFO, encode_drive_info(info, created))
     recording.close()
     arguments = ["-m", "pdtui", "replay", str(session), "--watch"]
     child = pexpect.spawn(
