@@ -35,6 +35,10 @@ HEAT_MAP = "/view/activations"
 
 INFO, VERSIONS, OUTCOME, REPAIR = "drive", "versions", "outcome", "repair"
 
+ACTIVATIONS, HALF_ACTIVATIONS = "activations", "activations_float16"
+"""Activations as float32 and as float16. A column has the same type in all sessions, or no viewer could show
+two of them together; earlier versions wrote both into the first."""
+
 REWARD_COST_ACTION, DIGEST_EPISODE = "reward_cost_action", "digest_episode"
 
 ACTIVE_FIELDS = ("remaining", "factor", "target", "value", "error", "magnitude", "waiting")
