@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
+from pdtui.cli.output.printed_result import progress_bar
 from pdtui.cli.shared_options import (
     FILE_PATH,
     import_option_flags,
@@ -15,7 +16,6 @@ from pdtui.cli.shared_options import (
     overwrite_option,
     own_policy_option,
     preset_option,
-    progress_bar,
 )
 from pdtui.core.printable_text import make_printable
 

@@ -9,8 +9,9 @@ from typing import Any
 
 import click
 
+from pdtui.cli.output.printed_result import print_result, progress_bar
 from pdtui.cli.replay_command import replay_options
-from pdtui.cli.shared_options import FILE_PATH, json_option, overwrite_option, print_result, progress_bar
+from pdtui.cli.shared_options import FILE_PATH, json_option, overwrite_option
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.printable_text import make_printable, to_json
@@ -31,7 +32,7 @@ def sessions_command() -> None:
 @json_option
 def list_command(folder: Path, as_json: bool) -> None:
     """List the sessions under FOLDER, and say what is wrong with broken ones."""
-    from pdtui.cli import session_tables
+    from pdtui.cli.output import session_tables
 
     if not folder.is_dir():
         raise SessionError(f"{folder}: no such folder")
@@ -68,7 +69,7 @@ def _list_row(path: Path) -> dict[str, Any]:
 @json_option
 def show_command(file: Path, as_json: bool) -> None:
     """Show robot, policy, keys, attributes and outcome of FILE."""
-    from pdtui.cli import session_tables
+    from pdtui.cli.output import session_tables
     from pdtui.sessions.session_header import read_session_header
     from pdtui.sessions.session_summary import read_session_summary
 
@@ -220,7 +221,7 @@ def compare_command(a: Path, b: Path, as_json: bool) -> None:
 
     Exit codes: 0 if they are identical; 3 if they differ.
     """
-    from pdtui.cli import session_tables
+    from pdtui.cli.output import session_tables
     from pdtui.sessions.session_comparison import compare_sessions
     from pdtui.sessions.session_header import read_session_header
 

@@ -21,7 +21,7 @@ def sessions(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 @pytest.mark.viewer
 def test_each_is_shown_under_its_own_names(viewer: RealViewer, sessions: tuple[Path, Path]) -> None:
-    shown = {}
+    shown: dict[str, list[str]] = {}
     for path in (*sessions, sessions[0]):
         viewer.show(path)
         robot = path.stem
