@@ -204,3 +204,30 @@ def test_a_module_named_on_the_command_line_is_imported_for_its_map(
         [*command, "--headless", "--steps", "5"], capture_output=True, text=True, check=False, cwd=tmp_path
     )
     assert result.stdout.startswith("5 steps"), result.stderr
+
+
+def test_a_module_is_found_in_the_working_directory_by_the_installed_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python does not look there when it runs an installed command, which `-P` stands for."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[1]))
+    (tmp_path / "my_worlds.py").write_text(
+        "import gymnasium\n"
+        "from gymnasium.envs.classic_control import PendulumEnv\n"
+        "class Mine(PendulumEnv):\n"
+        "    pass\n"
+        "gymnasium.register('Mine-v0', entry_point=Mine)\n"
+    )
+    policy = Path(__file__).parent / "fixtures" / "sb3-pendulum.zip"
+
+    def pdtui(*arguments: str | Path) -> str:
+        command = [sys.executable, "-P", "-m", "pdtui", *map(str, arguments)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    world = "my_worlds:Mine-v0"
+    drive = pdtui("drive", world, "--policy", policy, "--headless", "--steps", "5", "--no-record")
+    assert drive.startswith("5 steps")
+    measured = ("--policy", policy, "--policy-only", "--seeds", "1-2", "--json")
+    assert json.loads(pdtui("evaluate", world, *measured))["steps"] > 0

@@ -1,5 +1,6 @@
 """Robots by name. Importing this room loads no simulator."""
 
+from pdtui.robots.environments.environment_lookup import trust_module
 from pdtui.robots.options.robot_spec import RobotSpec
 from pdtui.robots.robot_registry import (
     list_robot_names,
@@ -8,7 +9,6 @@ from pdtui.robots.robot_registry import (
     open_robot,
     require_robot_name,
     robot_file_stem,
-    trust_module,
 )
 
 __all__ = [

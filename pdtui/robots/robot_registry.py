@@ -1,25 +1,22 @@
 """Find and build robots by name: pdtui's own, those of other packages, and Gymnasium's environments.
 
 A name may come from the command line, but also from a map or a session that somebody sent. It can only choose
-among code that is installed here. Gymnasium would import the module in front of a colon
-(``package.module:Name-v0``). Here, such a module must be imported already, or be named by the user: on the
-command line, or in the environment variable `TRUSTED`.
+among code that is installed here; see `pdtui.robots.environments.environment_lookup`.
 """
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pdtui.core.errors import RobotError
+from pdtui.robots.environments.environment_lookup import find_environment
 from pdtui.robots.options.constructor_options import read_constructor_options
 from pdtui.robots.options.robot_option import OptionValue, RobotOption, check_robot_options
 from pdtui.robots.options.robot_spec import RobotSpec
@@ -28,7 +25,6 @@ if TYPE_CHECKING:
     from pdtui.robots.robot import Robot
 
 GROUP = "pdtui.robots"
-TRUSTED = "PDTUI_ENVIRONMENT_MODULES"
 
 
 def find_own_robots() -> dict[str, str]:
@@ -51,16 +47,6 @@ def list_robot_names() -> list[str]:
     return [*find_own_robots(), *(entry.name for entry in entry_points(group=GROUP))]
 
 
-def trust_module(robot: str) -> None:
-    """Allow the import of the module in front of a name's colon, here and in processes started from here.
-
-    Call it only for names that the user typed.
-    """
-    module, colon, _ = robot.rpartition(":")
-    if colon:
-        os.environ[TRUSTED] = ",".join([*_trusted_modules(), module])
-
-
 def require_robot_name(name: str) -> str:
     """Return the name of a robot that can be built here.
 
@@ -68,7 +54,7 @@ def require_robot_name(name: str) -> str:
         RobotError: There is no robot of that name; the message lists close matches.
     """
     if name not in find_own_robots() and _find_entry_point(name) is None:
-        _find_environment(name)
+        find_environment(name, list_robot_names())
     return name
 
 
@@ -86,7 +72,7 @@ def list_robot_options(name: str) -> tuple[RobotOption, ...]:
         return read_constructor_options(_load_entry(entry))
     from pdtui.robots.environments.environment_options import read_environment_options
 
-    return read_environment_options(_find_environment(name))
+    return read_environment_options(find_environment(name, list_robot_names()))
 
 
 def make_robot(robot: str | RobotSpec, **options: OptionValue) -> Robot:
@@ -186,45 +172,7 @@ def _build_environment(name: str, options: Mapping[str, OptionValue]) -> Robot:
     from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
     from pdtui.robots.simulators.mujoco_robot import suppress_warnings
 
-    environment = _find_environment(name)
+    environment = find_environment(name, list_robot_names())
     with suppress_warnings(), closing(make_environment(environment, options)) as env:
         kind = MujocoGymnasiumRobot if is_mujoco(env) else PlainGymnasiumRobot
     return kind(name, environment=environment, options=options)
-
-
-def _find_environment(name: str) -> str:
-    """Return the registered id behind a name, without its module.
-
-    Raises:
-        RobotError: No environment is registered by that name, or its module may not be imported.
-    """
-    import gymnasium
-
-    if not name.isprintable():
-        raise RobotError(f"unknown robot {name!r}")
-    module, colon, environment = name.rpartition(":")
-    if colon and module not in sys.modules:
-        _import_trusted(module, name)
-    if environment in gymnasium.registry:
-        return environment
-    robots = list_robot_names()
-    known = {one.lower(): one for one in [*robots, *gymnasium.registry]}
-    close = [known[one] for one in get_close_matches(environment.lower(), known, 4, 0.5)]
-    hint = f"did you mean {', '.join(close)}" if close else f"available: {', '.join(sorted(robots))}"
-    raise RobotError(f"unknown robot '{name}'; {hint}, or any environment registered with Gymnasium")
-
-
-def _import_trusted(module: str, name: str) -> None:
-    if module not in _trusted_modules():
-        raise RobotError(
-            f"robot '{name}': the module '{module}' is not imported because a map or a session says so; "
-            f"name robot and map on the command line (drive {name} --map FILE), or the module in {TRUSTED}"
-        )
-    try:
-        import_module(module)
-    except Exception as error:  # whatever the module raises
-        raise RobotError(f"module '{module}' cannot be imported: {type(error).__name__}: {error}") from error
-
-
-def _trusted_modules() -> list[str]:
-    return [module for module in os.environ.get(TRUSTED, "").split(",") if module]

@@ -54,7 +54,7 @@ def folders_of_file(path: Path) -> tuple[Path, ...]:
 def find_file_inside_folders(name: str, folders: Sequence[Path], source: str) -> Path | None:
     """Find a file in one of the folders or the working directory, for names in untrusted files.
 
-    A file is only found inside allowed folders: the working directory, `folders`, and those in the environment
+    It is only found inside allowed folders: the working directory, `folders`, and those in the environment
     variable `POLICY_FOLDERS_VARIABLE`. A symbolic link counts as the file that it points to.
 
     Args:
