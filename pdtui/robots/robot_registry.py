@@ -167,7 +167,7 @@ def _build_from_entry(entry: EntryPoint, options: Mapping[str, OptionValue]) -> 
 
 
 def _build_environment(name: str, options: Mapping[str, OptionValue]) -> Robot:
-    from pdtui.robots.environments.gymnasium_robot import make_environment
+    from pdtui.robots.environments.environment_builder import make_environment
     from pdtui.robots.environments.mujoco_gymnasium_robot import MujocoGymnasiumRobot, is_mujoco
     from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
     from pdtui.robots.simulators.mujoco_robot import suppress_warnings

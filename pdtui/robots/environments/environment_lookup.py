@@ -7,6 +7,7 @@ be imported already, or be named by the user: on the command line, or in the env
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -18,6 +19,10 @@ from pdtui.core.errors import RobotError
 
 TRUSTED = "PDTUI_ENVIRONMENT_MODULES"
 """Environment variable: the modules that may be imported, separated by commas."""
+
+SINGLE_AGENT_ONLY = "pdtui drives single-agent worlds only: one agent, in one world at a time"
+_PETTINGZOO_NAME = re.compile(r"(?:[\w.]+\.)?\w+_v\d+")
+"""Names such as ``pistonball_v6``; those that Gymnasium registers end in ``-v6``."""
 
 
 def trust_module(robot: str) -> None:
@@ -45,10 +50,19 @@ def find_environment(name: str, robots: Sequence[str]) -> str:
     if not name.isprintable():
         raise RobotError(f"unknown robot {name!r}")
     module, colon, environment = name.rpartition(":")
+    if (module or name).split(".")[0] == "pettingzoo":
+        raise RobotError(f"'{name}' is a world of PettingZoo; {SINGLE_AGENT_ONLY}")
     if colon and module not in sys.modules:
         _import_trusted(module, name)
     if environment in gymnasium.registry:
+        spec = gymnasium.registry[environment]
+        if spec.entry_point is None and spec.vector_entry_point is not None:
+            raise RobotError(f"environment '{name}' is registered as vectorised only; {SINGLE_AGENT_ONLY}")
         return environment
+    if _PETTINGZOO_NAME.fullmatch(environment):
+        raise RobotError(
+            f"unknown robot '{name}'; worlds of PettingZoo have such names, but {SINGLE_AGENT_ONLY}"
+        )
     known = {one.lower(): one for one in [*robots, *gymnasium.registry]}
     close = [known[one] for one in get_close_matches(environment.lower(), known, 4, 0.5)]
     hint = f"did you mean {', '.join(close)}" if close else f"available: {', '.join(sorted(robots))}"
