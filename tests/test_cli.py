@@ -128,6 +128,7 @@ def test_evaluate_measures_a_target_and_the_policy_alone(map_path: Path) -> None
     tracked = run("evaluate", "ant", "--map", map_path, "--seeds", "100", "--target", "yaw", "--json")
     data = json.loads(tracked.output)
     assert [row["target"] for row in data["targets"]][:4] == [0.0, 0.4, 0.9, 1.2]
+    assert data["default_outcomes"].keys() == data["outcomes"].keys() == {"fell"}
     walked = run("evaluate", "ant", "--map", map_path, "--seeds", "100", "--policy-only", "--json")
     assert json.loads(walked.output)["steps"] == 1000
     missing = run("evaluate", "ant", "--map", map_path, "--seeds", "100", "--target", "height")
