@@ -132,8 +132,8 @@ def test_streams_are_exported_as_they_are(folder: Path, tmp_path: Path) -> None:
     again = run("sessions", "export", path, "--stream", "events", "-o", tmp_path / "e.csv")
     assert "e.csv: already exists" in again.output
     assert (
-        "no stream 'poses'"
-        in run("sessions", "export", path, "--stream", "poses", "-o", tmp_path / "p.csv").output
+        "no stream 'nothing'"
+        in run("sessions", "export", path, "--stream", "nothing", "-o", tmp_path / "p.csv").output
     )
 
 

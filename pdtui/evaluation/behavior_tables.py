@@ -143,8 +143,8 @@ def _notes(result: MapEvaluation) -> list[str]:
         failures = format_failures(rows[0].default_outcomes, rows[0].runs)
         noun = failure_noun(rows[0].default_outcomes)
         notes.append(
-            f"Without a press, there are {failures} {noun} by itself: the policy is weak, and its {noun} with "
-            "a behavior tell little about the behavior."
+            f"Without a press, there are {failures} {noun} by itself: the policy is weak, and {noun} with a "
+            "behavior tell little about the behavior."
         )
     if result.nearly_one_start:
         notes.append(

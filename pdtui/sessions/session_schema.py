@@ -44,6 +44,11 @@ REWARD_COST_ACTION, DIGEST_EPISODE = "reward_cost_action", "digest_episode"
 ACTIVE_FIELDS = ("remaining", "factor", "target", "value", "error", "magnitude", "waiting")
 """Fields in the column ``active``: those of an `ActiveBehavior` except its name, with NaN for None."""
 
+ExportFormat = Literal["parquet", "csv", "mcap"]
+"""Formats into which streams are exported."""
+
+EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
+
 ActivationsKept = Literal["all", "half", "off"]
 """How activations are recorded: as float32, as float16, or not at all."""
 
