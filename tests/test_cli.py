@@ -345,3 +345,28 @@ def test_a_drive_is_shown_in_a_viewer_and_goes_on_without_one(
     assert "80 steps" in alone.output
     refused = run(*drive, "--no-record", "--viewer", nobody)
     assert "--viewer shows what is recorded" in refused.output
+
+
+def test_robots_and_maps_are_listed(map_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "maps").mkdir()
+    shutil.copy(map_path, tmp_path / "maps" / "mine.toml")
+    (tmp_path / "maps" / "broken.toml").write_text("schema = 1\n")
+    robots = {row["name"]: row for row in json.loads(run("robots", "--json").output)["robots"]}
+    assert robots["bipedal_walker"]["starts"] == ["split"]
+    assert {"ant", "ant-imprints", "mine"} <= set(robots["ant"]["maps"])
+    listed = run("robots").output
+    row = next(line for line in listed.splitlines() if line.startswith("walker "))
+    assert row.split()[-2:] == ["walker-imprints,", "walker"]
+    maps = {row["map"]: row for row in json.loads(run("maps", "--json").output)["maps"]}
+    assert maps["mine"]["behaviors"]["push"] == "w"
+    assert "broken.toml" in maps["broken"]["problem"]
+    assert "push (w), twitch (t), hold heading (h)" in run("maps").output
+
+
+@pytest.mark.parametrize("command", [[], *([name] for name in COMMANDS), ["sessions", "export"]])
+def test_h_is_help(command: list[str]) -> None:
+    short, long = run(*command, "-h"), run(*command, "--help")
+    assert short.exit_code == 0
+    assert short.output == long.output
+    assert "-h, --help" in short.output

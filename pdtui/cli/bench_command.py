@@ -8,8 +8,7 @@ from typing import Any
 import click
 
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
-from pdtui.cli.output.printed_result import print_result, progress_bar
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     build_drive_config,
     integer_option,
     json_option,
@@ -17,6 +16,7 @@ from pdtui.cli.shared_options import (
     own_policy_option,
     record_activations_option,
 )
+from pdtui.cli.output.printed_result import print_result, progress_bar
 from pdtui.sessions.session_schema import ActivationsKept
 
 

@@ -8,8 +8,7 @@ from typing import Any
 import click
 
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
-from pdtui.cli.output.printed_result import print_result, progress_bar
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     FILE_PATH,
     import_option_flags,
     integer_option,
@@ -21,6 +20,7 @@ from pdtui.cli.shared_options import (
     search_seed_option,
     workers_option,
 )
+from pdtui.cli.output.printed_result import print_result, progress_bar
 
 
 @click.command()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pdtui.cli.options.robot_option_flag import robot_option_flag
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     FILE_PATH,
     build_drive_config,
     force_option,
@@ -163,6 +163,8 @@ def show_drive(config: DriveConfig, *, fps: int = 12, watching: bool = False) ->
     try:
         from pdtui.tui.drive_app import DriveApp
 
+        click.echo(make_printable(f"starting {config.robot} …"), err=True)
+        connection.wait_until_started()
         app = DriveApp(connection, config.stimulation_map, fps=fps, watching=watching)
         message = app.run()
     finally:

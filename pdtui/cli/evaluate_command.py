@@ -18,8 +18,7 @@ from pdtui.cli.evaluate.paper_experiments import (
 )
 from pdtui.cli.evaluate.run_watching import watch_runs
 from pdtui.cli.options.robot_option_flag import robot_option_flag
-from pdtui.cli.output.printed_result import describe_copied_map, print_result, progress_bar
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     FILE_PATH,
     SeedList,
     build_drive_config,
@@ -34,6 +33,7 @@ from pdtui.cli.shared_options import (
     start_option,
     workers_option,
 )
+from pdtui.cli.output.printed_result import describe_copied_map, print_result, progress_bar
 from pdtui.core.errors import MapError
 from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions

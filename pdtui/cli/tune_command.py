@@ -7,8 +7,7 @@ from typing import Any
 import click
 
 from pdtui.cli.options.robot_option_flag import robot_option_flag
-from pdtui.cli.output.printed_result import describe_copied_map, print_result, progress_bar
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     SeedList,
     build_drive_config,
     force_option,
@@ -19,6 +18,7 @@ from pdtui.cli.shared_options import (
     minutes_option,
     workers_option,
 )
+from pdtui.cli.output.printed_result import describe_copied_map, print_result, progress_bar
 from pdtui.core.errors import MapError
 from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions

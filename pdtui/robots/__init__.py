@@ -5,6 +5,7 @@ from pdtui.robots.options.robot_spec import RobotSpec
 from pdtui.robots.robot_registry import (
     list_robot_names,
     list_robot_options,
+    list_robots,
     make_robot,
     open_robot,
     require_robot_name,
@@ -15,6 +16,7 @@ __all__ = [
     "RobotSpec",
     "list_robot_names",
     "list_robot_options",
+    "list_robots",
     "make_robot",
     "open_robot",
     "require_robot_name",

@@ -10,6 +10,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -45,6 +46,37 @@ def find_own_robots() -> dict[str, str]:
 def list_robot_names() -> list[str]:
     """Return the names of pdtui's own robots, then of those of other packages."""
     return [*find_own_robots(), *(entry.name for entry in entry_points(group=GROUP))]
+
+
+@dataclass(frozen=True)
+class ListedRobot:
+    """A robot that can be driven, or the problem that prevents it.
+
+    Attributes:
+        name: Name of the robot.
+        title: Its name for people.
+        starts: States besides the usual one in which it can start.
+        problem: Why it cannot be built here; empty if it can.
+    """
+
+    name: str
+    title: str = ""
+    starts: tuple[str, ...] = ()
+    problem: str = ""
+
+
+def list_robots() -> list[ListedRobot]:
+    """Return pdtui's own robots, then those of other packages, without building any."""
+    own, listed = find_own_robots(), []
+    for name in list_robot_names():
+        entry = None if name in own else _find_entry_point(name)
+        try:
+            kind: Any = _load_entry(entry) if entry is not None else _import_own(name, own[name])
+        except RobotError as error:
+            listed.append(ListedRobot(name, problem=str(error)))
+            continue
+        listed.append(ListedRobot(name, getattr(kind, "title", ""), tuple(getattr(kind, "starts", ()))))
+    return listed
 
 
 def require_robot_name(name: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +12,9 @@ from typing import Any
 import click
 
 from pdtui.core.printable_text import to_json
+
+_UNCUT = 10_000
+"""Columns that are wide enough for every table."""
 
 
 def describe_copied_map(path: Path, output: Path) -> str:
@@ -26,8 +31,10 @@ def print_result(
         return
     from rich.console import Console
 
-    # Names in tables come from maps and sessions, so nothing in them is markup.
-    Console(markup=False, emoji=False).print(table())
+    # Names in tables come from maps and sessions, so nothing in them is markup. A file or a pipe is as wide
+    # as the widest table: only a terminal needs lines to be cut or folded.
+    told = sys.stdout.isatty() or "COLUMNS" in os.environ
+    Console(markup=False, emoji=False, width=None if told else _UNCUT).print(table())
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pdtui.cli.shared_options import FILE_PATH, overwrite_option, policy_option
+from pdtui.cli.options.shared_options import FILE_PATH, overwrite_option, policy_option
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import SessionError
 from pdtui.core.printable_text import make_printable
