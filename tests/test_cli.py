@@ -48,6 +48,24 @@ def test_a_headless_drive_is_recorded_and_replays_in_a_fresh_process(
     assert replay.stdout == "identical: 80 steps\n"
 
 
+def test_a_headless_drive_is_recorded_into_the_folder_of_sessions_unless_told_otherwise(
+    map_path: Path, keys: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    drive = ("drive", "ant", "--map", map_path, "--headless", "--keys", keys, "--steps", 60, "--seed", 7)
+    unrecorded = run(*drive, "--no-record")
+    assert unrecorded.exit_code == 0, unrecorded.output
+    assert not (tmp_path / "sessions").exists()
+    driven = run(*drive)
+    assert driven.exit_code == 0, driven.output
+    (session,) = Path("sessions").iterdir()
+    assert session.match("ant-*-seed7.rrd")
+    assert driven.stdout.endswith(f"recorded in {session}\n")
+    assert run("replay", session).stdout == "identical: 60 steps\n"
+    both = run(*drive, "--no-record", "--record", "a.rrd")
+    assert both.output == "pdtui: --record and --no-record are mutually exclusive\n"
+
+
 def test_a_replay_names_the_first_step_that_differs(map_path: Path, tmp_path: Path) -> None:
     """The same drive with another disturbance: a session whose robot was pushed behind the loop's back."""
     from pdtui.driving.drive_config import DriveConfig
@@ -110,6 +128,7 @@ def test_evaluate_measures_a_target_and_the_policy_alone(map_path: Path) -> None
     tracked = run("evaluate", "ant", "--map", map_path, "--seeds", "100", "--target", "yaw", "--json")
     data = json.loads(tracked.output)
     assert [row["target"] for row in data["targets"]][:4] == [0.0, 0.4, 0.9, 1.2]
+    assert data["default_outcomes"].keys() == data["outcomes"].keys() == {"fell"}
     walked = run("evaluate", "ant", "--map", map_path, "--seeds", "100", "--policy-only", "--json")
     assert json.loads(walked.output)["steps"] == 1000
     missing = run("evaluate", "ant", "--map", map_path, "--seeds", "100", "--target", "height")
@@ -185,7 +204,10 @@ def test_a_map_of_another_policy_needs_force(
     refused = run("drive", "ant", "--map", other, "--headless", "--steps", 5)
     assert refused.exit_code == 1
     assert f"made for a policy with SHA-256 {'0' * 64}" in refused.output
-    assert run("drive", "ant", "--map", other, "--headless", "--steps", 5, "--force").exit_code == 0
+    assert (
+        run("drive", "ant", "--map", other, "--headless", "--steps", 5, "--no-record", "--force").exit_code
+        == 0
+    )
     for command in (
         ("evaluate", other, "--update", "--force", "--seeds", "100"),
         ("tune", other, "--all", "--force", "--seeds", "200-201", "--points", 1, "--refinements", 0),
@@ -321,5 +343,30 @@ def test_a_drive_is_shown_in_a_viewer_and_goes_on_without_one(
     assert alone.exit_code == 0, alone.output
     assert f"no viewer listens on 127.0.0.1:{nobody}: start `rerun --bind 127.0.0.1" in alone.output
     assert "80 steps" in alone.output
-    refused = run(*drive, "--viewer", nobody)
+    refused = run(*drive, "--no-record", "--viewer", nobody)
     assert "--viewer shows what is recorded" in refused.output
+
+
+def test_robots_and_maps_are_listed(map_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "maps").mkdir()
+    shutil.copy(map_path, tmp_path / "maps" / "mine.toml")
+    (tmp_path / "maps" / "broken.toml").write_text("schema = 1\n")
+    robots = {row["name"]: row for row in json.loads(run("robots", "--json").output)["robots"]}
+    assert robots["bipedal_walker"]["starts"] == ["split"]
+    assert {"ant", "ant-imprints", "mine"} <= set(robots["ant"]["maps"])
+    listed = run("robots").output
+    row = next(line for line in listed.splitlines() if line.startswith("walker "))
+    assert row.split()[-2:] == ["walker-imprints,", "walker"]
+    maps = {row["map"]: row for row in json.loads(run("maps", "--json").output)["maps"]}
+    assert maps["mine"]["behaviors"]["push"] == "w"
+    assert "broken.toml" in maps["broken"]["problem"]
+    assert "push (w), twitch (t), hold heading (h)" in run("maps").output
+
+
+@pytest.mark.parametrize("command", [[], *([name] for name in COMMANDS), ["sessions", "export"]])
+def test_h_is_help(command: list[str]) -> None:
+    short, long = run(*command, "-h"), run(*command, "--help")
+    assert short.exit_code == 0
+    assert short.output == long.output
+    assert "-h, --help" in short.output

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -28,8 +29,9 @@ from tests.obstacle_course import Course, course_loop
 KEYS = "10 w\n20 t\n30 space\n35 h\n40 left\n50 r\n"
 
 
-def run(*arguments: str | Path | int) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+def run(*arguments: str | Path | int, columns: int | None = None) -> Result:
+    environment = None if columns is None else {"COLUMNS": str(columns)}
+    return CliRunner().invoke(main, [str(argument) for argument in arguments], env=environment)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +52,7 @@ def folder(map_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_list_shows_good_and_broken_files(folder: Path) -> None:
-    shown = run("sessions", "list", folder)
+    shown = run("sessions", "list", folder, columns=80)
     assert shown.exit_code == 0, shown.output
     rows = {line.split()[0]: line for line in shown.output.splitlines() if line[:1].strip()}
     assert rows["a.rrd"].split()[1:5] == ["ant", "4.0", "s", "6"]
@@ -63,8 +65,20 @@ def test_the_list_shows_good_and_broken_files(folder: Path) -> None:
     assert (data[0]["steps"], data[0]["keys"], data[0]["outcome"]) == (80, 6, "finished")
 
 
+def test_the_list_does_not_split_a_name_and_cuts_nothing_in_a_pipe(folder: Path, tmp_path: Path) -> None:
+    name = "bipedal_walker-20261127-175936-seed123.rrd"
+    shutil.copy(folder / "a.rrd", tmp_path / name)
+    shutil.copy(folder / "cut.rrd", tmp_path)
+    narrow = run("sessions", "list", tmp_path, columns=80)
+    assert name in narrow.output
+    piped = run("sessions", "list", tmp_path).output.splitlines()
+    assert len(piped) == 3  # the headings, and one line for each session
+    (broken,) = (line for line in piped if line.startswith("cut.rrd"))
+    assert "`pdtui sessions repair` rescues what is whole" in broken
+
+
 def test_show_tells_the_drive_key_by_key(folder: Path, map_text: str) -> None:
-    shown = run("sessions", "show", folder / "a.rrd")
+    shown = run("sessions", "show", folder / "a.rrd", columns=80)
     assert shown.exit_code == 0, shown.output
     lines = [line.split() for line in shown.output.splitlines()]
     assert ["0.50", "s", "10", "w", "behavior", "'push'", "latched"] in lines
@@ -132,8 +146,8 @@ def test_streams_are_exported_as_they_are(folder: Path, tmp_path: Path) -> None:
     again = run("sessions", "export", path, "--stream", "events", "-o", tmp_path / "e.csv")
     assert "e.csv: already exists" in again.output
     assert (
-        "no stream 'poses'"
-        in run("sessions", "export", path, "--stream", "poses", "-o", tmp_path / "p.csv").output
+        "no stream 'nothing'"
+        in run("sessions", "export", path, "--stream", "nothing", "-o", tmp_path / "p.csv").output
     )
 
 

@@ -98,9 +98,10 @@ def test_a_drive_in_a_terminal_replays_bit_for_bit(screen: pexpect.spawn[str], s
 def test_a_session_without_steps_cannot_be_watched(small_map: StimulationMap, session: Path) -> None:
     """Nowadays none is written, but earlier versions did."""
     info = build_control_loop(DriveConfig("ant", small_map, 5)).info
-    recording = RerunRecording(SessionFile(session), info)
+    created = "2026-01-01T00:00:00+00:00"
+    recording = RerunRecording(SessionFile(session), info, created)
     recording.create_file()
-    send_property_group(recording.stream, INFO, encode_drive_info(info, "2026-01-01T00:00:00+00:00"))
+    send_property_group(recording.stream, INFO, encode_drive_info(info, created))
     recording.close()
     arguments = ["-m", "pdtui", "replay", str(session), "--watch"]
     child = pexpect.spawn(
@@ -185,3 +186,37 @@ def test_a_drive_whose_terminal_is_gone_ends(screen: pexpect.spawn[str], session
         assert time.monotonic() < deadline, "the screen is still there"
         time.sleep(0.1)
     assert _outcome(session) in ("ended by SIGHUP", "stopped", "the screen went away")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--start", "upside down"), "no start 'upside down'"),
+        (
+            ("--map", "MAP", "--policy", "walker", "--force"),
+            "expected a policy for robot 'ant', found one for 'walker'",
+        ),
+        (("--record", "blocked/a.rrd"), "blocked/a.rrd: cannot be written"),
+    ],
+)
+def test_what_can_be_refused_is_refused_before_the_screen_opens(
+    options: tuple[str, ...], said: str, map_path: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "blocked").write_text("a file where a folder should be")
+    child = pexpect.spawn(
+        sys.executable,
+        ["-m", "pdtui", "drive", "ant", *(str(map_path) if one == "MAP" else one for one in options)],
+        dimensions=(24, 200),
+        encoding="utf-8",
+        timeout=3 * PATIENCE,
+        cwd=tmp_path,
+        env=_environment(),
+    )
+    child.expect(pexpect.EOF)
+    child.wait()
+    lines = (child.before or "").splitlines()
+    assert child.exitstatus == 1
+    assert "\x1b[?1049h" not in (child.before or ""), "the alternate screen was opened"
+    assert said in lines[-1]
+    assert lines[-1].startswith("pdtui: ")
+    assert not (tmp_path / "sessions").exists()

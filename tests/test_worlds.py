@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner, Result
+from gymnasium.envs.classic_control import PendulumEnv
 
 from pdtui.cli import main
 from pdtui.core.drive_events import DriveEvent
@@ -165,7 +169,7 @@ def test_dissect_takes_an_environment_and_its_map_drives(tmp_path: Path) -> None
     assert pictures[1] == tmp_path / "figures" / "spectrograms.png"
     assert all(path.stat().st_size > 1000 for path in pictures)
     assert load_map(output).robot == "Pendulum-v1"
-    driven = run("drive", output, "--headless", "--steps", 20)
+    driven = run("drive", output, "--headless", "--steps", 20, "--no-record")
     assert "20 steps, 1 s simulated" in driven.output, driven.output
 
 
@@ -204,3 +208,84 @@ def test_a_module_named_on_the_command_line_is_imported_for_its_map(
         [*command, "--headless", "--steps", "5"], capture_output=True, text=True, check=False, cwd=tmp_path
     )
     assert result.stdout.startswith("5 steps"), result.stderr
+
+
+def test_a_module_is_found_in_the_working_directory_by_the_installed_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python does not look there when it runs an installed command, which `-P` stands for."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[1]))
+    (tmp_path / "my_worlds.py").write_text(
+        "import gymnasium\n"
+        "from gymnasium.envs.classic_control import PendulumEnv\n"
+        "class Mine(PendulumEnv):\n"
+        "    pass\n"
+        "gymnasium.register('Mine-v0', entry_point=Mine)\n"
+    )
+    policy = Path(__file__).parent / "fixtures" / "sb3-pendulum.zip"
+
+    def pdtui(*arguments: str | Path) -> str:
+        command = [sys.executable, "-P", "-m", "pdtui", *map(str, arguments)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    world = "my_worlds:Mine-v0"
+    drive = pdtui("drive", world, "--policy", policy, "--headless", "--steps", "5", "--no-record")
+    assert drive.startswith("5 steps")
+    measured = ("--policy", policy, "--policy-only", "--seeds", "1-2", "--json")
+    assert json.loads(pdtui("evaluate", world, *measured))["steps"] > 0
+
+
+class _ManyAgents:
+    """What PettingZoo's parallel worlds look like."""
+
+    possible_agents = ("one", "other")
+
+    def close(self) -> None:
+        pass
+
+
+class _ManyPendulums(PendulumEnv):
+    """An environment that runs several worlds, as those of simulators on a GPU do."""
+
+    num_envs = 4
+
+
+@pytest.fixture
+def crowded() -> Iterator[None]:
+    """Worlds of several agents, or several at once, that are registered with Gymnasium."""
+    kinds: dict[str, dict[str, Any]] = {
+        "test/Agents-v0": {"entry_point": _ManyAgents},
+        "test/Vector-v0": {"entry_point": lambda: gymnasium.make_vec("CartPole-v1", num_envs=3)},
+        "test/OnlyVector-v0": {"vector_entry_point": lambda: gymnasium.make_vec("CartPole-v1", num_envs=3)},
+        "test/Pendulums-v0": {"entry_point": _ManyPendulums},
+    }
+    for name, points in kinds.items():
+        gymnasium.register(name, **points)
+    yield
+    for name in kinds:
+        del gymnasium.registry[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("pistonball_v6", "unknown robot 'pistonball_v6'; worlds of PettingZoo have such names, but pdtui"),
+        ("pettingzoo.mpe:simple_v3", "'pettingzoo.mpe:simple_v3' is a world of PettingZoo; pdtui"),
+        ("test/Agents-v0", "environment 'test/Agents-v0' is a world of PettingZoo, or one like them; pdtui"),
+        ("test/Vector-v0", "environment 'test/Vector-v0' is vectorised: it runs 3 worlds at once; pdtui"),
+        ("test/OnlyVector-v0", "environment 'test/OnlyVector-v0' is registered as vectorised only; pdtui"),
+        (
+            "test/Pendulums-v0",
+            "environment 'test/Pendulums-v0' is vectorised: it runs 4 worlds at once; pdtui",
+        ),
+    ],
+)
+@pytest.mark.usefixtures("crowded")
+def test_only_one_agent_in_one_world_is_driven(name: str, said: str) -> None:
+    policy = Path(__file__).parent / "fixtures" / "sb3-pendulum.zip"
+    refused = run("drive", name, "--policy", policy, "--headless", "--no-record")
+    assert refused.exit_code == 1
+    (line,) = [one for one in refused.output.splitlines() if "driving without behaviors" not in one]
+    assert line == f"pdtui: {said} drives single-agent worlds only: one agent, in one world at a time"

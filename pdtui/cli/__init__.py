@@ -14,6 +14,8 @@ from pdtui.cli.command_group import LazyCommandGroup
 
 COMMANDS = {
     "drive": "Drive a robot with the keys of its map.",
+    "robots": "List the robots.",
+    "maps": "List the maps.",
     "replay": "Repeat a session and compare every step.",
     "guide": "Read the guide.",
     "sessions": "List, inspect, verify, repair and export sessions.",
@@ -29,7 +31,12 @@ COMMANDS = {
 """The summary of each command in `pdtui --help`; `pdtui.cli.NAME_command` has the command."""
 
 
-@click.group(cls=LazyCommandGroup, summaries=COMMANDS, invoke_without_command=True)
+@click.group(
+    cls=LazyCommandGroup,
+    summaries=COMMANDS,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(__version__)
 @click.pass_context
 def main(ctx: click.Context) -> None:

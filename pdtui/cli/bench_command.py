@@ -8,16 +8,15 @@ from typing import Any
 import click
 
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     build_drive_config,
     integer_option,
     json_option,
     map_option,
     own_policy_option,
-    print_result,
-    progress_bar,
     record_activations_option,
 )
+from pdtui.cli.output.printed_result import print_result, progress_bar
 from pdtui.sessions.session_schema import ActivationsKept
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
-from pdtui.cli.shared_options import FILE_PATH, import_option_flags
+from pdtui.cli.options.shared_options import FILE_PATH, import_option_flags
 from pdtui.policies.weights.import_options import ImportOptions, ObservationActionSpaces
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     FILE_PATH,
     import_option_flags,
     integer_option,
@@ -17,11 +17,10 @@ from pdtui.cli.shared_options import (
     overwrite_option,
     own_policy_option,
     preset_option,
-    print_result,
-    progress_bar,
     search_seed_option,
     workers_option,
 )
+from pdtui.cli.output.printed_result import print_result, progress_bar
 
 
 @click.command()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pdtui.cli.options.robot_option_flag import robot_option_flag
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     FILE_PATH,
     build_drive_config,
     force_option,
@@ -96,20 +96,22 @@ def drive_command(
         raise SessionError(f"{record}: already exists; --overwrite replaces it")
     if overwrite and record is None:
         raise SessionError("--overwrite needs --record FILE")
+    if record is not None and no_record:
+        raise SessionError("--record and --no-record are mutually exclusive")
     if record is not None:
         config = replace(config, recording=str(record), existing="replace" if overwrite else "refuse")
+    elif not no_record:
+        config = _record_into_new_session(config)
     if keys is not None and not headless:
         raise KeystrokeError("--keys needs --headless; on the screen, keys are pressed by hand")
     if viewer is not None:
-        if no_record or (headless and record is None):
-            raise SessionError("--viewer shows what is recorded: add --record FILE, or leave --no-record out")
+        if no_record:
+            raise SessionError("--viewer shows what is recorded; leave --no-record out")
         config = replace(config, viewer=ViewerAddress.parse(viewer))
     if headless:
         _drive_headless(config, keys, steps)
-    elif no_record:
-        show_drive(replace(config, recording=""), fps=fps)
     else:
-        show_drive(config if record is not None else _record_into_new_session(config), fps=fps)
+        show_drive(config, fps=fps)
 
 
 def _record_into_new_session(config: DriveConfig) -> DriveConfig:
@@ -161,6 +163,8 @@ def show_drive(config: DriveConfig, *, fps: int = 12, watching: bool = False) ->
     try:
         from pdtui.tui.drive_app import DriveApp
 
+        click.echo(make_printable(f"starting {config.robot} …"), err=True)
+        connection.wait_until_started()
         app = DriveApp(connection, config.stimulation_map, fps=fps, watching=watching)
         message = app.run()
     finally:

@@ -19,7 +19,7 @@ from pdtui.cli.evaluate.paper_experiments import (
 from pdtui.cli.evaluate.run_watching import watch_runs
 from pdtui.cli.evaluate.single_measurements import print_policy_alone, print_releases, print_target_tracking
 from pdtui.cli.options.robot_option_flag import robot_option_flag
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     FILE_PATH,
     SeedList,
     build_drive_config,
@@ -31,12 +31,12 @@ from pdtui.cli.shared_options import (
     map_option,
     map_policy_option,
     overwrite_option,
-    print_result,
-    progress_bar,
     start_option,
     workers_option,
 )
+from pdtui.cli.output.printed_result import describe_copied_map, print_result, progress_bar
 from pdtui.core.errors import MapError
+from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
 
 if TYPE_CHECKING:
@@ -70,7 +70,10 @@ if TYPE_CHECKING:
 )
 @start_option
 @click.option(
-    "--update", is_flag=True, help="Write the effects of the behaviors into the map; its comments are kept."
+    "--update",
+    is_flag=True,
+    help="Write the effects of the behaviors into the map; its comments are kept. Of a map that comes with "
+    "pdtui, a copy is written into ./maps.",
 )
 @click.option("--quick", is_flag=True, help="Take a quick look: fewer seeds and random draws.")
 @integer_option("--hold", help="Control steps for which a behavior is held, at least 10 s; default: 1000.")
@@ -217,8 +220,13 @@ def _evaluate_behaviors(
     from pdtui.evaluation.ranked_runs import rank_runs
     from pdtui.pictures.behavior_strips import draw_strips, film_strips
     from pdtui.pictures.matplotlib_page import check_figure_path
+    from pdtui.stimulation.map_library import own_map_path
     from pdtui.stimulation.map_writer import replace_effects, rewrite_map
 
+    source = Path(config.stimulation_map.source)
+    output = own_map_path(source) if update else source
+    if update and len(seeds) < 2:
+        raise MapError("--update needs at least 2 seeds: a single one gives no interval")
     if drawn is not None:
         check_figure_path(*drawn)
     if watch:
@@ -229,8 +237,10 @@ def _evaluate_behaviors(
     with progress_bar("evaluating", quiet=as_json) as advance:
         result = evaluation.evaluate_behaviors(config, plan, workers=workers, progress=advance)
     if update:
-        path = Path(config.stimulation_map.source)
-        rewrite_map(path, lambda text: replace_effects(text, result.measured_effects(), str(path)))
+        measured = result.measured_effects()
+        rewrite_map(source, lambda text: replace_effects(text, measured, str(source)), output)
+        told = f"{output}: wrote the effects{describe_copied_map(source, output)}"
+        click.echo(make_printable(told), err=True)
     print_result(asdict(result), as_json, lambda: behavior_tables(result))
     if drawn is not None:
         with progress_bar("filming", quiet=as_json) as advance:

@@ -8,15 +8,15 @@ from typing import Any
 import click
 
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     FILE_PATH,
     import_option_flags,
     integer_option,
     overwrite_option,
     own_policy_option,
     preset_option,
-    progress_bar,
 )
+from pdtui.cli.output.printed_result import progress_bar
 from pdtui.core.printable_text import make_printable
 
 

@@ -9,18 +9,17 @@ from typing import Any
 import click
 
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     FILE_PATH,
     import_option_flags,
     integer_option,
     json_option,
     minutes_option,
     own_policy_option,
-    print_result,
-    progress_bar,
     search_seed_option,
     workers_option,
 )
+from pdtui.cli.output.printed_result import print_result, progress_bar
 
 
 @click.command()

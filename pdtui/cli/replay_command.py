@@ -11,7 +11,8 @@ from typing import Any
 import click
 
 from pdtui.cli.drive_command import show_drive
-from pdtui.cli.shared_options import FILE_PATH, policy_option, progress_bar
+from pdtui.cli.options.shared_options import FILE_PATH, policy_option
+from pdtui.cli.output.printed_result import progress_bar
 from pdtui.core.errors import SessionError
 from pdtui.core.printable_text import make_printable
 

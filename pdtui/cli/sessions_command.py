@@ -9,9 +9,10 @@ from typing import Any
 
 import click
 
+from pdtui.cli.options.shared_options import FILE_PATH, json_option
+from pdtui.cli.output.printed_result import print_result, progress_bar
 from pdtui.cli.replay_command import replay_options
-from pdtui.cli.shared_options import FILE_PATH, json_option, overwrite_option, print_result, progress_bar
-from pdtui.core.atomic_file import write_file
+from pdtui.cli.sessions.export_session import export_command
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.printable_text import make_printable, to_json
 
@@ -26,12 +27,15 @@ def sessions_command() -> None:
     """List, inspect, verify, repair, export, compare and open sessions."""
 
 
+sessions_command.add_command(export_command)
+
+
 @sessions_command.command("list")
 @click.argument("folder", type=FILE_PATH, default="sessions")
 @json_option
 def list_command(folder: Path, as_json: bool) -> None:
     """List the sessions under FOLDER, and say what is wrong with broken ones."""
-    from pdtui.cli import session_tables
+    from pdtui.cli.output import session_tables
 
     if not folder.is_dir():
         raise SessionError(f"{folder}: no such folder")
@@ -68,7 +72,7 @@ def _list_row(path: Path) -> dict[str, Any]:
 @json_option
 def show_command(file: Path, as_json: bool) -> None:
     """Show robot, policy, keys, attributes and outcome of FILE."""
-    from pdtui.cli import session_tables
+    from pdtui.cli.output import session_tables
     from pdtui.sessions.session_header import read_session_header
     from pdtui.sessions.session_summary import read_session_summary
 
@@ -168,50 +172,6 @@ def repair_command(file: Path, output: Path | None, in_place: bool) -> None:
 
 
 @sessions_command.command()
-@_file_argument
-@click.option(
-    "--stream", metavar="NAME", help="Stream to export. Without --stream and --keys, the streams are listed."
-)
-@click.option(
-    "-o", "--output", type=FILE_PATH, metavar="FILE.parquet|.csv", help="File to write the stream into."
-)
-@click.option("--keys", type=FILE_PATH, metavar="FILE", help="Text file to write the keystrokes into.")
-@overwrite_option
-def export_command(
-    file: Path, stream: str | None, output: Path | None, keys: Path | None, overwrite: bool
-) -> None:
-    """Export a stream of FILE as a table, or its keystrokes as text.
-
-    `pdtui drive --headless --keys` reads the keystrokes.
-    """
-    from pdtui.sessions.session_export import STREAMS, export_stream
-
-    if (stream is None) != (output is None):
-        raise SessionError("--stream and -o must be given together")
-    if stream is not None and output is not None:
-        rows = export_stream(file, stream, output, overwrite=overwrite)
-        click.echo(make_printable(f"wrote {output}: {rows} rows"))
-    if keys is not None:
-        _export_keys(file, keys, overwrite)
-    if stream is None and keys is None:
-        for name, one in STREAMS.items():
-            click.echo(f"{name:<12} {one.says}")
-
-
-def _export_keys(file: Path, output: Path, overwrite: bool) -> None:
-    from pdtui.driving.keystrokes import format_keystrokes
-    from pdtui.sessions.session_header import read_session_header
-
-    if output.exists() and not overwrite:
-        raise SessionError(f"{output}: already exists; --overwrite replaces it")
-    header = read_session_header(file)
-    write_file(output, format_keystrokes(header.events), SessionError)
-    without = len(header.events) - header.keys
-    note = f"; left out {without} events without a key" if without else ""
-    click.echo(make_printable(f"wrote {output}: {header.keys} keys of {header.steps} steps{note}"))
-
-
-@sessions_command.command()
 @click.argument("a", type=FILE_PATH)
 @click.argument("b", type=FILE_PATH)
 @json_option
@@ -220,7 +180,7 @@ def compare_command(a: Path, b: Path, as_json: bool) -> None:
 
     Exit codes: 0 if they are identical; 3 if they differ.
     """
-    from pdtui.cli import session_tables
+    from pdtui.cli.output import session_tables
     from pdtui.sessions.session_comparison import compare_sessions
     from pdtui.sessions.session_header import read_session_header
 

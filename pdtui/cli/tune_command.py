@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from pdtui.cli.options.robot_option_flag import robot_option_flag
-from pdtui.cli.shared_options import (
+from pdtui.cli.options.shared_options import (
     SeedList,
     build_drive_config,
     force_option,
@@ -16,11 +16,11 @@ from pdtui.cli.shared_options import (
     json_option,
     map_policy_option,
     minutes_option,
-    print_result,
-    progress_bar,
     workers_option,
 )
+from pdtui.cli.output.printed_result import describe_copied_map, print_result, progress_bar
 from pdtui.core.errors import MapError
+from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
 
 
@@ -64,7 +64,7 @@ def tune_command(
 
     On seeds that no search saw, what it found is compared with the map's gains and with the best
     proportional controller, which is searched in the same way. The best of the three is written. The map's
-    comments are kept.
+    comments are kept. Of a map that comes with pdtui, a copy is written into ./maps.
     """
     if bool(behaviors) == every:
         raise click.UsageError("expected either a BEHAVIOR or --all")
@@ -75,10 +75,11 @@ def tune_command(
     from pdtui.evaluation.evaluation_tables import tuning_table
     from pdtui.search.gain_search import TuningSettings
     from pdtui.search.gain_tuning import tune_gains
-    from pdtui.stimulation.map_library import find_map
+    from pdtui.stimulation.map_library import find_map, own_map_path
     from pdtui.stimulation.map_writer import add_seeds, replace_gains, rewrite_map
 
     path = find_map(map_name)
+    output = path if dry_run else own_map_path(path)
     config = build_drive_config(
         str(path), None, policy, import_options, force=force, robot_options=robot_options
     )
@@ -87,11 +88,17 @@ def tune_command(
             config, behaviors, seeds, settings=TuningSettings(**settings), workers=workers, progress=advance
         )
     better = {one.behavior: one.gains for one in results if one.better}
-    if better and not dry_run:
-        source = str(path)
-        rewrite_map(path, lambda text: add_seeds(replace_gains(text, better, source), [seeds], source))
     written = sorted(better) if not dry_run else []
-    data = {"map": str(path), "behaviors": [one.as_dict() for one in results], "written": written}
+    if written:
+        source = str(path)
+
+        def change(text: str) -> str:
+            return add_seeds(replace_gains(text, better, source), [seeds], source)
+
+        rewrite_map(path, change, output)
+    rows = [one.as_dict() for one in results]
+    data = {"map": str(output if written else path), "behaviors": rows, "written": written}
     print_result(data, as_json, lambda: tuning_table(results))
     if not as_json:
-        click.echo(f"{path}: wrote the gains of {', '.join(written)}" if written else f"{path}: not changed")
+        told = f"wrote the gains of {', '.join(written)}{describe_copied_map(path, output)}"
+        click.echo(make_printable(f"{output}: {told}" if written else f"{path}: not changed"))

@@ -24,6 +24,7 @@ from pdtui.search.task_rollout import StimulationWithDuration
 from pdtui.search.task_search import TaskSearch, TaskSearchResult
 from pdtui.search.task_search_settings import TaskSearchSettings
 from pdtui.stimulation.interventions.intervention import Onset
+from pdtui.stimulation.map_policy_lookup import name_policy_from_map
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.map_robot_options import map_robot
 from pdtui.stimulation.map_writer import add_behavior, add_seeds, compose_map, rewrite_map
@@ -115,14 +116,15 @@ def search_task_into_map(
         begin = [] if known is None else _known_plans(known, task, pool)
         search = TaskSearch(pool, goal, seed, settings, begin)
         result = search.run(SharedTimeBudget(minutes).share(), progress)
+        named, named_options = name_policy_from_map(policy, import_options, output)
         new_map = StimulationMap(
             robot.name,
-            policy,
+            named,
             pool.policy.sha256,
             "space",
             {},
             {},
-            import_options=import_options,
+            import_options=named_options,
             robot_options=dict(pool.robot.build_options),
         )
     behavior = draft_task_behavior(result, layers, dt)

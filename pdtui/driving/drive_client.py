@@ -64,6 +64,7 @@ class DriveClient(DriveConnection):
         self.failed = False
         """Whether the drive ended with an error; set by `close`."""
         self._asked = False
+        self._first: DriveFacts | None = None
         self.recording = ""
         """File that the drive is recorded into; empty until it was created."""
 
@@ -72,8 +73,21 @@ class DriveClient(DriveConnection):
         """Process id of the simulation."""
         return self._process.pid or 0
 
+    def wait_until_started(self) -> None:
+        """Wait until robot, policy and recording are ready; a `PdtuiError` says what cannot be loaded."""
+        while self._first is None:
+            message = self._receive(timeout=0.1)
+            if isinstance(message, PdtuiError):
+                raise message
+            if isinstance(message, str):
+                self._last_words = message
+                raise PdtuiError(message)
+            if isinstance(message, DriveFacts):
+                self._first = message
+
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:
-        message = self._receive()
+        first, self._first = self._first, None
+        message = first or self._receive()
         if isinstance(message, DriveFacts) and message.recorded:
             self.recording = message.recording
         if isinstance(message, DriveFacts) or (message is None and not self._asked):

@@ -7,7 +7,7 @@ import math
 from rich.console import Group
 from rich.table import Table
 
-from pdtui.core.outcome import failure_noun, format_failures
+from pdtui.core.outcome import count_failures, failure_noun, format_failures
 from pdtui.core.text_tables import format_mean_with_interval, format_p_value, format_seed_range, new_table
 from pdtui.evaluation.behavior_evaluation import MapEvaluation
 from pdtui.evaluation.behavior_summary import AS_LARGE, BehaviorEvaluation
@@ -138,6 +138,14 @@ def _condition_cells(row: BehaviorEvaluation) -> list[str]:
 
 def _notes(result: MapEvaluation) -> list[str]:
     notes = []
+    rows = result.undisturbed()
+    if rows and all(2 * count_failures(row.default_outcomes) >= row.runs for row in rows):
+        failures = format_failures(rows[0].default_outcomes, rows[0].runs)
+        noun = failure_noun(rows[0].default_outcomes)
+        notes.append(
+            f"Without a press, there are {failures} {noun} by itself: the policy is weak, and {noun} with a "
+            "behavior tell little about the behavior."
+        )
     if result.nearly_one_start:
         notes.append(
             f"These {len(result.seeds)} seeds are nearly one start: without a press, they differ by "

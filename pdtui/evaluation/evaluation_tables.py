@@ -39,19 +39,21 @@ def tracking_table(result: TrackingSummary) -> Table:
     unit = result.unit
     table = new_table(
         f"{result.behavior}: {result.attribute} ({unit}), {format_seed_range(result.seeds)}, "
-        f"{describe_outcomes(result.outcomes)}",
+        f"{describe_outcomes(result.outcomes, len(result.seeds))}",
         *(f"target ({unit})", "mean |error|", "last 25 steps"),
     )
     for row in result.targets:
         table.add_row(f"{row.target:+.2f}", f"{row.error:.3f}", f"{row.settled:.3f}")
     table.add_section()
     table.add_row("mean", _with_interval(result), f"{result.settled:.3f}")
+    by_itself = ""
     if result.default_error is not None:
         table.add_row("without control", f"{result.default_error:.3f}", "")
+        by_itself = f" Without control: {describe_outcomes(result.default_outcomes, len(result.seeds))}."
     responses = result.responses
     table.caption = (
         f"Rise time {_rise(responses)} s; {responses.unrisen} of {responses.steps} steps not risen; "
-        f"overshoot {_overshoot(responses)}."
+        f"overshoot {_overshoot(responses)}.{by_itself}"
     )
     return table
 

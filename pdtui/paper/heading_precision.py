@@ -90,6 +90,7 @@ class HeadingPrecisionComparison:
 
     def as_dict(self) -> dict[str, Any]:
         """Return what ``--json`` prints."""
+        left_out = ("default_error", "default_outcomes")  # the experiment drives no robot without control
         rows = [
             {
                 "map": row.map,
@@ -98,7 +99,7 @@ class HeadingPrecisionComparison:
                 "by": row.input_kind,
                 "driven": list(row.inputs),
                 "commands": row.other_commands,
-                **{name: value for name, value in asdict(row.tracking).items() if name != "default_error"},
+                **{name: value for name, value in asdict(row.tracking).items() if name not in left_out},
                 "ratio": None if row.ratio is None else asdict(row.ratio),
                 "pushed": None if row.pushed is None else asdict(row.pushed),
             }

@@ -1,25 +1,23 @@
 """Find and build robots by name: pdtui's own, those of other packages, and Gymnasium's environments.
 
 A name may come from the command line, but also from a map or a session that somebody sent. It can only choose
-among code that is installed here. Gymnasium would import the module in front of a colon
-(``package.module:Name-v0``). Here, such a module must be imported already, or be named by the user: on the
-command line, or in the environment variable `TRUSTED`.
+among code that is installed here; see `pdtui.robots.environments.environment_lookup`.
 """
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from difflib import get_close_matches
+from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pdtui.core.errors import RobotError
+from pdtui.robots.environments.environment_lookup import find_environment
 from pdtui.robots.options.constructor_options import read_constructor_options
 from pdtui.robots.options.robot_option import OptionValue, RobotOption, check_robot_options
 from pdtui.robots.options.robot_spec import RobotSpec
@@ -28,7 +26,6 @@ if TYPE_CHECKING:
     from pdtui.robots.robot import Robot
 
 GROUP = "pdtui.robots"
-TRUSTED = "PDTUI_ENVIRONMENT_MODULES"
 
 
 def find_own_robots() -> dict[str, str]:
@@ -51,14 +48,35 @@ def list_robot_names() -> list[str]:
     return [*find_own_robots(), *(entry.name for entry in entry_points(group=GROUP))]
 
 
-def trust_module(robot: str) -> None:
-    """Allow the import of the module in front of a name's colon, here and in processes started from here.
+@dataclass(frozen=True)
+class ListedRobot:
+    """A robot that can be driven, or the problem that prevents it.
 
-    Call it only for names that the user typed.
+    Attributes:
+        name: Name of the robot.
+        title: Its name for people.
+        starts: States besides the usual one in which it can start.
+        problem: Why it cannot be built here; empty if it can.
     """
-    module, colon, _ = robot.rpartition(":")
-    if colon:
-        os.environ[TRUSTED] = ",".join([*_trusted_modules(), module])
+
+    name: str
+    title: str = ""
+    starts: tuple[str, ...] = ()
+    problem: str = ""
+
+
+def list_robots() -> list[ListedRobot]:
+    """Return pdtui's own robots, then those of other packages, without building any."""
+    own, listed = find_own_robots(), []
+    for name in list_robot_names():
+        entry = None if name in own else _find_entry_point(name)
+        try:
+            kind: Any = _load_entry(entry) if entry is not None else _import_own(name, own[name])
+        except RobotError as error:
+            listed.append(ListedRobot(name, problem=str(error)))
+            continue
+        listed.append(ListedRobot(name, getattr(kind, "title", ""), tuple(getattr(kind, "starts", ()))))
+    return listed
 
 
 def require_robot_name(name: str) -> str:
@@ -68,7 +86,7 @@ def require_robot_name(name: str) -> str:
         RobotError: There is no robot of that name; the message lists close matches.
     """
     if name not in find_own_robots() and _find_entry_point(name) is None:
-        _find_environment(name)
+        find_environment(name, list_robot_names())
     return name
 
 
@@ -86,7 +104,7 @@ def list_robot_options(name: str) -> tuple[RobotOption, ...]:
         return read_constructor_options(_load_entry(entry))
     from pdtui.robots.environments.environment_options import read_environment_options
 
-    return read_environment_options(_find_environment(name))
+    return read_environment_options(find_environment(name, list_robot_names()))
 
 
 def make_robot(robot: str | RobotSpec, **options: OptionValue) -> Robot:
@@ -181,50 +199,12 @@ def _build_from_entry(entry: EntryPoint, options: Mapping[str, OptionValue]) -> 
 
 
 def _build_environment(name: str, options: Mapping[str, OptionValue]) -> Robot:
-    from pdtui.robots.environments.gymnasium_robot import make_environment
+    from pdtui.robots.environments.environment_builder import make_environment
     from pdtui.robots.environments.mujoco_gymnasium_robot import MujocoGymnasiumRobot, is_mujoco
     from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
     from pdtui.robots.simulators.mujoco_robot import suppress_warnings
 
-    environment = _find_environment(name)
+    environment = find_environment(name, list_robot_names())
     with suppress_warnings(), closing(make_environment(environment, options)) as env:
         kind = MujocoGymnasiumRobot if is_mujoco(env) else PlainGymnasiumRobot
     return kind(name, environment=environment, options=options)
-
-
-def _find_environment(name: str) -> str:
-    """Return the registered id behind a name, without its module.
-
-    Raises:
-        RobotError: No environment is registered by that name, or its module may not be imported.
-    """
-    import gymnasium
-
-    if not name.isprintable():
-        raise RobotError(f"unknown robot {name!r}")
-    module, colon, environment = name.rpartition(":")
-    if colon and module not in sys.modules:
-        _import_trusted(module, name)
-    if environment in gymnasium.registry:
-        return environment
-    robots = list_robot_names()
-    known = {one.lower(): one for one in [*robots, *gymnasium.registry]}
-    close = [known[one] for one in get_close_matches(environment.lower(), known, 4, 0.5)]
-    hint = f"did you mean {', '.join(close)}" if close else f"available: {', '.join(sorted(robots))}"
-    raise RobotError(f"unknown robot '{name}'; {hint}, or any environment registered with Gymnasium")
-
-
-def _import_trusted(module: str, name: str) -> None:
-    if module not in _trusted_modules():
-        raise RobotError(
-            f"robot '{name}': the module '{module}' is not imported because a map or a session says so; "
-            f"name robot and map on the command line (drive {name} --map FILE), or the module in {TRUSTED}"
-        )
-    try:
-        import_module(module)
-    except Exception as error:  # whatever the module raises
-        raise RobotError(f"module '{module}' cannot be imported: {type(error).__name__}: {error}") from error
-
-
-def _trusted_modules() -> list[str]:
-    return [module for module in os.environ.get(TRUSTED, "").split(",") if module]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -48,6 +48,7 @@ class TrackingSummary:
         responses: rise time and overshoot over all steps of the target and all seeds.
         outcomes: how drives ended before their time, and on how many seeds.
         default_error: mean |error| without the controller at the same targets; None if not measured.
+        default_outcomes: how the drives without the controller ended before their time; empty as well.
     """
 
     behavior: str
@@ -62,12 +63,13 @@ class TrackingSummary:
     responses: StepResponseSummary
     outcomes: OutcomeCounts
     default_error: float | None = None
+    default_outcomes: OutcomeCounts = field(default_factory=dict)
 
 
 def summarise_tracking(
-    results: Sequence[TrackingDriveResult], unit: str, default_error: float | None = None
+    results: Sequence[TrackingDriveResult], unit: str, untouched: Sequence[TrackingDriveResult] = ()
 ) -> TrackingSummary:
-    """Summarise drives of one behavior, one per seed."""
+    """Summarise drives of one behavior, one per seed, beside the `untouched`: those without a controller."""
     drive = results[0].drive
     common = drive.targets if len({one.drive.targets for one in results}) == 1 else ()
     table = np.abs(np.array([one.errors for one in results]))
@@ -90,7 +92,8 @@ def summarise_tracking(
         mean_of_finite(table[:, :, -SETTLED:]),
         StepResponseSummary.of([response for one in results for response in one.responses]),
         count_outcomes((one.outcome for one in results), [Outcome.FELL]),
-        default_error,
+        mean_of_finite(mean_errors_by_seed(untouched)) if untouched else None,
+        count_outcomes((one.outcome for one in untouched), [Outcome.FELL]) if untouched else {},
     )
 
 

@@ -15,7 +15,7 @@ from pdtui.core.units import Stimulation
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.session_header_decoding import count_control_steps, decode_session_header, read_gaps
-from pdtui.sessions.session_schema import DRIVE
+from pdtui.sessions.session_schema import ACTIVATIONS, DRIVE, HALF_ACTIVATIONS
 from pdtui.sessions.streams.step_block_decoding import decode_activations, decode_step_block
 
 
@@ -60,7 +60,7 @@ def read_session(path: Path | str) -> Session:
             the file and says what is wrong.
     """
     path = Path(path)
-    file = RrdContents(path, skip=("activations",))
+    file = RrdContents(path, skip=(ACTIVATIONS, HALF_ACTIVATIONS))
     try:
         drive = file.table(DRIVE)
         header = decode_session_header(file, path, count_control_steps(drive, read_gaps(file)))
@@ -91,7 +91,7 @@ def read_activations(path: Path | str) -> NDArray[np.float32]:
         SessionError: as `read_session`; or the activations were not recorded.
     """
     path = Path(path)
-    file = RrdContents(path, only=("activations",))
+    file = RrdContents(path, only=(ACTIVATIONS, HALF_ACTIVATIONS))
     try:
         drive = file.table(DRIVE)
         header = decode_session_header(file, path, count_control_steps(drive, read_gaps(file)))

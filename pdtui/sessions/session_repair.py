@@ -68,7 +68,7 @@ def repair_session(path: Path, output: Path) -> SessionIntegrity:
 def _rewrite(path: Path, output: Path, found: SessionIntegrity) -> None:
     header = found.header
     drive = encode_drive_info(header.info, header.created)
-    recording = RerunRecording(SessionFile(output), header.info, found.recording_id)
+    recording = RerunRecording(SessionFile(output), header.info, header.created, found.recording_id)
     stream = recording.stream
     try:
         recording.create_file()

@@ -42,6 +42,22 @@ def find_map(name: str) -> Path:
     raise MapError(f"no map '{name}'; available: {known}")
 
 
+def own_map_path(path: Path) -> Path:
+    """Return the file that a change of a map shall be written into: the map's own, or for a map that comes
+    with pdtui a new one of its name in ``./maps``.
+
+    Raises:
+        MapError: the copy could not be found by its name, because there is one already.
+    """
+    shipped = shipped_folder("maps").resolve()
+    own = Path("maps") / path.name
+    if path.resolve().parent != shipped or own.parent.resolve() == shipped:
+        return path
+    if own.exists():
+        raise MapError(f"{path}: comes with pdtui and is not changed, and a copy, {own}, already exists")
+    return own
+
+
 def map_without_behaviors(robot: str, policy: str) -> StimulationMap:
     """Return a map without behaviors, with which a policy drives alone."""
     source = f"the map of {robot} without behaviors"

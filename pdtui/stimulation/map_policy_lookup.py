@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from pdtui.policies.weights.import_options import (
     ImportOptions,
     ObservationActionSpaces,
 )
-from pdtui.policies.weights.policy_file_lookup import find_file_inside_folders
+from pdtui.policies.weights.policy_file_lookup import find_file_inside_folders, folders_of_file, is_file
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import RobotSpec, open_robot
 from pdtui.stimulation.map_writer import compose_map, replace_policy
@@ -48,11 +49,10 @@ def locate_map_policy(
 ) -> StimulationMap:
     """Do the same as `resolve_map_policy`, but leave the text of the map as it is."""
     source = stimulation_map.source
-    folder = Path(source).parent
-    name = policy or _path_from_here(stimulation_map.policy, folder, source)
+    name = policy or _path_from_here(stimulation_map.policy, source)
     merged = import_options.or_else(stimulation_map.import_options)
     if merged.normaliser != NO_NORMALISER and not import_options.normaliser:
-        merged = replace(merged, normaliser=_path_from_here(merged.normaliser, folder, source))
+        merged = replace(merged, normaliser=_path_from_here(merged.normaliser, source))
     return replace(stimulation_map, policy=name, import_options=merged)
 
 
@@ -70,9 +70,30 @@ def is_of_another_policy(
     return given.sha256 != stimulation_map.policy_hash
 
 
-def _path_from_here(name: str, folder: Path, source: str) -> str:
+def name_policy_from_map(
+    policy: str, import_options: ImportOptions, output: Path
+) -> tuple[str, ImportOptions]:
+    """Return how a map names a policy and its statistics: a file by its path from the map's folder.
+
+    Args:
+        policy: The policy as the user gave it: a file, by its path from the working directory, or a name.
+        import_options: As the user gave them.
+        output: The map's file.
+    """
+    normaliser = _path_from_map(import_options.normaliser, output)
+    return _path_from_map(policy, output), replace(import_options, normaliser=normaliser)
+
+
+def _path_from_map(name: str, output: Path) -> str:
+    path = Path(name)
+    if not name or path.is_absolute() or not is_file(path):
+        return name
+    return os.path.relpath(path.parent.resolve() / path.name, output.parent.resolve())
+
+
+def _path_from_here(name: str, source: str) -> str:
     """Return a file's name as seen from the working directory; unchanged if found that way, or nowhere."""
-    found = find_file_inside_folders(name, (folder,), source) if name else None
+    found = find_file_inside_folders(name, folders_of_file(Path(source)), source) if name else None
     if found is None or found == Path(name):
         return name
     here = Path.cwd()

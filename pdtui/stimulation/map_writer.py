@@ -151,13 +151,13 @@ def add_seeds(text: str, seeds: Iterable[int | range], source: str) -> str:
     return _edit(text, source, add)
 
 
-def rewrite_map(path: Path, change: Callable[[str], str]) -> None:
-    """Replace the text of a map's file by what `change` makes of it, atomically."""
+def rewrite_map(path: Path, change: Callable[[str], str], output: Path | None = None) -> None:
+    """Write what `change` makes of the text of a map into its file or into `output`, atomically."""
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise MapError(f"{path}: cannot be read: {error.strerror}") from error
-    write_file(path, change(text), MapError)
+    write_file(output or path, change(text), MapError)
 
 
 def _edit_behaviors(

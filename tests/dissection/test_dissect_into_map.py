@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from pdtui.cli import main
 from pdtui.cli.dissect_command import dissect_command
 from pdtui.core.errors import MapError, PictureError
 from pdtui.dissection.dissect_into_map import dissect_into_map, journal_path
 from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.dissection.dissection_result import Dissection
+from pdtui.policies.weights.policy_file_lookup import POLICY_FOLDERS_VARIABLE
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.stimulation.map_reader import load_map
 from tests.small_dissection import SMALL
@@ -47,6 +51,33 @@ def test_roll_outs_are_kept_until_map_and_pictures_are_written(policy_file: Path
     assert not journal.exists()
     assert written.as_dict()["pictures"] == [str(drawn)]
     assert tuple(load_map(output).behaviors) == written.behaviors
+
+
+def test_a_map_finds_its_policy_from_any_folder(
+    policy_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(POLICY_FOLDERS_VARIABLE)
+    project, elsewhere = tmp_path / "project", tmp_path / "elsewhere"
+    (project / "policies").mkdir(parents=True)
+    elsewhere.mkdir()
+    shutil.copy(policy_file, project / "policies" / "small.safetensors")
+    monkeypatch.chdir(project)
+    config = DissectionConfig(
+        "ant", "policies/small.safetensors", settings=SMALL, episodes=2, workers=1, budget_minutes=0.0
+    )
+    dissect_into_map(config, Path("maps", "small.toml"))
+    assert load_map(Path("maps", "small.toml")).policy == "../policies/small.safetensors"
+
+    def run(*arguments: str) -> str:
+        result = CliRunner().invoke(main, arguments)
+        assert result.exit_code == 0, result.output
+        return result.output
+
+    drive = "--headless", "--steps", "8"
+    run("drive", "maps/small.toml", *drive, "--record", "sessions/a.rrd")
+    monkeypatch.chdir(elsewhere)
+    run("drive", str(project / "maps" / "small.toml"), *drive, "--no-record")
+    assert run("replay", "../project/sessions/a.rrd").endswith("identical: 8 steps\n")
 
 
 def test_the_map_names_the_robots_options(dissection: Dissection) -> None:

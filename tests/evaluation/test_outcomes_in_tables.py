@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import StringIO
 
 import pytest
@@ -12,9 +13,11 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.behavior_evaluation import MapEvaluation, evaluate_behaviors
 from pdtui.evaluation.behavior_tables import behavior_tables
 from pdtui.evaluation.evaluation_plan import EvaluationPlan
-from pdtui.evaluation.evaluation_tables import policy_evaluation_table
+from pdtui.evaluation.evaluation_tables import policy_evaluation_table, tracking_table
 from pdtui.evaluation.policy_evaluation import evaluate_policy
 from pdtui.evaluation.protocol_settings import ProtocolSettings
+from pdtui.search.step_response import StepResponseSummary
+from pdtui.search.tracking_summary import TrackingSummary
 from tests.road import road_loop
 
 SEEDS = range(100, 103)
@@ -64,3 +67,32 @@ def test_behaviors_are_told_by_how_their_runs_end(result: MapEvaluation) -> None
     assert "3/3 (left the road 3)" in text
     assert "0/3 (arrived 3)" in text
     assert "falls" not in text
+
+
+def test_a_policy_that_fails_by_itself_is_said_to_be_weak(result: MapEvaluation) -> None:
+    assert "the policy is weak" not in _text(behavior_tables(result))
+    rows = tuple(replace(row, default_outcomes={Outcome.FELL: row.runs}) for row in result.behaviors)
+    text = _text(behavior_tables(replace(result, behaviors=rows)))
+    assert "Without a press, there are 3/3 falls by itself: the policy is weak" in text
+
+
+def test_targets_are_held_beside_the_falls_without_control() -> None:
+    fell = {Outcome.FELL: 2}
+    tracking = TrackingSummary(
+        behavior="hold heading",
+        attribute="yaw",
+        unit="rad",
+        seeds=(100, 101),
+        targets=(),
+        error=0.5,
+        low=0.4,
+        high=0.6,
+        settled=0.5,
+        responses=StepResponseSummary.of([]),
+        outcomes=fell,
+        default_error=0.5,
+        default_outcomes=fell,
+    )
+    text = _text(tracking_table(tracking))
+    assert "falls 2 of 2" in text
+    assert "Without control: falls 2 of 2." in text

@@ -76,7 +76,7 @@ def read_session_file(path: Path) -> None:
     """Everything that a command does with a session before it simulates."""
     from rich.console import Console
 
-    from pdtui.cli.session_tables import session_comparison_table, session_details
+    from pdtui.cli.output.session_tables import session_comparison_table, session_details
     from pdtui.driving.keystrokes import format_keystrokes
     from pdtui.driving.session_replay import config_from_session
     from pdtui.sessions.session_comparison import compare_sessions

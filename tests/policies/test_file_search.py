@@ -7,7 +7,11 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import PolicyError
-from pdtui.policies.weights.policy_file_lookup import POLICY_FOLDERS_VARIABLE, find_file_inside_folders
+from pdtui.policies.weights.policy_file_lookup import (
+    POLICY_FOLDERS_VARIABLE,
+    find_file_inside_folders,
+    folders_of_file,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -30,6 +34,27 @@ def test_files_of_the_working_directory_and_the_maps_folder_are_found(here: Path
     assert find_file_inside_folders("../own.st", maps, "m") == Path("maps/../own.st")
     assert find_file_inside_folders(str(here / "own.st"), maps, "m") == here / "own.st"
     assert find_file_inside_folders("ant", maps, "m") is None
+
+
+def test_the_map_s_own_folder_comes_first(here: Path) -> None:
+    (here / "maps" / "own.st").write_bytes(b"x")
+    assert find_file_inside_folders("own.st", (Path("maps"),), "m") == Path("maps/own.st")
+
+
+def test_a_file_in_a_folder_of_maps_may_name_what_lies_above_it(
+    here: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    for name in ("own.st", "../own.st"):
+        found = find_file_inside_folders(name, folders_of_file(here / "maps" / "a.toml"), "m")
+        assert found is not None
+        assert found.samefile(here / "own.st")
+    assert folders_of_file(here / "own.toml") == (here,)
+    with pytest.raises(PolicyError, match="lies outside"):
+        find_file_inside_folders("../outside.st", folders_of_file(here / "own.toml"), "m")
+    with pytest.raises(PolicyError, match="lies outside"):
+        find_file_inside_folders("../../outside.st", folders_of_file(here / "maps" / "a.toml"), "m")
 
 
 @pytest.mark.parametrize(

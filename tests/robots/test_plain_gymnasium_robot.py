@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 import gymnasium
@@ -108,6 +109,14 @@ class Picture(gymnasium.Env[Any, Any]):
         return np.full((4, 5, 3), shade, np.uint8), float(shade), False, False, {"lives": 2, "said": "text"}
 
 
+class Emulator(Picture):
+    """Holds an object of an extension module whose class looks like Python's but has no attributes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.handle = struct.Struct("f")
+
+
 class Unrepeatable(Picture):
     """Its randomness is no function of the seed, and it keeps something that no copy reaches."""
 
@@ -130,6 +139,7 @@ class Broken(Picture):
 def registered() -> Any:
     kinds: dict[str, Any] = {
         "test/Picture-v0": Picture,
+        "test/Emulator-v0": Emulator,
         "test/Unrepeatable-v0": Unrepeatable,
         "test/Broken-v0": Broken,
     }
@@ -151,6 +161,17 @@ def test_a_picture_is_passed_as_it_is_and_gives_no_attributes() -> None:
     assert robot.world.chosen == [4], "choices count from 0, whatever the space's own count starts with"
     assert values_of(robot) == {"reward": reward, "lives": 2.0}
     np.testing.assert_array_equal(robot.observe(), observation)
+
+
+def test_an_environment_around_an_emulator_repeats_its_actions() -> None:
+    robot = make_robot("test/Emulator-v0")
+    robot.reset(seed=3)
+    robot.step(np.array([0.0], np.float32))
+    snapshot = robot.snapshot()
+    assert snapshot.memory is None
+    first = [robot.step(np.array([1.0], np.float32))[1] for _ in range(5)]
+    robot.restore(snapshot)
+    assert [robot.step(np.array([1.0], np.float32))[1] for _ in range(5)] == first
 
 
 def test_an_environment_that_does_not_repeat_itself_is_an_error_and_no_silent_difference() -> None:

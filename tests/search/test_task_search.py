@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from click.testing import CliRunner
 from safetensors import safe_open
 from safetensors.torch import save_file
@@ -82,15 +83,17 @@ def test_the_command_writes_a_behavior_and_keeps_what_the_map_says(tmp_path: Pat
     assert {row["condition"] for row in disturbed} >= {"pushed", "friction −20 %", "mass +20 %"}
 
 
-def test_a_map_names_the_policy_that_was_searched(tmp_path: Path) -> None:
+def test_a_map_names_the_policy_that_was_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file named like a shipped policy is not taken for it."""
     with safe_open(find_weights_file("bipedal_walker"), "pt") as file:
         described = file.metadata()
         tensors = {name: 1.001 * file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    policy, path = tmp_path / "bipedal_walker.safetensors", tmp_path / "mine.toml"
+    monkeypatch.chdir(tmp_path)
+    policy, path = Path("bipedal_walker.safetensors"), Path("maps", "mine.toml")
     save_file(tensors, policy, described)
     arguments = ["pursue", "bipedal_walker", "jump", "--quick", "--policy", str(policy), "-o", str(path)]
     pursued = CliRunner().invoke(main, [*arguments, "--workers", "1"])
     assert pursued.exit_code == 0, pursued.output
+    assert load_map(path).policy == f"../{policy}"
     driven = CliRunner().invoke(main, ["drive", str(path), "--headless", "--steps", "3", "--no-record"])
     assert driven.exit_code == 0, driven.output

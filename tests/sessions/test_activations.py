@@ -7,14 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rerun.chunk import RrdReader
 
 from pdtui.core.errors import SessionError
+from pdtui.sessions.export.session_export import export_stream
 from pdtui.sessions.session_comparison import compare_sessions
-from pdtui.sessions.session_export import export_stream
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_activations, read_session
 from pdtui.sessions.session_repair import repair_session
 from pdtui.sessions.session_schema import ActivationsKept
+from pdtui.sessions.streams.step_block_reader import read_step_blocks
+from pdtui.sessions.writer import step_record_columns
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.sessions.conftest import Recorded
 
@@ -55,6 +58,29 @@ def test_everything_else_is_there(kept: ActivationsKept, recorded: Recorded, tmp
     torn.write_bytes(path.read_bytes()[: path.stat().st_size * 3 // 4])
     assert repair_session(torn, torn).header.info.activations == kept
     assert examine_session(torn).whole
+
+
+def test_a_column_has_one_type_in_all_sessions(recorded: Recorded, tmp_path: Path) -> None:
+    """Rerun's viewer and catalog refuse recordings together whose columns of one name differ in type."""
+    types: dict[tuple[str, str], str] = {}
+    for path in (recorded[0], record(recorded, tmp_path / "half.rrd", "half")):
+        for chunk in RrdReader(path).stream():
+            for field in chunk.to_record_batch().schema:
+                column = chunk.entity_path, field.name
+                assert types.setdefault(column, str(field.type)) == str(field.type), column
+    assert ("/drive", "activations_float16") in types
+
+
+def test_a_session_of_an_earlier_version_has_both_kinds_in_one_column(
+    recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(step_record_columns, "HALF_ACTIVATIONS", "activations")
+    path = record(recorded, tmp_path / "old.rrd", "half")
+    monkeypatch.undo()
+    expected = np.stack([one.activations for one in recorded[2]]).astype(np.float16)
+    np.testing.assert_array_equal(read_activations(path), expected.astype(np.float32))
+    blocks = read_step_blocks(read_session(path), activations=True)
+    assert sum(len(block.activations) for block in blocks if block.activations is not None) == len(expected)
 
 
 def test_beyond_the_range_of_half_is_infinite(recorded: Recorded, tmp_path: Path) -> None:

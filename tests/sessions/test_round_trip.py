@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -97,6 +98,21 @@ def test_rerun_accepts_the_file(recorded: Recorded) -> None:
         [rerun, "rrd", "verify", recorded[0]], capture_output=True, text=True, timeout=120, check=False
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_each_recording_has_an_application_of_its_own_with_its_layout(
+    recorded: Recorded, weights: Path, tmp_path: Path
+) -> None:
+    """A viewer has one layout for all recordings of an application."""
+    record_drive(tmp_path / "again.rrd", weights, steps=3)
+    applications = []
+    for path in (recorded[0], tmp_path / "again.rrd"):
+        reader = RrdReader(path)
+        (recording,) = reader.recordings()
+        assert {layout.application_id for layout in reader.blueprints()} == {recording.application_id}
+        applications.append(recording.application_id)
+    assert applications[0] != applications[1]
+    assert all(re.fullmatch(r"pdtui ant \d{4}-\d\d-\d\d [\d:]{8} \w{6}", name) for name in applications)
 
 
 def test_the_layout_at_the_end_adds_what_came_and_leaves_out_what_did_not(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from pdtui.core.drive_events import DriveEvent
 from pdtui.core.scenery import Scenery, Traffic
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
-from tests.real_viewer import RealViewer, real_viewer
+from tests.real_viewer import RealViewer
 from tests.small_road import APPEARS, VANISHES, small_road_loop
 
 STEPS = 40
@@ -133,21 +132,14 @@ def test_a_session_on_a_road_says_so(road: Road) -> None:
     assert (info.roads, info.obstacles) == (True, False)
 
 
-@pytest.fixture
-def new_viewer() -> Iterator[RealViewer]:
-    """A viewer of its own, since a viewer keeps the layout of the first session that it shows."""
-    with real_viewer() as started:
-        yield started
-
-
 @pytest.mark.viewer
-def test_the_viewer_shows_the_truck_come_and_go(new_viewer: RealViewer, road: Road) -> None:
+def test_the_viewer_shows_the_truck_come_and_go(viewer: RealViewer, road: Road) -> None:
     path, _, _ = road
-    new_viewer.show(path)
-    assert "Road from above" in new_viewer.view_names()
+    viewer.show(path)
+    assert "Road from above" in viewer.view_names()
     yellow = []
     for step in (APPEARS - 2, APPEARS, VANISHES):
-        picture = new_viewer.picture(f"road-{step}", step=step).astype(int)
+        picture = viewer.picture(f"road-{step}", step=step).astype(int)
         left = picture[:, : picture.shape[1] * 2 // 5]
         above = left[len(left) // 2 :]
         warm = (above[..., 0] > above[..., 2] + 60) & (above[..., 1] > above[..., 2] + 40)

@@ -41,15 +41,25 @@ def find_file_beside(name: str, folders: Sequence[Path]) -> Path | None:
     return next((path for path in places if is_file(path)), None)
 
 
-def find_file_inside_folders(name: str, folders: Sequence[Path], source: str) -> Path | None:
-    """Find a file as `find_file_beside` does, but only inside allowed folders, for names in untrusted files.
+def folders_of_file(path: Path) -> tuple[Path, ...]:
+    """Return the folders in which a map or a session may name weights, besides the working directory.
 
-    Allowed are the working directory, `folders`, and the folders in the environment variable
-    `POLICY_FOLDERS_VARIABLE`. A symbolic link counts as the file that it points to.
+    They are its own and, if that is called ``maps`` or ``sessions``, the one above: there, pdtui was run that
+    wrote the file into it.
+    """
+    folder = path.parent
+    return (folder, folder / "..") if folder.resolve().name in ("maps", "sessions") else (folder,)
+
+
+def find_file_inside_folders(name: str, folders: Sequence[Path], source: str) -> Path | None:
+    """Find a file in one of the folders or the working directory, for names in untrusted files.
+
+    It is only found inside allowed folders: the working directory, `folders`, and those in the environment
+    variable `POLICY_FOLDERS_VARIABLE`. A symbolic link counts as the file that it points to.
 
     Args:
         name: Name of the file.
-        folders: Further folders to search.
+        folders: Folders to search before the working directory.
         source: The map or session that names the file, for messages.
 
     Raises:
@@ -62,7 +72,7 @@ def find_file_inside_folders(name: str, folders: Sequence[Path], source: str) ->
     ]
     inside = [folder.resolve() for folder in allowed]
     outside = False
-    for path in (Path(name), *(folder / name for folder in folders)):
+    for path in (*(folder / name for folder in folders), Path(name)):
         try:
             real = path.resolve()
         except (OSError, RuntimeError, ValueError):  # too long, a loop of links, or not a name

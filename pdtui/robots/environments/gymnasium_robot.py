@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,6 +16,7 @@ from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.core.robot_links_and_state import RobotState
 from pdtui.robots.environments import gymnasium_spaces
 from pdtui.robots.environments.action_log import ActionLog, repeat_log
+from pdtui.robots.environments.environment_builder import make_environment
 from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions
 from pdtui.robots.robot import ResetResult, Robot, StepResult
 from pdtui.robots.simulators import python_state
@@ -26,27 +26,6 @@ _DEFAULT_DT, _MAX_DT = 1.0 / 30.0, 60.0
 _MAX_SEED = 2**31
 # Steps that tell whether a copy of an environment continues like the original, and steps before the copy.
 _TRIAL_STEPS, _STEPS_BEFORE_COPY = 24, 4
-
-
-def make_environment(name: str, options: RobotOptions = NO_ROBOT_OPTIONS) -> gymnasium.Env[Any, Any]:
-    """Build a registered environment with the wrappers of its registration and options of its own.
-
-    It has no time limit: that serves training, and would end a drive for no visible reason.
-
-    Raises:
-        RobotError: A package is missing, or the environment cannot be built.
-    """
-    cause: Exception
-    with warnings.catch_warnings():
-        # Advice to trainers ("there is a newer version") would be printed over the screen.
-        warnings.simplefilter("ignore")
-        try:
-            return gymnasium.make(name, max_episode_steps=-1, disable_env_checker=True, **options)
-        except (ImportError, gymnasium.error.DependencyNotInstalled) as error:
-            reason, cause = f"needs a package that is not installed: {error}", error
-        except Exception as error:  # whatever a third party's constructor raises
-            reason, cause = f"cannot be built: {str(error) or type(error).__name__}", error
-    raise RobotError(f"environment '{name}' {reason}") from cause
 
 
 class GymnasiumRobot(Robot):

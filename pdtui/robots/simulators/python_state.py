@@ -50,7 +50,9 @@ def is_plain_data(value: Any, seen: frozenset[int] = frozenset()) -> bool:
         return all(is_plain_data(item, seen) for item in value)
     if isinstance(value, dict):
         return all(is_plain_data(item, seen) for pair in value.items() for item in pair)
-    return _is_simple(type(value)) and is_plain_data(vars(value), seen)
+    # A handle of an extension module, such as that of an emulator, has no attributes of Python's.
+    own = getattr(value, "__dict__", None)
+    return isinstance(own, dict) and _is_simple(type(value)) and is_plain_data(own, seen)
 
 
 def _is_simple(kind: type) -> bool:

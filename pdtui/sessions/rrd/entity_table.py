@@ -35,6 +35,10 @@ class EntityTable:
         self._order = np.argsort(unsorted, kind="stable")
         self.steps: NDArray[np.int64] = unsorted[self._order]
 
+    def has_column(self, name: str) -> bool:
+        """Return whether any of the rows may have values in this column."""
+        return any(name in batch.schema.names for batch in self._batches)
+
     def read_lists(self, name: str, kind: type[Any], *, optional: bool = False) -> list[list[Any]]:
         """Return one list of values of this Python type per row; their lengths may differ.
 

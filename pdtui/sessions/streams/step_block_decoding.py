@@ -12,7 +12,14 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.rrd.entity_table import EntityTable
-from pdtui.sessions.session_schema import ACTIVE_FIELDS, DIGEST_EPISODE, DRIVE, REWARD_COST_ACTION
+from pdtui.sessions.session_schema import (
+    ACTIVATIONS,
+    ACTIVE_FIELDS,
+    DIGEST_EPISODE,
+    DRIVE,
+    HALF_ACTIVATIONS,
+    REWARD_COST_ACTION,
+)
 from pdtui.sessions.streams.step_block import StepBlock
 
 
@@ -80,5 +87,9 @@ def _decode_behavior_states(counts: NDArray[np.int64], lengths: NDArray[np.int64
 
 def decode_activations(drive: EntityTable, info: DriveInfo) -> NDArray[Any]:
     """Return the output of every hidden unit, shape (n, U), float16 or float32 as it was recorded."""
-    kind = np.float16 if info.activations == "half" else np.float32
-    return drive.read_matrix("activations", kind, sum(info.layers))
+    units = sum(info.layers)
+    if info.activations != "half":
+        return drive.read_matrix(ACTIVATIONS, np.float32, units)
+    # Sessions of earlier versions have both kinds in the same column.
+    name = HALF_ACTIVATIONS if drive.has_column(HALF_ACTIVATIONS) else ACTIVATIONS
+    return drive.read_matrix(name, np.float16, units)

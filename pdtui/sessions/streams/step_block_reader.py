@@ -17,7 +17,15 @@ from pdtui.sessions.rrd.entity_table import EntityTable
 from pdtui.sessions.rrd.rrd_contents import RrdContents
 from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.session_header_decoding import count_control_steps
-from pdtui.sessions.session_schema import DIGEST_EPISODE, DRIVE, REWARD_COST_ACTION, ROBOT, STEP
+from pdtui.sessions.session_schema import (
+    ACTIVATIONS,
+    DIGEST_EPISODE,
+    DRIVE,
+    HALF_ACTIVATIONS,
+    REWARD_COST_ACTION,
+    ROBOT,
+    STEP,
+)
 from pdtui.sessions.streams.recorded_poses import RecordedPoses
 from pdtui.sessions.streams.step_block import StepBlock
 from pdtui.sessions.streams.step_block_decoding import decode_step_block
@@ -36,7 +44,8 @@ _COLUMNS = {
         "attributes",
         REWARD_COST_ACTION,
         DIGEST_EPISODE,
-        "activations",
+        ACTIVATIONS,
+        HALF_ACTIVATIONS,
         "stimulation",
         "takeover",
         "behaviors",
@@ -139,7 +148,9 @@ def _merge_batches(batches: _Batches, *, activations: bool) -> _Batches:
     def columns(batch: pa.RecordBatch) -> tuple[tuple[str, int, pa.DataType], ...]:
         found = zip(batch.schema.names, range(batch.num_columns), batch.schema.types, strict=True)
         kept = {one[0]: one for one in found if one[0] in _COLUMNS}
-        return tuple(one for name, one in kept.items() if activations or name != "activations")
+        return tuple(
+            one for name, one in kept.items() if activations or name not in (ACTIVATIONS, HALF_ACTIVATIONS)
+        )
 
     merged = []
     for found, run in groupby(batches, columns):
@@ -168,7 +179,7 @@ def _gather_steps(header: SessionHeader, activations: bool, queue: RecordedPoses
         count_control_steps(RrdContents(header.path, only=(DIGEST_EPISODE,)).table(DRIVE), header.gaps)
         if queue is not None:
             queue.gather()
-        skipped = () if activations else ("activations",)
+        skipped = () if activations else (ACTIVATIONS, HALF_ACTIVATIONS)
         return _decode(RrdContents(header.path, skip=skipped).table(DRIVE), header, activations, queue, True)
 
 

@@ -10,7 +10,6 @@ from collections.abc import Callable
 import rerun as rr
 
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.session_schema import APP
 from pdtui.sessions.viewer.session_blueprint import session_blueprint
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
 
@@ -26,11 +25,11 @@ class LiveViewer:
     Args:
         address: address of a viewer that listens.
         info: the drive.
-        recording_id: identifier of the session, by which the viewer recognises its file.
+        application, recording_id: identifiers of the session, by which the viewer recognises its file.
     """
 
-    def __init__(self, address: ViewerAddress, info: DriveInfo, recording_id: str) -> None:
-        self._recording = rr.RecordingStream(APP, recording_id=recording_id)
+    def __init__(self, address: ViewerAddress, info: DriveInfo, application: str, recording_id: str) -> None:
+        self._recording = rr.RecordingStream(application, recording_id=recording_id)
         self._work: queue.Queue[Callable[[rr.RecordingStream], object] | None] = queue.Queue(_WAITING)
         self._lost = False
         self._thread = threading.Thread(target=self._send_all, name="live view", daemon=True)

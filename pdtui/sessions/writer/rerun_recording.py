@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import pyarrow as pa
 import rerun as rr
@@ -15,7 +16,7 @@ from rerun.recording_stream import is_enabled
 
 from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.session_schema import APP
+from pdtui.sessions.session_schema import name_application
 from pdtui.sessions.viewer.session_blueprint import session_blueprint
 from pdtui.sessions.writer.message_pipe import MessagePipe
 from pdtui.sessions.writer.session_file import SessionFile
@@ -30,17 +31,21 @@ class RerunRecording:
     Args:
         file: the file.
         info: the drive, for the blueprint.
-        recording_id: identifier by which the viewer knows the recording; a new one by default.
+        created: date and time at which the drive began, ISO 8601.
+        recording_id: identifier by which the viewer knows the recording; a new one if it is empty.
 
     Attributes:
         stream: Rerun's recording.
+        application, recording_id: what the viewer knows it by.
 
     Raises:
         SessionError: recording is disabled.
     """
 
-    def __init__(self, file: SessionFile, info: DriveInfo, recording_id: str | None = None) -> None:
-        self.stream = rr.RecordingStream(APP, recording_id=recording_id)
+    def __init__(self, file: SessionFile, info: DriveInfo, created: str, recording_id: str = "") -> None:
+        self.recording_id = recording_id or uuid4().hex
+        self.application = name_application(info.robot, created, self.recording_id)
+        self.stream = rr.RecordingStream(self.application, recording_id=self.recording_id)
         if not is_enabled(self.stream):
             why = "recording is disabled by the environment variable RERUN=off"
             raise SessionError(f"{file.path}: cannot be written: {why}")

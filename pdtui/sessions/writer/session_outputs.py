@@ -24,6 +24,7 @@ class SessionOutputs:
     Args:
         file: the file.
         info: the drive.
+        created: date and time at which it began, ISO 8601.
         viewer: address of a viewer; None for none.
 
     Attributes:
@@ -31,12 +32,14 @@ class SessionOutputs:
         chunks: number of chunks of rows that were sent.
     """
 
-    def __init__(self, file: SessionFile, info: DriveInfo, viewer: ViewerAddress | None) -> None:
+    def __init__(
+        self, file: SessionFile, info: DriveInfo, created: str, viewer: ViewerAddress | None
+    ) -> None:
         self._dt = info.dt
         self.chunks = 0
-        self.recording = RerunRecording(file, info)
-        recording_id = self.recording.stream.get_recording_id() or ""
-        self._live = None if viewer is None else LiveViewer(viewer, info, recording_id)
+        self.recording = RerunRecording(file, info, created)
+        shown_as = self.recording.application, self.recording.recording_id
+        self._live = None if viewer is None else LiveViewer(viewer, info, *shown_as)
         with self.recording.errors_named():
             name = f"{info.robot}, policy {info.policy}, seed {info.seed}"
             self.recording.stream.send_recording_name(name)

@@ -103,7 +103,7 @@ class SessionRecorder:
         file = SessionFile(Path(path), existing, sync)
         self._reserve = DiskReserve(sum(info.layers), self._viewer_rows + batches * self._rows_per_write)
         self._reserve.require_space_to_begin(file.path)
-        self._outputs = SessionOutputs(file, info, viewer)
+        self._outputs = SessionOutputs(file, info, self._created, viewer)
         self._recording = self._outputs.recording
         self._describe_drive()
         self._viewer_data = ViewerDataWriter(info, self._outputs.send_columns, self._outputs.log_static)

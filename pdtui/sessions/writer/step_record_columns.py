@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from pdtui.core.drive_events import DriveEvent, describe_event
 from pdtui.core.outcome import Outcome, is_failure
 from pdtui.core.step_record import ActiveBehavior, StepRecord
-from pdtui.sessions.session_schema import ACTIVE_FIELDS, DIGEST_EPISODE, REWARD_COST_ACTION, ActivationsKept
+from pdtui.sessions.session_schema import (
+    ACTIVATIONS,
+    ACTIVE_FIELDS,
+    DIGEST_EPISODE,
+    HALF_ACTIVATIONS,
+    REWARD_COST_ACTION,
+    ActivationsKept,
+)
 from pdtui.sessions.session_summary import SessionSummaryCounter
 from pdtui.sessions.writer.arrow_columns import (
     ComponentColumn,
@@ -48,8 +55,11 @@ def step_record_columns(
     ]
     if kept != "off":
         activations = stack_rows(of.activations)
-        stored = _to_half(activations) if kept == "half" else activations
-        columns.append(nested_list_column("activations", stored))
+        columns.append(
+            nested_list_column(HALF_ACTIVATIONS, _to_half(activations))
+            if kept == "half"
+            else nested_list_column(ACTIVATIONS, activations)
+        )
     if any(stimulation.units for stimulation in of.stimulation):
         flat = [_flatten_stimulation(record) for record in records]
         columns.append(ragged_list_column("stimulation", flat, pa.float64()))

@@ -1,10 +1,9 @@
-"""Options and output that several commands share."""
+"""Options that several commands share."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ import click
 
 from pdtui.cli.options.robot_option_flag import apply_robot_options, parse_robot_options
 from pdtui.core.errors import MapError, SeedError
-from pdtui.core.printable_text import make_printable, to_json
+from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ACTIVATION_NAMES, NO_OPTIONS, SQUASH_NAMES, ImportOptions
 from pdtui.sessions.session_schema import ACTIVATIONS_KEPT
 from pdtui.stimulation.seed_ranges import FIRST_SEARCH_SEED, parse_seed_range, require_unused_seeds
@@ -209,38 +208,3 @@ def check_judging_seeds(config: DriveConfig, seeds: range) -> None:
     warning = require_unused_seeds(seeds, judged.seeds, judged.source)
     if warning:
         click.echo(make_printable(warning), err=True)
-
-
-def print_result(
-    data: dict[str, Any] | list[dict[str, Any]], as_json: bool, table: Callable[[], Any]
-) -> None:
-    """Print the data as JSON, or the table."""
-    if as_json:
-        click.echo(to_json(data))
-        return
-    from rich.console import Console
-
-    # Names in tables come from maps and sessions, so nothing in them is markup.
-    Console(markup=False, emoji=False).print(table())
-
-
-@contextmanager
-def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[..., None] | None]:
-    """Show a progress bar on standard error and yield ``advance(done, total, note="")``; None if `quiet`."""
-    if quiet:
-        yield None
-        return
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    text, bar, _, remaining = Progress.get_default_columns()
-    columns = (text, bar, MofNCompleteColumn(), TimeElapsedColumn(), remaining)
-    with Progress(*columns, TextColumn("{task.fields[note]}"), console=Console(stderr=True)) as progress:
-        task = progress.add_task(label, total=None, note="")
-
-        def advance(done: int, total: int, note: str = "") -> None:
-            fields = {"note": escape(note)} if note else {}
-            progress.update(task, completed=done, total=total, **fields)  # type: ignore[arg-type]
-
-        yield advance

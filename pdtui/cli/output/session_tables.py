@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pdtui.sessions.session_summary import SessionSummary
     from pdtui.sessions.streams.run_deviations import AttributeDeviation
 
+_LONGEST_NAME = 60
 _KEPT = {
     "all": "every unit, every step",
     "half": "every unit, every step, as float16",
@@ -43,6 +44,11 @@ def session_list_table(rows: Iterable[dict[str, Any]], folder: Path) -> Any:
         *("", "session", "robot", "length", "keys", "size", *told, "outcome"),
         left=("session", "robot", *told, "outcome"),
     )
+    # A name is for copying: where there is little space, the other columns are folded.
+    longest = max((len(str(Path(row["path"]).relative_to(folder))) for row in rows), default=0)
+    table.columns[0].min_width = min(longest, _LONGEST_NAME)
+    for column in (table.columns[0], *table.columns[2:5]):
+        column.no_wrap = True
     for row in rows:
         name, size = _cell(Path(row["path"]).relative_to(folder)), filesize.decimal(row["bytes"])
         if row["broken"]:
