@@ -9,8 +9,8 @@ from dataclasses import replace
 
 from pdtui.core.closable import Closable
 from pdtui.core.drive_events import DriveEvent
-from pdtui.core.errors import PdtuiError, format_error_in_one_line
-from pdtui.core.processes.worker_pool import WorkerProcess
+from pdtui.core.errors import PdtuiError, WorkerError, format_error_in_one_line
+from pdtui.core.processes.worker_pool import WorkerProcess, describe_exit
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.ghost.ghost_simulation import (
     GhostStart,
@@ -40,6 +40,7 @@ class GhostProcess(Closable):
         self._start: GhostStart | None = None
         self._tasks: deque[GhostTask] = deque()
         self._steps: list[GhostStep] = []
+        self._over = False  # the episode of the present ghost has ended
         self._number = 0  # of the present ghost, so that steps of an earlier one are dropped
         self._closed = False
         self.loaded = False
@@ -58,14 +59,16 @@ class GhostProcess(Closable):
         """Begin a ghost in the place of the present one, or only end that if `start` is None."""
         with self._changed:
             self._start, self._tasks, self._steps = start, deque(), []
+            self._over = False
             self._number += 1
             self._changed.notify()
 
     def advance(self, step: int, events: Sequence[DriveEvent]) -> None:
-        """Have the ghost do its next control step, after these events."""
+        """Have the ghost do its next control step, after these events, unless its episode is over."""
         with self._changed:
-            self._tasks.append(GhostTask(step, tuple(events)))
-            self._changed.notify()
+            if not self._over:
+                self._tasks.append(GhostTask(step, tuple(events)))
+                self._changed.notify()
 
     def take_steps(self) -> list[GhostStep]:
         """Return the steps of the present ghost that were done since the last call."""
@@ -83,18 +86,25 @@ class GhostProcess(Closable):
 
     def _talk(self) -> None:
         try:
-            worker = WorkerProcess("the ghost", build_ghost_loop, self._config)
-            with self._changed:
-                self._worker = worker
-            with worker:
-                worker.send(load_ghost)
-                worker.receive()
-                self.loaded = True
-                while not self._closed:
-                    self._pass_on(worker)
+            with WorkerProcess("the ghost", build_ghost_loop, self._config) as worker:
+                with self._changed:
+                    self._worker = worker
+                self._serve(worker)
         except Exception as error:
-            said = str(error) if isinstance(error, PdtuiError) else format_error_in_one_line(error)
-            self.failure = said or "the ghost failed"
+            self.failure = str(error) if isinstance(error, PdtuiError) else format_error_in_one_line(error)
+
+    def _serve(self, worker: WorkerProcess) -> None:
+        try:
+            worker.send(load_ghost)
+            worker.receive()
+            self.loaded = True
+            while not self._closed:
+                self._pass_on(worker)
+        except WorkerError as error:
+            how = describe_exit(worker.process)
+            if worker.process.is_alive():  # a process that the robot itself had started
+                raise
+            raise WorkerError(f"its process {how}") from error
 
     def _pass_on(self, worker: WorkerProcess) -> None:
         """Wait for something to do, and have it done."""
@@ -110,5 +120,6 @@ class GhostProcess(Closable):
         with self._changed:
             if number == self._number:
                 self._steps += steps
-                if steps and steps[-1].ended:
+                self._over = bool(steps) and bool(steps[-1].ended)
+                if self._over:
                     self._tasks.clear()

@@ -85,9 +85,7 @@ def run_ghost(loop: ControlLoop, start: GhostStart | None, tasks: Sequence[Ghost
     steps: list[GhostStep] = []
     for task in tasks:
         record = loop.advance(task.events)
-        steps.append(
-            GhostStep(record.step, record.attributes, record.poses, record.digest, record.ended)
-        )
+        steps.append(GhostStep(record.step, record.attributes, record.poses, record.digest, record.ended))
         if record.ended:
             break
     return steps

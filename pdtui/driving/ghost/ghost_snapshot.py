@@ -33,8 +33,8 @@ class GhostSnapshot:
     """The present state of a ghost that is on, and its history and path since the last snapshot.
 
     Attributes:
-        condition: ``loading`` robot and policy; ``waiting`` for a behavior to be latched; ``starting`` from the
-            drive's state; ``running``; ``over`` where its own episode has ended; ``failed``.
+        condition: ``loading`` robot and policy; ``waiting`` for a behavior to be latched; ``starting`` from
+            the drive's state; ``running``; ``over`` where its own episode has ended; ``failed``.
         message: how its episode ended, or why there is no ghost; else empty.
         first: the control step before which it began; −1 where there is none.
         latest: the latest control step that ghost and drive have done; None before the first.

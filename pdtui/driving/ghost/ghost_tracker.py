@@ -10,6 +10,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.closable import Closable
 from pdtui.core.drive_events import DriveEvent
+from pdtui.core.errors import PdtuiError
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
@@ -100,7 +101,7 @@ class GhostTracker(Closable):
             self._ended,
             self._first,
             self._latest,
-            np.array([step.attributes for step in steps]).reshape(len(steps), -1),
+            np.array([step.attributes for step in steps]).reshape(-1, len(self._loop.robot.attributes)),
             _path(steps),
         )
 
@@ -126,9 +127,13 @@ class GhostTracker(Closable):
     def _begin(self, process: GhostProcess) -> None:
         self._end()
         loop = self._loop
-        state = replace(loop.copy_state(), latch=_NOTHING_LATCHED)
-        process.start(GhostStart(loop.step, state, loop.robot.digest()))
-        self._first = loop.step
+        try:
+            state = replace(loop.copy_state(), latch=_NOTHING_LATCHED)
+        except PdtuiError as error:  # the drive goes on
+            self._fail(f"no ghost: {error}")
+        else:
+            process.start(GhostStart(loop.step, state, loop.robot.digest()))
+            self._first = loop.step
 
     def _end(self) -> None:
         if self._process is not None and self._first >= 0:
