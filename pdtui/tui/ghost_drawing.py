@@ -46,7 +46,7 @@ def draw_ghost(
     if not np.isfinite(ends).all():
         return
     dots, magnification, before = camera.project(ends)
-    for row in np.flatnonzero(before.all(axis=1)):
+    for row in np.flatnonzero(before.all(axis=1)).tolist():
         link = links[row]
         if link.shape == "box":
             corners, _, corners_before = camera.project(compute_box_corners(link, placed[row]))

@@ -28,6 +28,7 @@ _VALUE, _UNIT, _TARGET, _END = 8, 6, 10, 7  # widths of the columns with the spa
 _CHANGE = 9  # the same of a difference
 _LEAST_NAME, _LEAST_PLOT = 8, 12  # cells
 _WIDE = 50  # cells from which two lines have room for targets
+_WITHOUT = "without"
 _FORCES = ("N", "N m", "Nm")
 _Targets = dict[int, tuple[float, Style]]
 
@@ -104,6 +105,7 @@ class AttributeTable(SnapshotWidget):
         unit = _UNIT if lines == 1 else max(_UNIT, _CHANGE)
         target = _TARGET if lines == 1 or width >= _WIDE else 0
         least = _Layout(lines, width, 0, unit, target)
+        names += [len(_WITHOUT)] * (lines - 1)
         name = min(max(names, default=0), max(_LEAST_NAME, least.plot - _LEAST_PLOT))
         return least._replace(name=name)
 
@@ -176,7 +178,7 @@ class AttributeTable(SnapshotWidget):
             wraps = self.facts.attributes[index].wraps
             value = format_number(other)
             change = f" Δ{format_signed(wrap_angle(own - other) if wraps else own - other)}"
-        line.add("without" if self.snapshot.ghost is not None else "", STYLES.ghost, layout.name)
+        line.add(_WITHOUT if self.snapshot.ghost is not None else "", STYLES.ghost, layout.name)
         line.add(" " + value, STYLES.ghost, _VALUE, right=True)
         return line.add(change, STYLES.muted, layout.unit + layout.target)
 

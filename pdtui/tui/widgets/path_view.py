@@ -16,13 +16,14 @@ from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
-from pdtui.tui.widgets.path_trail import MOST_POINTS, PathTrail, is_near
+from pdtui.tui.widgets.path_trail import MOST_POINTS, PathTrail, are_near
 
 _ARROWS = "→↗↑↖←↙↓↘"
 _LEAST_SIZE = 2.0  # of the area shown, m
 STRETCHES: tuple[float | None, ...] = (5.0, 10.0, 20.0, 40.0, 80.0, None)
 """How much of the path can be shown: its last seconds, or all of it."""
 _USUAL = STRETCHES.index(20.0)
+_WITH_GHOST = 20.0  # seconds of path from which the ghost has to be in the picture
 _PAST, _NONE, _MARK, _LABEL, _GHOST, _FIRST_BEHAVIOR = range(6)
 _INKS = (STYLES.faint, STYLES.text, STYLES.accent, STYLES.muted, STYLES.ghost, *STYLES.behaviors)
 
@@ -59,11 +60,11 @@ class PathView(SnapshotWidget):
         if began != self._ghost_began:
             self._ghost_path, self._ghost_began = np.empty((0, 2)), began
         if ghost is not None and ghost.path is not None:
-            near = ghost.path[[is_near(place) for place in ghost.path]]
+            near = ghost.path[are_near(ghost.path)]
             self._ghost_path = np.concatenate([self._ghost_path, near])[-MOST_POINTS:]
         if self.facts is not None and len(snapshot.poses):
             root = snapshot.poses[root_body_row(self.facts.links)]
-            if is_near(root):  # else the mark stays where it was
+            if are_near(root):  # else the mark stays where it was
                 ahead = rotate_vectors(root[3:], np.array([1.0, 0.0, 0.0]))
                 self._here = root[:2]
                 self._heading = atan2(float(ahead[1]), float(ahead[0]))
@@ -77,7 +78,9 @@ class PathView(SnapshotWidget):
         steps = MOST_POINTS if seconds is None else max(1, round(seconds / self.facts.dt))
         shown = points if seconds is None else self.trail.recent[-steps - 1 :]
         ghost = self._ghost_path[-steps - 1 :]
-        middle, zoom = self._frame(canvas, np.concatenate([shown[:, :2], ghost]))
+        # Close up, the robot fills the picture, as the ghost may be far away.
+        framed = ghost if seconds is None or seconds >= _WITH_GHOST else ghost[:0]
+        middle, zoom = self._frame(canvas, np.concatenate([shown[:, :2], framed]))
 
         def place(world: Floats) -> Floats:
             centre = np.array([canvas.width / 2, canvas.height / 2])

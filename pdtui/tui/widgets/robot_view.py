@@ -9,7 +9,6 @@ from textual.reactive import reactive
 from textual.strip import Strip
 
 from pdtui.core.attributes import Floats
-from pdtui.core.robot_links_and_state import Link
 from pdtui.core.scenery import NO_SCENERY, BoxKind, LineKind, Scenery, Traffic
 from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.pictures.perspective_camera import PerspectiveCamera, round_length_down
@@ -31,9 +30,8 @@ from pdtui.tui.theme import STYLES
 
 View = Literal["side", "above"]
 _SIDE_ELEVATION = 14.0  # of the camera at the side, degrees
-_GROUND, _AXIS, _SHADOW, _ROBOT, _LABEL, _OBSTACLE, _LANE, _EDGE, _ROUTE, _VEHICLE, _GHOST, _FIRST_SHADE = (
-    range(12)
-)
+_GROUND, _AXIS, _SHADOW, _ROBOT, _LABEL, _OBSTACLE = range(6)
+_LANE, _EDGE, _ROUTE, _VEHICLE, _GHOST, _FIRST_SHADE = range(6, 12)
 _INKS = (
     *(STYLES.faint, STYLES.muted, STYLES.faint, STYLES.accent, STYLES.muted, STYLES.obstacle),
     *(STYLES.muted, STYLES.text, STYLES.primary, STYLES.warn, STYLES.ghost),

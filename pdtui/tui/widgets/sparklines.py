@@ -1,4 +1,4 @@
-"""Small plots of attributes over time: a row of blocks, or two rows of dots with a zero line and the ghost."""
+"""Small plots of attributes over time: a row of blocks, or two rows of dots with zero and the ghost."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def draw_line_plots(own: Floats, ghost: Floats, scales: PlotScales, styles: Sequ
 
 
 def split_runs(text: str, marked: NDArray[np.bool_]) -> list[tuple[str, bool]]:
-    """Return the longest parts of a text whose characters are all marked, or all not, and which of the two."""
+    """Return the parts of a text in which all characters are marked, or none is, and which of the two."""
     cuts = [0, *(np.flatnonzero(marked[1:] != marked[:-1]) + 1).tolist(), len(text)]
     return [(text[a:b], bool(marked[a])) for a, b in pairwise(cuts) if a < b]
 
