@@ -88,7 +88,7 @@ KEY_TABLE = (
     ReservedKey(
         "ghost",
         "ctrl+g",
-        "turns the ghost on or off, which runs on without the behavior",
+        "turns the ghost on or off, the twin without the behavior",
         action="toggle_ghost",
         hint="ghost",
         hint_rank=5,

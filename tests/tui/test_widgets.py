@@ -11,8 +11,9 @@ from pdtui.core.step_record import ActiveBehavior
 from pdtui.pictures.perspective_camera import PerspectiveCamera, round_length_down
 from pdtui.tui.cell_text import fit_cells, format_number, format_signed
 from pdtui.tui.widgets.activation_heatmap import UnitGrid, allocate_layer_rows
-from pdtui.tui.widgets.attribute_table import AttributeHistory, draw_sparklines
-from pdtui.tui.widgets.path_view import MOST_POINTS, PathTrail
+from pdtui.tui.widgets.attribute_history import AttributeHistory
+from pdtui.tui.widgets.path_trail import MOST_POINTS, PathTrail
+from pdtui.tui.widgets.sparklines import draw_sparklines
 from pdtui.tui.widgets.unit_table import behaviors_of_units
 from tests.tui.recorded_snapshots import drive_map
 

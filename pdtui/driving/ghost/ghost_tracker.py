@@ -87,8 +87,10 @@ class GhostTracker(Closable):
             self._fail(f"no ghost: {self._process.failure}")
         if self._process is None:
             return GhostSnapshot("failed", self._failure) if self._failure else None
+        if not self._process.loaded:
+            return GhostSnapshot("loading", first=self._first)
         if self._first < 0:
-            return GhostSnapshot("waiting" if self._process.loaded else "loading")
+            return GhostSnapshot("waiting")
         steps = self._process.take_steps()
         for step in steps:
             own = self._unmatched.pop(step.step)

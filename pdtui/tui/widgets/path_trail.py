@@ -65,5 +65,5 @@ class PathTrail:
 
 def are_near(places: Floats) -> NDArray[np.bool_]:
     """Return which places (..., n) are finite and near enough to be drawn, shape (...)."""
-    near: NDArray[np.bool_] = (np.abs(places) < _FARTHEST).all(axis=-1)
+    near: NDArray[np.bool_] = np.asarray((np.abs(places) < _FARTHEST).all(axis=-1))
     return near
