@@ -13,7 +13,8 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.ghost import ghost_tracker
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
-from pdtui.policies.weights.weights_file import save_network
+from pdtui.policies.weights.weights_file import hash_file, save_network
+from pdtui.robots.robot_registry import TRUSTED
 from pdtui.stimulation.map_library import find_map, map_without_behaviors
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
@@ -36,7 +37,7 @@ def _needs(module: str) -> pytest.MarkDecorator:
         ("ant", "", True, "d", 40),
         ("anymal-forward", "", False, "w", 40),  # its behaviors command the policy
         pytest.param("a1", "forest", False, "d", 40, marks=_needs("pybullet")),
-        ("bipedal_walker", "", False, "s", 20),  # repeats its actions
+        ("bipedal_walker", "", False, "f", 20),  # repeats its actions
         pytest.param("metadrive", "", False, "s", 15, marks=_needs("metadrive")),  # repeats them, too
     ],
 )
@@ -155,11 +156,15 @@ def test_a_ghost_that_is_too_far_behind_is_given_up(
         assert drive.tracker.pid == 0
 
 
-def test_a_world_that_does_not_repeat_itself_has_no_ghost(tmp_path: Path) -> None:
+def test_a_world_that_does_not_repeat_itself_has_no_ghost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(TRUSTED, NAME.partition(":")[0])
     weights = tmp_path / "small.safetensors"
     spec = NetworkSpec(NAME, 3, (8, 8), "tanh", 1, "mean", (-1.0,), (1.0,))
     save_network(weights, PolicyNetwork(spec))
-    stimulation_map = replace(map_without_behaviors(NAME, str(weights)), behaviors={"push": PUSH})
+    alone = map_without_behaviors(NAME, str(weights))
+    stimulation_map = replace(alone, policy_hash=hash_file(weights), behaviors={"push": PUSH})
     with ghost_drive(DriveConfig(NAME, stimulation_map, 3)) as drive:
         drive.run(3)
         drive.run(5, "w")

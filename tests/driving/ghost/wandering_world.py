@@ -23,6 +23,7 @@ class WanderingWorld(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
         return np.zeros(3), {}
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        del action
         return np.random.default_rng().random(3), 0.0, False, False, {}
 
 
