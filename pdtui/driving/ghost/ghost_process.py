@@ -104,7 +104,7 @@ class GhostProcess(Closable):
             how = describe_exit(worker.process)
             if worker.process.is_alive():  # a process that the robot itself had started
                 raise
-            raise WorkerError(f"its process {how}") from error
+            raise WorkerError(f"it {how}") from error
 
     def _pass_on(self, worker: WorkerProcess) -> None:
         """Wait for something to do, and have it done."""

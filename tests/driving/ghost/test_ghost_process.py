@@ -120,7 +120,7 @@ def test_a_killed_ghost_is_said_and_the_drive_goes_on(connection: DriveClient, r
     os.kill(_turn_on(connection), signal.SIGKILL)
     failed = _until(connection, _is("failed"))
     assert failed.ghost is not None
-    assert failed.ghost.message == "no ghost: its process was killed by SIGKILL"
+    assert failed.ghost.message == "no ghost: it was killed by SIGKILL"
     assert failed.notice == failed.ghost.message
     later = _until(connection, lambda snapshot: snapshot.step > failed.step + 20)
     assert later.active_behaviors[0].name == "push"

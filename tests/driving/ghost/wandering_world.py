@@ -27,4 +27,4 @@ class WanderingWorld(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
         return np.random.default_rng().random(3), 0.0, False, False, {}
 
 
-gymnasium.register("pdtui-test/Wandering-v0", WanderingWorld)
+gymnasium.register("pdtui-test/Wandering-v0", lambda **_: WanderingWorld())
