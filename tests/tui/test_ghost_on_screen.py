@@ -68,7 +68,7 @@ async def test_the_table_says_now_without_and_the_difference(
         (GhostSnapshot("loading"), "ghost: loading"),
         (GhostSnapshot("waiting"), "ghost: waits for a behavior"),
         (GhostSnapshot("starting", first=4), "ghost: starting"),
-        (GhostSnapshot("failed", "no ghost: its process was killed by SIGKILL"), "no ghost: its process was"),
+        (GhostSnapshot("failed", "no ghost: it was killed by SIGKILL"), "no ghost: it was killed by SIGKILL"),
     ],
 )
 async def test_the_screen_says_why_there_is_no_ghost_yet_or_no_more(

@@ -15,7 +15,7 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.rewind_history import DriveState
 
-_NICENESS = 10  # the drive goes first where there are not enough processors for both
+_NICENESS = 5  # the drive goes first where there are not enough processors for both
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,9 @@ class GhostStep(NamedTuple):
 
 def build_ghost_loop(config: DriveConfig) -> ControlLoop:
     """Return the loop of a ghost of this drive, in the ghost's process."""
-    os.nice(_NICENESS)
-    return build_control_loop(config)
+    loop = build_control_loop(config)
+    os.nice(_NICENESS)  # not before, or a busy machine would never load it
+    return loop
 
 
 def load_ghost(loop: ControlLoop) -> None:

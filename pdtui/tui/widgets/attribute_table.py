@@ -80,7 +80,10 @@ class AttributeTable(SnapshotWidget):
             self._ghost_began = began
         if ghost is not None and ghost.latest is not None and ghost.history is not None:
             self._history.add_ghost(ghost.history, ghost.latest.step)
-        title = "attributes" if ghost is None else f"attributes · {describe_ghost(ghost, snapshot.step)}"
+        title = self.BORDER_TITLE
+        if ghost is not None:
+            said = describe_ghost(ghost, snapshot.step)
+            title = said if ghost.condition == "failed" else f"{title} · {said}"
         if self.border_title != title:
             self.border_title = title
 
