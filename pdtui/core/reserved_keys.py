@@ -71,20 +71,31 @@ KEY_TABLE = (
         hint_rank=2,
     ),
     ReservedKey(
-        "stronger", "plus", "strengthens the latched behavior", "factor", 1, hint="stronger", hint_rank=7
+        "stronger", "plus", "strengthens the latched behavior", "factor", 1, hint="stronger", hint_rank=8
     ),
-    ReservedKey("weaker", "minus", "weakens the latched behavior", "factor", -1, hint="weaker", hint_rank=8),
-    ReservedKey("reset", "r", "starts the next episode", "reset", hint="reset", hint_rank=5),
-    ReservedKey("rewind", "backspace", "rewinds by three seconds", "rewind", hint="rewind", hint_rank=6),
+    ReservedKey("weaker", "minus", "weakens the latched behavior", "factor", -1, hint="weaker", hint_rank=9),
+    ReservedKey("reset", "r", "starts the next episode", "reset", hint="reset", hint_rank=6),
+    ReservedKey("rewind", "backspace", "rewinds by three seconds", "rewind", hint="rewind", hint_rank=7),
     ReservedKey("pause", "p", "pauses or resumes", action="pace('pause')", hint="pause", hint_rank=3),
-    ReservedKey("step", "n", "runs a single control step", action="pace('step')", hint="step", hint_rank=9),
-    ReservedKey("slower", "comma", "halves the speed", action="pace('slower')", hint="slower", hint_rank=10),
+    ReservedKey("step", "n", "runs a single control step", action="pace('step')", hint="step", hint_rank=10),
+    ReservedKey("slower", "comma", "halves the speed", action="pace('slower')", hint="slower", hint_rank=11),
     ReservedKey(
-        "faster", "full_stop", "doubles the speed", action="pace('faster')", hint="faster", hint_rank=11
+        "faster", "full_stop", "doubles the speed", action="pace('faster')", hint="faster", hint_rank=12
     ),
     ReservedKey(
         "view", "v", "switches between side view and top view", action="toggle_view", hint="view", hint_rank=4
     ),
+    # A control key, as maps that `pdtui dissect` has drafted may use any letter.
+    ReservedKey(
+        "ghost",
+        "ctrl+g",
+        "turns the ghost on or off, the twin without the behavior",
+        action="toggle_ghost",
+        hint="ghost",
+        hint_rank=5,
+    ),
+    ReservedKey("zoom_in", "right_square_bracket", "shows less of the path", action="zoom_path(-1)"),
+    ReservedKey("zoom_out", "left_square_bracket", "shows more of the path", action="zoom_path(1)"),
     ReservedKey("help", "question_mark", "shows all keys", action="help", hint="help", hint_rank=0),
     ReservedKey("quit", "q", "ends the drive and quits", action="leave", hint="quit", hint_rank=1),
 )

@@ -57,6 +57,7 @@ class ControlLoop:
         _check_commands(robot, stimulation_map)
         self.robot, self.policy, self.map, self.seed = robot, policy, stimulation_map, seed
         self.start = robot.check_start(start)
+        self._options = {"start": self.start} if self.start else None
         self.step = 0
         self.episode = 0
         self.latch = BehaviorLatch(
@@ -65,6 +66,8 @@ class ControlLoop:
         self.takeover = ManualTakeover(robot)
         self.act: PolicyAct = policy.act
         """What acts in each control step; an evaluation may put a disturbed policy in its place."""
+        self.before_step: Callable[[Sequence[DriveEvent]], None] = lambda _: None
+        """Called in each control step with its events, which have been applied, before it is simulated."""
         self._noise = np.random.default_rng(seed) if stochastic else None
         self._ended = self._arrived = False
         self.history = RewindHistory()
@@ -93,10 +96,6 @@ class ControlLoop:
             robot_options=dict(self.robot.build_options),
         )
 
-    @property
-    def _options(self) -> dict[str, str] | None:
-        return {"start": self.start} if self.start else None
-
     def advance(self, events: Sequence[DriveEvent] = ()) -> StepRecord:
         """Apply the events, then run one control step.
 
@@ -107,11 +106,12 @@ class ControlLoop:
         if self._ended:
             self._start_episode()
         if self.step % STEPS_PER_KEPT_STATE == 0:
-            self._keep_state()
+            self.history.keep(self.step, self.copy_state())
         for event in events:
             if event.step != self.step:
                 raise KeystrokeError(f"event for step {event.step} given to step {self.step}")
             self._apply(event)
+        self.before_step(events)
         stimulation = self.latch.stimulate(self.attributes)
         if self.robot.set_commands({**self.robot.commands, **self.latch.commands}):
             self._observation = self.robot.observe()
@@ -178,7 +178,7 @@ class ControlLoop:
                 self.latch.restore_state(state.latch)
                 self.takeover.restore_state(state.takeover)
             case "rewind":
-                self._rewind(event.value)
+                self.restore_state(self.history.return_to(event.value, self.step))
             case _:
                 raise KeystrokeError(f"step {event.step}: unknown event '{event.kind}'")
 
@@ -212,21 +212,20 @@ class ControlLoop:
         self.latch.clear()
         self.takeover.clear()
 
-    def _keep_state(self) -> None:
-        noise = self._noise.bit_generator.state if self._noise is not None else {}
-        state = DriveState(
+    def copy_state(self) -> DriveState:
+        """Return everything that the loop needs to go on from the present step."""
+        return DriveState(
             self.robot.snapshot(),
             self.policy.snapshot(),
             self.latch.copy_state(),
             self.takeover.copy_state(),
-            noise,
+            self._noise.bit_generator.state if self._noise is not None else {},
             self.episode,
             self._arrived,
         )
-        self.history.keep(self.step, state)
 
-    def _rewind(self, target: float) -> None:
-        state = self.history.return_to(target, self.step)
+    def restore_state(self, state: DriveState) -> None:
+        """Go on from a state that `copy_state` returned, at the present step."""
         self.robot.restore(state.robot)
         self.policy.restore(state.policy)
         self.latch.restore_state(state.latch)

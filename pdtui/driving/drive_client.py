@@ -37,6 +37,9 @@ class DriveConnection(Protocol):
     def change_pace(self, request: PaceRequest) -> None:
         """Change the pace, which is no part of the run and is not recorded."""
 
+    def toggle_ghost(self) -> None:
+        """Turn the ghost on or off, which is no part of the run and is not recorded."""
+
     def close(self) -> str:
         """End the drive, wait until its recording is complete, and return one line on how it ended."""
 
@@ -107,6 +110,9 @@ class DriveClient(DriveConnection):
 
     def change_pace(self, request: PaceRequest) -> None:
         self._send("pace", request)
+
+    def toggle_ghost(self) -> None:
+        self._send("ghost", None)
 
     def close(self) -> str:
         self._send("close", None)

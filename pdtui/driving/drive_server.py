@@ -20,6 +20,7 @@ from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts
+from pdtui.driving.ghost.ghost_tracker import GhostTracker
 from pdtui.driving.keystrokes import interpret_keys
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.pacer import Pacer
@@ -48,7 +49,8 @@ class DriveServer:
     ) -> None:
         self._connection, self._send, self._config = connection, send, config
         self._loop: ControlLoop = build_control_loop(config)
-        self._builder = SnapshotBuilder(self._loop)
+        self._ghost = GhostTracker(config, self._loop)
+        self._builder = SnapshotBuilder(self._loop, self._ghost)
         self._recorder: SessionRecorder | None = None
         if config.recording:
             path, viewer = Path(config.recording), config.viewer
@@ -104,6 +106,7 @@ class DriveServer:
                 self._closing = format_error_in_one_line(error)
             raise
         finally:
+            self._ghost.close()
             self._close_recording()
 
     def stop(self, reason: str) -> None:
@@ -138,6 +141,8 @@ class DriveServer:
                 self._pressed_keys.append(value)
             case "pace":
                 self._pacer.change_pace(value, time.monotonic())
+            case "ghost":
+                self._ghost.toggle()
             case "frame":
                 self._snapshot_requested = True
             case "close":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from pdtui.core.scenery import NO_TRAFFIC
 from pdtui.sessions.episode_statistics import NO_STATISTICS, EpisodeStatistics
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pdtui.core.robot_links_and_state import Link
     from pdtui.core.scenery import Scenery, Traffic
     from pdtui.core.step_record import ActiveBehavior
+    from pdtui.driving.ghost.ghost_snapshot import GhostSnapshot
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,20 @@ class StimulatedUnit:
     overwritten: float
 
 
+class KeyPress(NamedTuple):
+    """A key that changed the run.
+
+    Attributes:
+        step: the control step before which it applied.
+        key: its name.
+        behavior: row in the map of the behavior that it latched; −1 for any other key.
+    """
+
+    step: int
+    key: str
+    behavior: int
+
+
 @dataclass(frozen=True)
 class DriveSnapshot:
     """The present state of a drive, and its history and path since the last snapshot.
@@ -85,6 +100,8 @@ class DriveSnapshot:
         manual: name and value of each control that the operator has taken over; empty without a takeover.
         scenery: `Robot.scenery` if it has changed since the last snapshot; else None.
         traffic: what was around the robot after the last step.
+        key_presses: keys that changed the run since the last snapshot.
+        ghost: the ghost; None while it is off.
     """
 
     step: int
@@ -111,3 +128,5 @@ class DriveSnapshot:
     manual: tuple[tuple[str, float], ...] = ()
     scenery: Scenery | None = None
     traffic: Traffic = NO_TRAFFIC
+    key_presses: tuple[KeyPress, ...] = ()
+    ghost: GhostSnapshot | None = None

@@ -9,20 +9,27 @@ from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.driving.drive_snapshot import DriveSnapshot, StimulatedUnit
+from pdtui.driving.drive_snapshot import DriveSnapshot, KeyPress, StimulatedUnit
+from pdtui.driving.ghost.ghost_tracker import GhostTracker
 from pdtui.sessions.episode_statistics import EpisodeStatisticsCounter
 
 _ROWS_KEPT = 4000  # control steps between two snapshots that a stopped screen does not lose
 
 
 class SnapshotBuilder:
-    """Collects the steps since the last snapshot, so that skipped frames lose nothing."""
+    """Collects the steps since the last snapshot, so that skipped frames lose nothing.
 
-    def __init__(self, loop: ControlLoop) -> None:
-        self._loop = loop
+    Args:
+        loop: the drive.
+        ghost: its ghost, if it can have one.
+    """
+
+    def __init__(self, loop: ControlLoop, ghost: GhostTracker | None = None) -> None:
+        self._loop, self._ghost = loop, ghost
         self._rows = {name: row for row, name in enumerate(loop.map.behaviors)}
         self._history: list[np.ndarray] = []
         self._path: list[tuple[float, float, float]] = []
+        self._key_presses: list[KeyPress] = []
         self._restarted = False
         self._episode = 0
         self._involvement, self._cost = 0, 0.0
@@ -42,7 +49,12 @@ class SnapshotBuilder:
         self._history.append(record.attributes)
         if len(record.poses):
             self._path.append((float(record.poses[0, 0]), float(record.poses[0, 1]), float(row)))
-        del self._history[:-_ROWS_KEPT], self._path[:-_ROWS_KEPT]
+        self._key_presses += [
+            KeyPress(event.step, event.key, self._rows[event.name] if event.kind == "behavior" else -1)
+            for event in record.events
+            if event.key
+        ]
+        del self._history[:-_ROWS_KEPT], self._path[:-_ROWS_KEPT], self._key_presses[:-_ROWS_KEPT]
         involved = record.involved
         self._involvement += involved
         self._cost += record.cost
@@ -59,6 +71,8 @@ class SnapshotBuilder:
         if record.outcome is not None:
             self.notice = record.ended or f"{record.outcome}; the episode goes on"
         self._last = record
+        if self._ghost is not None:
+            self._ghost.add_step(record)
 
     def build_snapshot(
         self, *, paused: bool, speed: float, achieved_speed: float, recorded_bytes: int, finished: str
@@ -73,6 +87,9 @@ class SnapshotBuilder:
         size = len(loop.robot.attributes)
         other_scenery = loop.robot.scenery is not self._scenery
         self._scenery = loop.robot.scenery
+        ghost = None if self._ghost is None else self._ghost.build_snapshot()
+        if self._ghost is not None and self._ghost.notice:
+            self.notice, self._ghost.notice = self._ghost.notice, ""
         snapshot = DriveSnapshot(
             step=loop.step,
             time=loop.step * loop.robot.control_dt,
@@ -98,6 +115,9 @@ class SnapshotBuilder:
             manual=tuple(loop.takeover.values.items()),
             scenery=self._scenery if other_scenery else None,
             traffic=loop.robot.read_traffic() if last is None else last.traffic,
+            key_presses=tuple(self._key_presses),
+            ghost=ghost,
         )
-        self._history, self._path, self._restarted, self.notice = [], [], False, ""
+        self._history, self._path, self._key_presses = [], [], []
+        self._restarted, self.notice = False, ""
         return snapshot

@@ -60,6 +60,13 @@ class ScreenRow:
             self.left -= cell_len(text)
         return self
 
+    def add_strip(self, strip: Strip) -> ScreenRow:
+        """Append a line, which is cut where it exceeds this one."""
+        strip = strip if strip.cell_length <= self.left else strip.crop(0, self.left)
+        self._segments += strip
+        self.left -= strip.cell_length
+        return self
+
     def strip(self) -> Strip:
         """Return the line, padded with blanks."""
         if self.left:

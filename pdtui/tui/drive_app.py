@@ -12,10 +12,7 @@ from textual import events
 from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.containers import Container
-from textual.geometry import Size
 from textual.reactive import reactive
-from textual.strip import Strip
-from textual.widget import Widget
 
 from pdtui.core.errors import PdtuiError
 from pdtui.core.reserved_keys import KEY_TABLE
@@ -23,12 +20,13 @@ from pdtui.driving.drive_client import DriveConnection
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
-from pdtui.tui.cell_text import ScreenRow, displayed_key_name
+from pdtui.tui.cell_text import displayed_key_name
 from pdtui.tui.help_screen import HelpScreen
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
 from pdtui.tui.terminal_driver import TerminalDriver
-from pdtui.tui.theme import STYLES, THEME
+from pdtui.tui.terminal_size_notice import LEAST_SIZE, TerminalSizeNotice
+from pdtui.tui.theme import THEME
 from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
 from pdtui.tui.widgets.attribute_table import AttributeTable
 from pdtui.tui.widgets.behavior_list import BehaviorList
@@ -38,7 +36,6 @@ from pdtui.tui.widgets.status_lines import KeyLine, NoticeLine, StatusLine
 from pdtui.tui.widgets.unit_table import UnitTable
 
 NOTICE_SECONDS = 4.0
-LEAST_SIZE = Size(80, 24)
 _ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 # A key that changes the run goes to the drive under its original name, whatever key the user gave it.
 # Each binding has an id, so that users can remap it.
@@ -208,6 +205,17 @@ class DriveApp(App[str], inherit_bindings=False):
         """Change the drive's pace."""
         self.connection.change_pace(cast(PaceRequest, request))
 
+    def action_toggle_ghost(self) -> None:
+        """Turn the ghost on or off; it is no part of the run, so it may run beside a recording, too."""
+        if self.facts is None:
+            self.say("the policy is still loading")
+        else:
+            self.connection.toggle_ghost()
+
+    def action_zoom_path(self, change: int) -> None:
+        """Show more of the path for 1, less for −1."""
+        self.query_one(PathView).zoom(change)
+
     def action_toggle_view(self) -> None:
         """Switch between side view and top view."""
         robot = self.query_one(RobotView)
@@ -226,23 +234,3 @@ class DriveApp(App[str], inherit_bindings=False):
     def action_leave(self) -> None:
         """Quit; the caller of `run` then ends the drive."""
         self.exit()
-
-
-class TerminalSizeNotice(Widget, can_focus=False):
-    """Shows the needed and the present size instead of a drive that does not fit; the drive continues."""
-
-    def render_line(self, y: int) -> Strip:
-        """Render one line; the message is centred in the terminal."""
-        (width, height), terminal = self.size, self.app.size
-        lines = [
-            ("terminal too small", STYLES.accent),
-            (f"need {LEAST_SIZE.width} × {LEAST_SIZE.height}", STYLES.text),
-            (f"have {terminal.width} × {terminal.height}", STYLES.warn),
-            ("the drive continues", STYLES.muted),
-        ]
-        row = y - max(0, (height - len(lines)) // 2)
-        if not 0 <= row < len(lines):
-            return Strip.blank(width, STYLES.base)
-        text, style = lines[row]
-        line = ScreenRow(width).add(" " * max(0, (width - len(text)) // 2), style).add(text, style)
-        return line.strip().apply_style(STYLES.base)

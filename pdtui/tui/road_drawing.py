@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
+from pdtui.core.robot_links_and_state import Link
 from pdtui.core.scenery import BoxKind, LineKind, RoadLine, Traffic
 from pdtui.pictures.perspective_camera import PerspectiveCamera
+from pdtui.robots.geometry import rotate_vectors
 from pdtui.tui.braille_canvas import BrailleCanvas
 
 _AROUND = ((-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5))
@@ -45,6 +47,11 @@ class RoadLineDrawing:
         ends, _, also_before = camera.project(self._ends)
         kept = before & also_before
         canvas.draw_segments(starts[kept], ends[kept], self._inks[kept])
+
+
+def compute_box_corners(link: Link, pose: Floats) -> Floats:
+    """Return the corners of a box with this pose in the world, shape (8, 3), ordered as `BOX_CORNERS`."""
+    return pose[:3] + rotate_vectors(pose[3:], BOX_CORNERS * 2 * np.array(link.size))
 
 
 def draw_box_edges(canvas: BrailleCanvas, corners: Floats, ink: int) -> None:

@@ -29,9 +29,12 @@ _DEPTHS = ((0.0, 0.45), (0.0, 0.62), (0.0, 0.80), (0.03, 1.0), (0.16, 1.0))
 
 
 _VARIABLES = THEME.to_color_system().generate()
-_BACK, _FRONT, _MAIN, _ACCENT, _SUCCESS, _WARNING, _ERROR, _PANEL = (
+_BACK, _FRONT, _MAIN, _SECOND, _ACCENT, _SUCCESS, _WARNING, _ERROR, _PANEL = (
     Color.parse(_VARIABLES[name])
-    for name in ("background", "foreground", "primary", "accent", "success", "warning", "error", "panel")
+    for name in (
+        *("background", "foreground", "primary", "secondary", "accent"),
+        *("success", "warning", "error", "panel"),
+    )
 )
 _BEHAVIORS = tuple(Color.parse(color) for color in BEHAVIOR_COLORS)
 
@@ -54,6 +57,8 @@ class ThemeStyles:
         title: titles and values.
         primary, accent, good, warn, bad: the theme's colours.
         alert: urgent messages.
+        below: values below zero, where those above are `primary`.
+        ghost: the ghost.
         obstacle: obstacles.
         key: cap of a key that is not latched.
         behaviors: colours of behaviors by row in the map, modulo their number.
@@ -73,6 +78,8 @@ class ThemeStyles:
     warn = _style(_WARNING)
     bad = _style(_ERROR)
     alert = _style(_BACK, bold=True, on=_ERROR)
+    below = _style(_BACK.blend(_MAIN, 0.6))
+    ghost = _style(_BACK.blend(_SECOND, 0.6))
     obstacle = _style(_SUCCESS, bold=True)
     key = _style(_FRONT, bold=True, on=_BACK.blend(_FRONT, 0.16))
     behaviors = tuple(_style(color) for color in _BEHAVIORS)

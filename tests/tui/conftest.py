@@ -25,6 +25,7 @@ class ScriptedConnection:
         self.messages = list(messages)
         self.pressed: list[str] = []
         self.paced: list[PaceRequest] = []
+        self.toggled = 0
 
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:
         if not self.messages:
@@ -39,6 +40,9 @@ class ScriptedConnection:
 
     def change_pace(self, request: PaceRequest) -> None:
         self.paced.append(request)
+
+    def toggle_ghost(self) -> None:
+        self.toggled += 1
 
     def close(self) -> str:
         return "stopped: 0 steps"

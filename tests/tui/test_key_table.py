@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -39,7 +40,9 @@ def driven(policy: Policy, small_map: StimulationMap) -> ControlLoop:
 
 @pytest.mark.parametrize("row", KEY_TABLE, ids=lambda row: row.id)
 def test_a_map_may_not_use_the_key(row: ReservedKey, map_text: str) -> None:
-    with pytest.raises(MapError, match=f"behavior 'twitch': key '{row.key}' is taken: it {row.says}"):
+    with pytest.raises(
+        MapError, match=f"behavior 'twitch': key '{re.escape(row.key)}' is taken: it {row.says}"
+    ):
         parse_map(map_text.replace('key = "t"', f'key = "{row.key}"'), "small.toml")
 
 

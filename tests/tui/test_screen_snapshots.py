@@ -12,6 +12,7 @@ from textual.pilot import Pilot
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.tui.map_picker import MapPickerApp
 from tests.tui.conftest import MakeApp, ScriptedConnection
+from tests.tui.ghost_snapshots import with_ghost
 from tests.tui.screens import played
 from tests.tui.test_map_picker import ROWS
 
@@ -38,6 +39,18 @@ def test_loading(snap_compare: Compare, make_app: MakeApp, size: tuple[int, int]
 @pytest.mark.parametrize("snapshots", [64, 120], ids=["period", "controller"])
 def test_driving(snap_compare: Compare, make_app: MakeApp, size: tuple[int, int], snapshots: int) -> None:
     app, connection = make_app(snapshots)
+    assert snap_compare(app, terminal_size=size, run_before=after(connection))
+
+
+@pytest.mark.parametrize("size", [SMALL, LARGE], ids=["small", "large"])
+def test_ghost(
+    snap_compare: Compare,
+    make_app: MakeApp,
+    drive: tuple[DriveFacts, list[DriveSnapshot]],
+    size: tuple[int, int],
+) -> None:
+    facts, snapshots = drive
+    app, connection = make_app([facts, *with_ghost(snapshots[:64], 40)])
     assert snap_compare(app, terminal_size=size, run_before=after(connection))
 
 

@@ -8,11 +8,15 @@ from rich import filesize
 
 from pdtui.core.printable_text import make_printable
 from pdtui.core.step_record import ActiveBehavior
+from pdtui.driving.drive_snapshot import KeyPress
 from pdtui.pictures.perspective_camera import PerspectiveCamera, round_length_down
-from pdtui.tui.cell_text import fit_cells, format_number, format_signed
+from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number, format_signed
+from pdtui.tui.theme import STYLES
 from pdtui.tui.widgets.activation_heatmap import UnitGrid, allocate_layer_rows
-from pdtui.tui.widgets.attribute_table import AttributeHistory, draw_sparklines
-from pdtui.tui.widgets.path_view import MOST_POINTS, PathTrail
+from pdtui.tui.widgets.attribute_history import AttributeHistory
+from pdtui.tui.widgets.key_marks import KeyMarks, mark_of_key
+from pdtui.tui.widgets.path_trail import MOST_POINTS, PathTrail
+from pdtui.tui.widgets.sparklines import draw_line_plots, draw_sparklines, fit_scales, format_range
 from pdtui.tui.widgets.unit_table import behaviors_of_units
 from tests.tui.recorded_snapshots import drive_map
 
@@ -72,7 +76,7 @@ def test_a_restart_begins_a_new_path_and_keeps_the_old_one() -> None:
     starts, ends, _ = trail.line_segments()
     assert starts[:, 0] == pytest.approx([10.0, 10.1])
     assert ends[:, 0] == pytest.approx([10.1, 10.2])
-    assert len(trail.line_segments(past=True)[0]) == 4
+    assert len(trail.line_segments("past")[0]) == 4
 
 
 def test_a_jump_is_not_drawn() -> None:
@@ -102,7 +106,8 @@ def test_history_forgets_the_oldest_but_not_the_range() -> None:
 
 def test_sparklines() -> None:
     means = np.array([[0.0, 5.0, np.nan], [0.5, 5.0, np.nan], [1.0, 5.0, np.nan]])
-    lines = draw_sparklines(means, np.array([0.0, 5.0, np.inf]), np.array([1.0, 5.0, -np.inf]))
+    low, high = np.array([0.0, 5.0, np.inf]), np.array([1.0, 5.0, -np.inf])
+    lines = draw_sparklines(means, fit_scales(means, low, high))
     assert lines[0] == "▁▅█"
     assert len(set(lines[1])) == 1
     assert lines[2] == "   "
@@ -110,9 +115,9 @@ def test_sparklines() -> None:
 
 def test_noise_stays_small_beside_what_was_seen() -> None:
     means = np.array([[0.0], [0.001]])
-    (line,) = draw_sparklines(means, np.array([0.0]), np.array([10.0]))
+    (line,) = draw_sparklines(means, fit_scales(means, np.array([0.0]), np.array([10.0])))
     assert line in ("▄▄", "▄▅", "▅▅")
-    (line,) = draw_sparklines(means, np.array([0.0]), np.array([0.001]))
+    (line,) = draw_sparklines(means, fit_scales(means, np.array([0.0]), np.array([0.001])))
     assert line == "▁█"
 
 
@@ -182,3 +187,92 @@ def test_text_is_fitted_by_cells() -> None:
     assert fit_cells("turns on the spot", 9) == "turns on…"
     assert fit_cells("漢字漢字", 5) == "漢字…"
     assert fit_cells("abc", 0) == ""
+
+
+def test_the_ghosts_values_lie_beside_the_drives_of_the_same_step() -> None:
+    history = AttributeHistory(6, 1)
+    history.extend(np.arange(8.0)[:, None])
+    history.add_ghost(np.array([[40.0], [50.0]]), 6)  # steps 4 and 5
+    history.extend(np.array([[8.0]]))
+    assert history.means(6, 1)[:, 0].tolist() == [3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
+    ghost = history.means(6, 1, ghost=True)[:, 0]
+    assert ghost[1:3].tolist() == [40.0, 50.0]
+    assert np.isnan(ghost[[0, 3, 4, 5]]).all()
+    history.add_ghost(np.arange(100.0)[:, None], 9)  # longer than what is kept
+    assert history.means(6, 1, ghost=True)[:, 0].tolist() == [94.0, 95.0, 96.0, 97.0, 98.0, 99.0]
+    history.forget_ghost()
+    assert np.isnan(history.means(6, 1, ghost=True)).all()
+
+
+def test_steps_that_a_stopped_screen_has_lost_are_gaps() -> None:
+    history = AttributeHistory(6, 1)
+    history.extend(np.array([[1.0], [2.0]]), 2)
+    history.extend(np.array([[9.0]]), 5)
+    assert history.means(5, 1)[[0, 1, 4], 0].tolist() == [1.0, 2.0, 9.0]
+    assert np.isnan(history.means(5, 1)[2:4]).all()
+    assert history.total == 5
+
+
+def test_a_key_is_marked_in_the_cell_of_its_step() -> None:
+    history = AttributeHistory(12, 1)
+    history.extend(np.arange(7.0)[:, None])
+    assert [history.cell_of(step, 4, 2) for step in range(7)] == [0, 0, 1, 1, 2, 2, 3]
+    marks, line = KeyMarks(), ScreenRow(6)
+    marks.extend([KeyPress(-90, "x", 0), KeyPress(1, "space", -1), KeyPress(6, "w", 0)])
+    marks.add_axis(line, 4, lambda step: history.cell_of(step, 4, 2))
+    assert line.strip().text == "␣──w  "
+
+
+@pytest.mark.parametrize(
+    ("key", "mark"), [("a", "a"), ("space", "␣"), ("plus", "+"), ("up", "↑"), ("f5", "f"), ("ß", "ß")]
+)
+def test_marks_of_keys(key: str, mark: str) -> None:
+    assert mark_of_key(key) == mark
+
+
+def test_plots_have_a_zero_line_only_where_zero_is_inside() -> None:
+    values = np.array([[-1.0, 1.0], [1.0, 2.0]])
+    scales = fit_scales(values, values.min(axis=0), values.max(axis=0))
+    assert scales.crosses_zero.tolist() == [True, False]
+    assert (scales.bottom.tolist(), scales.top.tolist()) == ([-1.0, 1.0], [1.0, 2.0])
+    means = np.repeat(np.array([[1.0, 1.5]]), 12, axis=0)
+    nothing = np.full_like(means, np.nan)
+    lines = draw_line_plots(means, nothing, scales, [STYLES.text] * 2)
+    texts = [line.text for line in lines]
+    assert texts[0] == "⠉" * 6, "the line is at the top"
+    assert texts[1] == "⠁⠈ ⠁⠈ ", "zero is in the middle"
+    assert [text.strip() for text in texts[2:]] in (["⣀" * 6, ""], ["", "⠉" * 6])
+
+
+def test_the_ghosts_line_is_dotted_and_in_its_own_colour() -> None:
+    own, ghost = np.full((8, 1), 1.0), np.full((8, 1), 3.0)
+    scales = fit_scales(np.concatenate([own, ghost]), np.array([1.0]), np.array([3.0]))
+    above, below = draw_line_plots(own, ghost, scales, [STYLES.primary])
+    assert (above.text, below.text) == ("⠁⠁⠁⠁", "⣀⣀⣀⣀")
+    assert {segment.style for segment in above} == {STYLES.ghost}
+    assert {segment.style for segment in below} == {STYLES.primary}
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "said"),
+    [
+        (-0.5, 1.25, "−0.50…1.25"),
+        (-80.84, 103.2, "−80.8…103.2"),
+        (-1234.0, 5678.0, "−1234…5678"),
+        (-1e9, 1e9, ""),
+        (float("nan"), 1.0, ""),
+    ],
+)
+def test_ranges_have_the_digits_that_fit(low: float, high: float, said: str) -> None:
+    assert format_range(low, high, 11) == said
+
+
+def test_the_latest_points_of_a_long_path_are_all_kept() -> None:
+    trail = PathTrail()
+    for first in range(0, 20_000, 50):
+        trail.extend(walk(first, first + 50), restarted=False)
+    starts, ends, _ = trail.line_segments("recent", 100)
+    assert starts[:, 0] == pytest.approx(np.arange(19_899, 19_999) * 0.1)
+    assert ends[-1, 0] == pytest.approx(1999.9)
+    trail.extend(walk(0, 3), restarted=True)
+    assert len(trail.line_segments("recent", 100)[0]) == 2

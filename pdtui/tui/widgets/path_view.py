@@ -1,11 +1,11 @@
-"""The path from above, in the colours of the behaviors active along it."""
+"""The path from above, in the colours of the behaviors active along it, and the ghost's."""
 
 from __future__ import annotations
 
 from math import atan2, ceil, log2, pi
 
 import numpy as np
-from numpy.typing import NDArray
+from textual.reactive import reactive
 from textual.strip import Strip
 
 from pdtui.core.attributes import Floats
@@ -16,94 +16,91 @@ from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
+from pdtui.tui.widgets.path_trail import MOST_POINTS, PathTrail, are_near
 
 _ARROWS = "→↗↑↖←↙↓↘"
 _LEAST_SIZE = 2.0  # of the area shown, m
-MOST_POINTS = 5000
-_JUMP = 1.0  # longest step that is drawn as a line, m
-_FARTHEST = 1e9  # coordinates beyond it, in m, come from a simulation that diverges and are not drawn
-_PAST, _NONE, _MARK, _LABEL, _FIRST_BEHAVIOR = range(5)
-
-
-class PathTrail:
-    """The points of the present path and of the one before it.
-
-    When a path outgrows `MOST_POINTS`, every second point is dropped, and from then on only every second,
-    fourth, … new point is kept, so that the shape remains however long the drive.
-    """
-
-    def __init__(self) -> None:
-        self.points: Floats = np.empty((0, 3))
-        self.past: Floats = np.empty((0, 3))
-        self._stride = 1
-        self._skip = 0
-
-    def extend(self, path: Floats, *, restarted: bool) -> None:
-        """Append rows (x, y, behavior), shape (n, 3), after starting a new path if `restarted`."""
-        if restarted and len(self.points):
-            self.past, self.points = self.points, np.empty((0, 3))
-            self._stride, self._skip = 1, 0
-        path = path[(np.abs(path) < _FARTHEST).all(axis=1)]
-        kept = path[self._skip :: self._stride]
-        self._skip = (self._skip - len(path)) % self._stride
-        self.points = np.concatenate([self.points, kept])
-        while len(self.points) > MOST_POINTS:
-            # Whether the last point has an odd or an even index, the next points keep the new stride.
-            self._skip += self._stride * (len(self.points) % 2)
-            self._stride *= 2
-            self.points = self.points[::2]
-
-    def line_segments(self, past: bool = False) -> tuple[Floats, Floats, NDArray[np.int16]]:
-        """Return starts (n, 2), ends (n, 2) and behaviors (n,) of the path's lines, without jumps."""
-        points = self.past if past else self.points
-        starts, ends = points[:-1], points[1:]
-        joined = np.hypot(*(ends[:, :2] - starts[:, :2]).T) <= _JUMP * self._stride
-        return starts[joined, :2], ends[joined, :2], ends[joined, 2].astype(np.int16)
+STRETCHES: tuple[float | None, ...] = (5.0, 10.0, 20.0, 40.0, 80.0, None)
+"""How much of the path can be shown: its last seconds, or all of it."""
+_USUAL = STRETCHES.index(20.0)
+_WITH_GHOST = 20.0  # seconds of path from which the ghost has to be in the picture
+_PAST, _NONE, _MARK, _LABEL, _GHOST, _FIRST_BEHAVIOR = range(6)
+_INKS = (STYLES.faint, STYLES.text, STYLES.accent, STYLES.muted, STYLES.ghost, *STYLES.behaviors)
 
 
 class PathView(SnapshotWidget):
-    """Draws the whole present path, with +x to the right and +y up."""
+    """Draws the last seconds of the present path, or all of it, with +x to the right and +y up.
 
-    BORDER_TITLE = "path"
+    What lies before, and the path before, are faint.
+    """
+
+    BORDER_TITLE = "path · last 20 s"
+    stretch: reactive[int] = reactive(_USUAL, init=False, repaint=False)
 
     def on_mount(self) -> None:
         self.trail = PathTrail()
+        self._ghost_path: Floats = np.empty((0, 2))
+        self._ghost_began = -1
         self._heading = 0.0
         self._here = np.zeros(2)
 
+    def zoom(self, change: int) -> None:
+        """Show more of the path for 1, less for −1."""
+        self.stretch = min(max(self.stretch + change, 0), len(STRETCHES) - 1)
+
+    def watch_stretch(self) -> None:
+        seconds = STRETCHES[self.stretch]
+        self.border_title = "path · all of it" if seconds is None else f"path · last {seconds:g} s"
+        self.redraw()
+
     def remember(self, snapshot: DriveSnapshot) -> None:
         self.trail.extend(snapshot.path, restarted=snapshot.restarted)
+        ghost = snapshot.ghost
+        began = -1 if ghost is None else ghost.first
+        if began != self._ghost_began:
+            self._ghost_path, self._ghost_began = np.empty((0, 2)), began
+        if ghost is not None and ghost.path is not None:
+            near = ghost.path[are_near(ghost.path)]
+            self._ghost_path = np.concatenate([self._ghost_path, near])[-MOST_POINTS:]
         if self.facts is not None and len(snapshot.poses):
             root = snapshot.poses[root_body_row(self.facts.links)]
-            if (np.abs(root) < _FARTHEST).all():  # else the mark stays where it was
+            if are_near(root):  # else the mark stays where it was
                 ahead = rotate_vectors(root[3:], np.array([1.0, 0.0, 0.0]))
                 self._here = root[:2]
                 self._heading = atan2(float(ahead[1]), float(ahead[0]))
 
     def paint(self, width: int, height: int) -> list[Strip]:
         points = self.trail.points
-        if not len(points):
+        if not len(points) or self.facts is None:
             return []
         canvas = BrailleCanvas(width, height)
-        middle, zoom = self._frame(canvas, points[:, :2])
+        seconds = STRETCHES[self.stretch]
+        steps = MOST_POINTS if seconds is None else max(1, round(seconds / self.facts.dt))
+        shown = points if seconds is None else self.trail.recent[-steps - 1 :]
+        ghost = self._ghost_path[-steps - 1 :]
+        # Close up, the robot fills the picture, as the ghost may be far away.
+        framed = ghost if seconds is None or seconds >= _WITH_GHOST else ghost[:0]
+        middle, zoom = self._frame(canvas, np.concatenate([shown[:, :2], framed]))
 
         def place(world: Floats) -> Floats:
             centre = np.array([canvas.width / 2, canvas.height / 2])
             dots: Floats = centre + (world - middle) * np.array([zoom, -zoom])
             return dots
 
-        old_starts, old_ends, _ = self.trail.line_segments(past=True)
-        canvas.draw_segments(place(old_starts), place(old_ends), _PAST)
-        starts, ends, rows = self.trail.line_segments()
+        for part in ("past", "present") if seconds is not None else ("past",):
+            old_starts, old_ends, _ = self.trail.line_segments(part)
+            canvas.draw_segments(place(old_starts), place(old_ends), _PAST)
+        canvas.draw_segments(place(ghost[:-1]), place(ghost[1:]), _GHOST)
+        starts, ends, rows = self.trail.line_segments("present" if seconds is None else "recent", steps)
         count = len(STYLES.behaviors)
         inks = np.where(rows < 0, _NONE, _FIRST_BEHAVIOR + rows % count).astype(np.int16)
         canvas.draw_segments(place(starts), place(ends), inks)
-        self._mark(canvas, place(points[0, :2]), "○")
-        self._mark(canvas, place(self._here), _ARROWS[round(self._heading / (pi / 4)) % 8])
+        self._mark(canvas, place(points[0, :2]), "○", _MARK)
+        if len(ghost):
+            self._mark(canvas, place(ghost[-1]), "◌", _GHOST)
+        self._mark(canvas, place(self._here), _ARROWS[round(self._heading / (pi / 4)) % 8], _MARK)
         self._draw_scale(canvas, zoom)
-        return canvas.render_strips(
-            [STYLES.faint, STYLES.text, STYLES.accent, STYLES.muted, *STYLES.behaviors]
-        )
+        return canvas.render_strips(_INKS)
 
     def _frame(self, canvas: BrailleCanvas, points: Floats) -> tuple[Floats, float]:
         """Return the middle of the picture in m and the number of dots per m.
@@ -119,8 +116,8 @@ class PathView(SnapshotWidget):
         middle: Floats = np.round((low + high) / 2 / cell) * cell
         return middle, zoom
 
-    def _mark(self, canvas: BrailleCanvas, dot: Floats, character: str) -> None:
-        canvas.draw_text(int(dot[0]) // 2, int(dot[1]) // 4, character, _MARK)
+    def _mark(self, canvas: BrailleCanvas, dot: Floats, character: str, ink: int) -> None:
+        canvas.draw_text(int(dot[0]) // 2, int(dot[1]) // 4, character, ink)
 
     def _draw_scale(self, canvas: BrailleCanvas, zoom: float) -> None:
         length = round_length_down(max(canvas.columns // 3, 4) * 2 / zoom)

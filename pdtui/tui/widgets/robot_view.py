@@ -9,25 +9,32 @@ from textual.reactive import reactive
 from textual.strip import Strip
 
 from pdtui.core.attributes import Floats
-from pdtui.core.robot_links_and_state import Link
 from pdtui.core.scenery import NO_SCENERY, BoxKind, LineKind, Scenery, Traffic
 from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.pictures.perspective_camera import PerspectiveCamera, round_length_down
 from pdtui.pictures.view_ahead import AHEAD, ViewAhead, frame_road, heading_on_ground, measure_stretch
-from pdtui.robots.geometry import capsule_ends, compute_link_poses, root_body_row, rotate_vectors
+from pdtui.robots.geometry import capsule_ends, compute_link_poses, root_body_row
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import ScreenRow, format_number
+from pdtui.tui.ghost_drawing import draw_ghost, point_to_ghost
 from pdtui.tui.obstacle_drawing import draw_obstacles_from_above, draw_obstacles_from_side
-from pdtui.tui.road_drawing import BOX_CORNERS, RoadLineDrawing, draw_box_edges, draw_lidar_hits, draw_traffic
+from pdtui.tui.road_drawing import (
+    RoadLineDrawing,
+    compute_box_corners,
+    draw_box_edges,
+    draw_lidar_hits,
+    draw_traffic,
+)
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
 View = Literal["side", "above"]
 _SIDE_ELEVATION = 14.0  # of the camera at the side, degrees
-_GROUND, _AXIS, _SHADOW, _ROBOT, _LABEL, _OBSTACLE, _LANE, _EDGE, _ROUTE, _VEHICLE, _FIRST_SHADE = range(11)
+_GROUND, _AXIS, _SHADOW, _ROBOT, _LABEL, _OBSTACLE = range(6)
+_LANE, _EDGE, _ROUTE, _VEHICLE, _GHOST, _FIRST_SHADE = range(6, 12)
 _INKS = (
     *(STYLES.faint, STYLES.muted, STYLES.faint, STYLES.accent, STYLES.muted, STYLES.obstacle),
-    *(STYLES.muted, STYLES.text, STYLES.primary, STYLES.warn),
+    *(STYLES.muted, STYLES.text, STYLES.primary, STYLES.warn, STYLES.ghost),
     *STYLES.depth,
 )
 _LINE_INKS: dict[LineKind, int] = {
@@ -89,12 +96,14 @@ class RobotView(SnapshotWidget):
         camera = self._camera(canvas, root, ends)
         if self._shows_road:
             self._draw_surroundings(canvas, camera, self.snapshot.traffic)
+            self._draw_ghost(canvas, camera, root)
             self._draw_links_on_road(canvas, camera, placed, ends)
         else:
             self._draw_ground(canvas, camera, root)
             self._draw_shadow(canvas, camera, ends)
             self._draw_surroundings(canvas, camera, self.snapshot.traffic)
             self._draw_heading(canvas, camera, root)
+            self._draw_ghost(canvas, camera, root)
             self._draw_links(canvas, camera, placed, ends)
         if self.view == "side":
             draw_obstacles_from_side(canvas, camera, self._scenery.cylinders, _OBSTACLE, behind=False)
@@ -170,6 +179,15 @@ class RobotView(SnapshotWidget):
         kept = before.all(axis=-1)
         canvas.draw_segments(dots[kept, 0], dots[kept, 1], _SHADOW)
 
+    def _draw_ghost(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
+        """Draw the ghost beneath the robot, or say where it is."""
+        assert self.facts is not None
+        ghost = None if self.snapshot is None else self.snapshot.ghost
+        if ghost is not None and ghost.latest is not None and len(ghost.latest.poses):
+            poses = ghost.latest.poses
+            draw_ghost(canvas, camera, self.facts.links, poses, _GHOST)
+            point_to_ghost(canvas, camera, poses[root_body_row(self.facts.links)], root, _GHOST)
+
     def _draw_heading(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
         """Draw the direction of the robot's own x axis as an arrow on the ground."""
         x, y = heading_on_ground(root)
@@ -200,7 +218,7 @@ class RobotView(SnapshotWidget):
                 continue
             link, ink = self.facts.links[row], _FIRST_SHADE + int(shade[row])
             if link.shape == "box":
-                corners, _, corners_before = camera.project(_box_corners(link, placed[row]))
+                corners, _, corners_before = camera.project(compute_box_corners(link, placed[row]))
                 if corners_before.all():
                     draw_box_edges(canvas, corners, ink)
                 continue
@@ -216,13 +234,8 @@ class RobotView(SnapshotWidget):
         for halo in (1.0, 0.0):
             for row, link in enumerate(self.facts.links):
                 if link.shape == "box":
-                    corners, _, _ = camera.project(_box_corners(link, placed[row]))
+                    corners, _, _ = camera.project(compute_box_corners(link, placed[row]))
                     canvas.draw_polygon(corners[:4], _ROBOT, halo=halo)
                 else:
                     thick = link.size[0] * camera.zoom
                     canvas.draw_capsule(dots[row, 0], dots[row, 1], thick, _ROBOT, halo=halo)
-
-
-def _box_corners(link: Link, pose: Floats) -> Floats:
-    """Return the corners of a box with this pose in the world, shape (8, 3), ordered as `BOX_CORNERS`."""
-    return pose[:3] + rotate_vectors(pose[3:], BOX_CORNERS * 2 * np.array(link.size))
