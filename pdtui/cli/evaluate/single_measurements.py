@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from pdtui.cli.shared_options import print_result, progress_bar
+from pdtui.cli.output.printed_result import print_result, progress_bar
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig

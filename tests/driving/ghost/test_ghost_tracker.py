@@ -14,7 +14,7 @@ from pdtui.driving.ghost import ghost_tracker
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import hash_file, save_network
-from pdtui.robots.robot_registry import TRUSTED
+from pdtui.robots.environments.environment_lookup import TRUSTED
 from pdtui.stimulation.map_library import find_map, map_without_behaviors
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
