@@ -23,7 +23,7 @@ COMMANDS = {
     "dissect": "Find the units that steer a robot; write a map.",
     "pursue": "Search for units that accomplish a task.",
     "tune": "Tune the PID gains of a map.",
-    "figure": "Draw figures as PNG files.",
+    "figure": "Draw figures.",
     "convert": "Convert a policy to safetensors.",
     "train": "Train a policy.",
     "bench": "Measure speed and memory.",

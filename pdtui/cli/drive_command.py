@@ -163,7 +163,8 @@ def show_drive(config: DriveConfig, *, fps: int = 12, watching: bool = False) ->
     try:
         from pdtui.tui.drive_app import DriveApp
 
-        click.echo(make_printable(f"starting {config.robot} …"), err=True)
+        if not watching:
+            click.echo(make_printable(f"starting {config.robot} …"), err=True)
         connection.wait_until_started()
         app = DriveApp(connection, config.stimulation_map, fps=fps, watching=watching)
         message = app.run()

@@ -80,8 +80,8 @@ if TYPE_CHECKING:
 @click.option(
     "--strip",
     type=FILE_PATH,
-    metavar="FILE.png",
-    help="Draw frames of the best, the median and the worst seed of each behavior.",
+    metavar="FILE",
+    help="Draw frames of the best, the median and the worst seed of each behavior as .png, .pdf or .svg.",
 )
 @click.option(
     "--watch",
@@ -99,8 +99,8 @@ if TYPE_CHECKING:
     "pictures",
     type=FILE_PATH,
     multiple=True,
-    metavar="FILE.png|.rrd",
-    help="Draw the result of the experiment; may be repeated.",
+    metavar="FILE",
+    help="Draw the result of the experiment as .png, .pdf, .svg or .rrd; may be repeated.",
 )
 @overwrite_option
 @workers_option

@@ -59,7 +59,9 @@ def figure_command() -> None:
     metavar="SECONDS",
     help="Length of time to draw.",
 )
-@click.option("-o", "--output", type=FILE_PATH, required=True, metavar="FILE.png", help="File to write.")
+@click.option(
+    "-o", "--output", type=FILE_PATH, required=True, metavar="FILE", help="File to write: .png, .pdf or .svg."
+)
 @overwrite_option
 def episode_command(
     robot: str,

@@ -19,6 +19,14 @@ WIDTH = 7.2
 """Width of a page in inches: two columns of a paper."""
 _DPI = 200
 """Pixels per inch, enough for print."""
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": "pdtui"},
+    # Without a date, the same data give the same file.
+    "pdf": {"Creator": "pdtui", "CreationDate": None},
+    "svg": {"Creator": "pdtui", "Date": None},
+}
+FIGURE_SUFFIXES = tuple(f".{kind}" for kind in _METADATA)
+"""Endings of the names of figures: each is a format."""
 _STYLE: dict[str, Any] = {
     "font.size": 7.5,
     "axes.titlesize": 8,
@@ -41,7 +49,7 @@ _STYLE: dict[str, Any] = {
 
 @contextmanager
 def open_figure_page(target: Path | BytesIO, height: float, title: str) -> Iterator[Figure]:
-    """Yield a figure that is written as a PNG when the block ends without an error.
+    """Yield a figure that is written when the block ends without an error, by its name as PNG, PDF or SVG.
 
     A file's folder is made, and the file is replaced once the picture is whole. The height is in inches.
 
@@ -61,15 +69,18 @@ def open_figure_page(target: Path | BytesIO, height: float, title: str) -> Itera
         with (
             nullcontext(target) if isinstance(target, BytesIO) else replace_file(target, PictureError) as file
         ):
-            figure.savefig(file, format="png", metadata={"Title": title, "Software": "pdtui"})
+            kind = "png" if isinstance(target, BytesIO) else target.suffix.removeprefix(".")
+            figure.savefig(file, format=kind, metadata={"Title": title, **_METADATA[kind]})
 
 
 def check_figure_path(path: Path, overwrite: bool) -> None:
     """Find out before the work whether one figure may be written.
 
     Raises:
-        PictureError: The file already exists.
+        PictureError: The file already exists, or its name is not that of a figure.
     """
+    if path.suffix not in FIGURE_SUFFIXES:
+        raise PictureError(f"{path}: expected a name that ends in {', '.join(FIGURE_SUFFIXES)}")
     if path.exists() and not overwrite:
         raise PictureError(f"{path}: already exists; --overwrite replaces it, -o writes elsewhere")
 

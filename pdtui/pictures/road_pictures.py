@@ -13,7 +13,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pdtui.core.attributes import Floats
-from pdtui.pictures.matplotlib_page import open_figure_page
+from pdtui.pictures.matplotlib_page import FIGURE_SUFFIXES, open_figure_page
 from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, color_to_hex
 from pdtui.pictures.rerun_report_file import open_report_file
 
@@ -61,7 +61,7 @@ def draw_road_pictures(paths: Sequence[Path], title: str, pictures: Sequence[Roa
         PictureError: A file cannot be written.
     """
     for path in paths:
-        if path.suffix == ".png":
+        if path.suffix in FIGURE_SUFFIXES:
             _draw_page(path, title, pictures)
         else:
             _write_recording(path, title, pictures)

@@ -35,7 +35,8 @@ CASSIE_DESCRIPTION = LeggedRobotDescription(
     rewards=LeggedRewardWeights(
         velocity=2.0,
         yaw_rate=1.0,
-        vertical_speed=0.5,
+        tracking_width=0.4,
+        vertical_speed=1.0,
         tilt_rate=0.05,
         tilt=3.0,
         torque=5e-6,
@@ -49,6 +50,7 @@ CASSIE_DESCRIPTION = LeggedRobotDescription(
         posture=0.4,
         posture_joints=(0, 1, 6, 7),
         steps=0.0,
+        one_foot=1.0,
         single_stance=2.5,
         fall=2.0,
     ),

@@ -54,5 +54,5 @@ def test_both_formats_are_written(tmp_path: Path) -> None:
     assert paths[1].read_bytes().startswith(b"RRF2")
     with pytest.raises(PictureError, match=r"ways\.png: already exists"):
         check_picture_paths(paths, overwrite=False)
-    with pytest.raises(PictureError, match=r"ways\.svg: expected a name that ends in"):
-        check_picture_paths([tmp_path / "ways.svg"], overwrite=False)
+    with pytest.raises(PictureError, match=r"ways\.gif: expected a name that ends in"):
+        check_picture_paths([tmp_path / "ways.gif"], overwrite=False)

@@ -39,7 +39,9 @@ def test_it_stands_and_falls_by_its_own_rule(robot: SmallLeggedRobot) -> None:
 
 
 def test_standing_on_one_foot_is_rewarded_only_while_it_is_to_move(robot: SmallLeggedRobot) -> None:
-    weights = replace(robot.description.rewards, single_stance=2.0, swing=0.0, slip=0.0, steps=0.0)
+    weights = replace(
+        robot.description.rewards, one_foot=0.5, single_stance=2.0, swing=0.0, slip=0.0, steps=0.0
+    )
     one = replace(robot.description, rewards=weights)
     state = robot.read_state()
     times, fell = np.array([[0.3, -0.3]]), np.zeros(1, bool)
@@ -54,8 +56,8 @@ def test_standing_on_one_foot_is_rewarded_only_while_it_is_to_move(robot: SmallL
         return float(compute_legged_rewards(now, times, 0.02, one, fell)[0][0])
 
     both, single = reward([True, True], 0.5), reward([False, True], 0.5)
-    assert single - both == pytest.approx(2.0 * 0.32 * 0.02, abs=1e-3)
-    assert reward([False, True], 0.0) == pytest.approx(reward([True, True], 0.0), abs=1e-3)
+    assert single - both == pytest.approx((0.5 + 2.0 * 0.32) * 0.02)
+    assert reward([False, True], 0.0) == pytest.approx(reward([True, True], 0.0))
 
 
 def test_foot_times_count_up_in_the_air_and_down_on_the_ground(robot: SmallLeggedRobot) -> None:

@@ -30,11 +30,13 @@ class FallRule:
 class LeggedRewardWeights:
     """Weights of the rewards and penalties, per second unless they say otherwise.
 
-    Those of velocity and yaw rate are rewards for following the commands, with a width of 0.25 squared m/s or
-    rad/s. Most of the others are penalties, of which legged_gym has many (Rudin et al., 2021).
+    Those of velocity and yaw rate are rewards for following the commands. Most of the others are penalties,
+    of which legged_gym has many (Rudin et al., 2021).
 
     Attributes:
-        velocity, yaw_rate: Rewards for following the commanded velocity and yaw rate.
+        velocity, yaw_rate: Rewards for following the commanded velocity and yaw rate: the weight ×
+            exp(−deviation² / `tracking_width`).
+        tracking_width: Squared m/s or rad/s.
         vertical_speed, tilt_rate: Per squared m/s up and down, and per squared rad/s of roll and pitch.
         tilt: Per squared horizontal part of the trunk's vertical axis.
         torque, joint_speed: Per squared N m and squared rad/s, summed over the joints.
@@ -49,14 +51,16 @@ class LeggedRewardWeights:
         steps: Reward per landing of a foot and s by which it was in the air for longer than `least_air_time`,
             while the robot is commanded to move.
         least_air_time: Shortest time in the air that is rewarded, s.
-        single_stance: Reward, while the robot is commanded to move and exactly one foot is on the ground, per
-            s for which both feet have been where they are, up to `longest_stance`.
+        one_foot: Reward while the robot is commanded to move and exactly one foot is on the ground.
+        single_stance: Further reward then, per s for which both feet have been where they are, up to
+            `longest_stance`.
         longest_stance: Longest such time that is rewarded, s.
         fall: Penalty for a fall, once.
     """
 
     velocity: float = 1.5
     yaw_rate: float = 0.8
+    tracking_width: float = 0.25
     vertical_speed: float = 2.0
     tilt_rate: float = 0.05
     tilt: float = 3.0
@@ -72,6 +76,7 @@ class LeggedRewardWeights:
     posture_joints: tuple[int, ...] = ()
     steps: float = 1.5
     least_air_time: float = 0.35
+    one_foot: float = 0.0
     single_stance: float = 0.0
     longest_stance: float = 0.4
     fall: float = 0.0

@@ -26,8 +26,6 @@ MAX_SCANNED = 1.0
 """Largest deviation of a scanned height that is observed, m."""
 # Observations are clipped at ±100, as in legged_gym.
 _MAX_OBSERVATION = 100.0
-# Width of the reward for following a command, in squared m/s or rad/s.
-_TRACKING_WIDTH = 0.25
 # Commanded speed below which a robot stands and earns nothing for steps.
 _MIN_COMMAND = 0.1
 
@@ -93,8 +91,8 @@ def compute_legged_rewards(
     off = motion.qpos[:, [7 + joint for joint in posture]] - description.stance[posture]
     times = np.where(touching, np.minimum(foot_times, 0.0) - dt, air_time + dt)
     reward = (
-        weights.velocity * np.exp(-np.square(error).sum(1) / _TRACKING_WIDTH)
-        + weights.yaw_rate * np.exp(-np.square(yaw_error) / _TRACKING_WIDTH)
+        weights.velocity * np.exp(-np.square(error).sum(1) / weights.tracking_width)
+        + weights.yaw_rate * np.exp(-np.square(yaw_error) / weights.tracking_width)
         - weights.vertical_speed * np.square(motion.linear[:, 2])
         - weights.tilt_rate * np.square(motion.qvel[:, 3:5]).sum(1)
         - weights.tilt * np.square(motion.up[:, :2]).sum(1)
@@ -115,5 +113,5 @@ def _single_stance(times: Floats, touching: NDArray[np.bool_], weights: LeggedRe
     """Return the reward for standing on exactly one foot, per second, shape (n,)."""
     single = touching.sum(axis=1) == 1
     shared = np.minimum(np.abs(times).min(axis=1), weights.longest_stance)
-    rewards: Floats = weights.single_stance * single * shared
+    rewards: Floats = single * (weights.one_foot + weights.single_stance * shared)
     return rewards
