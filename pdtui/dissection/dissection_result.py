@@ -12,7 +12,7 @@ from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.primitive_judging import PrimitiveJudgement
-from pdtui.dissection.steering.steering_comparison import SteeringComparison
+from pdtui.dissection.steering.steering_results import SteeringComparison
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.measured_effects import UnitEffects
 from pdtui.robots.options.robot_option import RobotOptions

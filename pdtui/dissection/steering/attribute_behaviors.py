@@ -8,7 +8,7 @@ from pdtui.core.attributes import BehaviorAim
 from pdtui.core.reserved_keys import KeyAllocator
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.steering.steering_comparison import SteeringResult
+from pdtui.dissection.steering.steering_results import SteeringResult
 from pdtui.probing.intervention_plan import InterventionPlan
 from pdtui.stimulation.interventions.intervention import LayerVectors
 from pdtui.stimulation.stimulation_map import Behavior

@@ -12,6 +12,7 @@ from pdtui.core.confidence_intervals import bootstrap_interval
 from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.dissection.steering.linear_probes import LinearProbe
 from pdtui.dissection.steering.steering_candidates import BASELINES, SteeringCandidate, SteeringMethod
+from pdtui.dissection.steering.steering_results import SteeringComparison, SteeringResult
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.measured_effects import PlanEffects
 from pdtui.probing.null_distributions import correct_for_comparisons, sign_flip_p_values
@@ -44,81 +45,6 @@ class SteeringSettings:
     readings: tuple[float, ...] = (1.0, 2.0, 4.0)
     factors: tuple[float, ...] = (1.0, 2.0, 4.0)
     random: int = 4
-
-
-@dataclass(frozen=True)
-class SteeringResult:
-    """What one method does to one attribute in one direction, from starts that chose nothing.
-
-    Attributes:
-        sign: 1 for up, −1 for down.
-        candidate: The source and the smallest dose that reach most of the method's largest effect.
-        main: Change of the attribute, in its standard deviations.
-        side: Largest change of any other attribute, in standard deviations of that one.
-        largest_dose: Largest dose from this one on, of this source and sign, without a fall from a start that
-            chose.
-        p: P-value against flips of the signs, corrected for all results.
-        p_random: P-value of the difference to the baseline, the best of a few units or directions drawn at
-            random, corrected likewise; None for the baselines themselves.
-        level: Share of false discoveries that is accepted.
-    """
-
-    column: int
-    sign: int
-    candidate: SteeringCandidate
-    measured: MeasuredEffect
-    main: float
-    side: float
-    largest_dose: float
-    p: float
-    p_random: float | None
-    level: float
-
-    @property
-    def method(self) -> SteeringMethod:
-        """The method that it is of."""
-        return self.candidate.method
-
-    @property
-    def moves(self) -> bool:
-        """Whether it moves the attribute at all."""
-        return self.p <= self.level
-
-    @property
-    def steers(self) -> bool:
-        """Whether it moves the attribute more than its baseline does, if it has one."""
-        return self.moves and (self.p_random is None or self.p_random <= self.level)
-
-
-@dataclass(frozen=True)
-class SteeringComparison:
-    """All methods on all attributes that can be moved.
-
-    Attributes:
-        probes: The linear probes.
-        results: What each method does; a method without a candidate that moves an attribute from every
-            choosing start without a fall has none for it.
-        columns: Columns of the attributes.
-        tried: Number of candidates of each method.
-        choosing, judging: Number of starts that chose, and that judged.
-    """
-
-    probes: tuple[LinearProbe, ...]
-    results: tuple[SteeringResult, ...]
-    columns: tuple[int, ...]
-    tried: dict[SteeringMethod, int]
-    choosing: int
-    judging: int
-
-    def probe_of(self, column: int) -> LinearProbe | None:
-        """Return the linear probe of an attribute, if there is one."""
-        return next((one for one in self.probes if one.column == column), None)
-
-    def result_of(self, column: int, sign: int, method: SteeringMethod) -> SteeringResult | None:
-        """Return what a method does to an attribute in a direction, if it has a candidate."""
-        wanted = column, sign, method
-        found = (one for one in self.results if (one.column, one.sign, one.method) == wanted)
-        return next(found, None)
 
 
 def compare_steering(

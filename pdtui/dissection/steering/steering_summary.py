@@ -11,7 +11,7 @@ from rich.table import Table
 from pdtui.core.attributes import Attribute
 from pdtui.core.text_tables import new_table
 from pdtui.dissection.steering.steering_candidates import BASELINES, SteeringMethod
-from pdtui.dissection.steering.steering_comparison import SteeringComparison, SteeringResult
+from pdtui.dissection.steering.steering_results import SteeringComparison, SteeringResult
 
 
 def summarise_steering(steering: SteeringComparison, attributes: Sequence[Attribute]) -> dict[str, Any]:

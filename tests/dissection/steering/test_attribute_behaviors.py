@@ -14,7 +14,7 @@ from pdtui.dissection.steering.steering_candidates import (
     affine_candidates,
     direction_candidates,
 )
-from pdtui.dissection.steering.steering_comparison import SteeringResult
+from pdtui.dissection.steering.steering_results import SteeringResult
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot

@@ -17,7 +17,8 @@ from pdtui.dissection.steering.steering_candidates import (
     random_direction_candidates,
     unit_candidates,
 )
-from pdtui.dissection.steering.steering_comparison import SteeringComparison, compare_steering
+from pdtui.dissection.steering.steering_comparison import compare_steering
+from pdtui.dissection.steering.steering_results import SteeringComparison
 from pdtui.dissection.steering.steering_summary import steering_tables, summarise_steering
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.intervention_plan import InterventionPlan
