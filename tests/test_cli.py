@@ -344,7 +344,7 @@ def test_a_drive_is_shown_in_a_viewer_and_goes_on_without_one(
     assert f"no viewer listens on 127.0.0.1:{nobody}: start `rerun --bind 127.0.0.1" in alone.output
     assert "80 steps" in alone.output
     refused = run(*drive, "--no-record", "--viewer", nobody)
-    assert "--viewer shows what is recorded" in refused.output
+    assert "--viewer shows the recording" in refused.output
 
 
 def test_robots_and_maps_are_listed(map_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

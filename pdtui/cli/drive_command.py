@@ -106,7 +106,7 @@ def drive_command(
         raise KeystrokeError("--keys needs --headless; on the screen, keys are pressed by hand")
     if viewer is not None:
         if no_record:
-            raise SessionError("--viewer shows what is recorded; leave --no-record out")
+            raise SessionError("--viewer shows the recording, so it cannot be used with --no-record")
         config = replace(config, viewer=ViewerAddress.parse(viewer))
     if headless:
         _drive_headless(config, keys, steps)

@@ -63,17 +63,19 @@ if TYPE_CHECKING:
 @click.option(
     "--gait",
     is_flag=True,
-    help="Measure how the policy alone walks: contacts, clearance and slip of each foot.",
+    help="Measure the gait of the policy without interventions: contacts, clearance and slip of each foot.",
 )
 @click.option(
-    "--let-go", is_flag=True, help="Measure whether the robot stays up after each behavior is let go."
+    "--let-go",
+    is_flag=True,
+    help="Measure whether the robot stays up after the key of each behavior is released.",
 )
 @start_option
 @click.option(
     "--update",
     is_flag=True,
-    help="Write the effects of the behaviors into the map; its comments are kept. Of a map that comes with "
-    "pdtui, a copy is written into ./maps.",
+    help="Write the measured effects into the map and keep its comments. If the map comes with pdtui, write a "
+    "copy into ./maps instead.",
 )
 @click.option("--quick", is_flag=True, help="Take a quick look: fewer seeds and random draws.")
 @integer_option("--hold", help="Control steps for which a behavior is held, at least 10 s; default: 1000.")
@@ -149,7 +151,7 @@ def evaluate_command(
     without_map = policy_only or gait
     if start and not without_map:
         raise click.UsageError(
-            "--start needs --policy-only or --gait; tasks and experiments have their own starts"
+            "--start needs --policy-only or --gait; tasks and experiments define their own starts"
         )
     if update and force:
         raise MapError("--update cannot be used with --force: the map would get another policy's figures")
@@ -226,7 +228,7 @@ def _evaluate_behaviors(
     source = Path(config.stimulation_map.source)
     output = own_map_path(source) if update else source
     if update and len(seeds) < 2:
-        raise MapError("--update needs at least 2 seeds: a single one gives no interval")
+        raise MapError("--update needs at least 2 seeds: one seed gives no confidence interval")
     if drawn is not None:
         check_figure_path(*drawn)
     if watch:

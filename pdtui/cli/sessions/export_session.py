@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 @click.option(
     "--stream",
     metavar="NAME",
-    help="Stream to export, or 'all'. Without --stream and --keys, the streams are listed.",
+    help="Stream to export, or 'all'. Without --stream and --keys, list the streams.",
 )
 @click.option(
     "--format",
     "form",
     type=click.Choice(EXPORT_FORMATS),
-    help="Format of the table; default: by the name of the file. MCAP needs pip install 'pdtui[export]'.",
+    help="Format of the table; default: by the extension of the file. MCAP needs pip install 'pdtui[export]'.",
 )
 @click.option(
     "-o",
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     "with a file for each.",
 )
 @click.option("--keys", type=FILE_PATH, metavar="FILE", help="Text file to write the keystrokes into.")
-@policy_option("the session's policy, with which observations are computed again")
+@policy_option("the session's policy, which is needed to compute the observations")
 @overwrite_option
 def export_command(
     file: Path,
