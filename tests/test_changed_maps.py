@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 
 from pdtui.cli import main
 from pdtui.stimulation import map_library
-from pdtui.stimulation.map_library import find_map, own_map_path, shipped_folder
+from pdtui.stimulation.map_library import find_map, shipped_folder, user_map_path
 from pdtui.stimulation.map_reader import load_map
 from tests.small_map import write_small_map
 
@@ -73,4 +73,4 @@ def test_tune_writes_the_gains_into_a_copy(shipped: Path) -> None:
 def test_in_a_checkout_its_own_maps_are_changed(monkeypatch: pytest.MonkeyPatch) -> None:
     path = find_map("ant")
     monkeypatch.chdir(shipped_folder("maps").parent)
-    assert own_map_path(path) == path
+    assert user_map_path(path) == path

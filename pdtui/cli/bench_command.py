@@ -16,7 +16,7 @@ from pdtui.cli.options.shared_options import (
     own_policy_option,
     record_activations_option,
 )
-from pdtui.cli.output.printed_result import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result, progress_bar
 from pdtui.sessions.session_schema import ActivationsKept
 
 

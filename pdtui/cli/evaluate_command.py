@@ -16,8 +16,12 @@ from pdtui.cli.evaluate.paper_experiments import (
     experiment_options,
     run_experiment,
 )
+from pdtui.cli.evaluate.printed_measurements import (
+    print_key_releases,
+    print_policy_alone,
+    print_target_tracking,
+)
 from pdtui.cli.evaluate.run_watching import watch_runs
-from pdtui.cli.evaluate.single_measurements import print_policy_alone, print_releases, print_target_tracking
 from pdtui.cli.options.robot_option_flag import robot_option_flag
 from pdtui.cli.options.shared_options import (
     FILE_PATH,
@@ -34,7 +38,7 @@ from pdtui.cli.options.shared_options import (
     start_option,
     workers_option,
 )
-from pdtui.cli.output.printed_result import describe_copied_map, print_result, progress_bar
+from pdtui.cli.output.command_output import describe_map_copy, print_result, progress_bar
 from pdtui.core.errors import MapError
 from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
@@ -74,8 +78,8 @@ if TYPE_CHECKING:
 @click.option(
     "--update",
     is_flag=True,
-    help="Write the measured effects into the map and keep its comments. If the map comes with pdtui, write a "
-    "copy into ./maps instead.",
+    help="Write the measured effects into the map and keep its comments. If the map comes with pdtui, write "
+    "a copy into ./maps instead.",
 )
 @click.option("--quick", is_flag=True, help="Take a quick look: fewer seeds and random draws.")
 @integer_option("--hold", help="Control steps for which a behavior is held, at least 10 s; default: 1000.")
@@ -195,7 +199,7 @@ def evaluate_command(
     elif without_map:
         print_policy_alone(config, seeds, as_json, gait=gait)
     elif let_go:
-        print_releases(config, seeds, hold, workers, as_json)
+        print_key_releases(config, seeds, hold, workers, as_json)
     else:
         from pdtui.evaluation.protocol_settings import QUICK_SEEDS, choose_protocol
 
@@ -222,11 +226,11 @@ def _evaluate_behaviors(
     from pdtui.evaluation.ranked_runs import rank_runs
     from pdtui.pictures.behavior_strips import draw_strips, film_strips
     from pdtui.pictures.matplotlib_page import check_figure_path
-    from pdtui.stimulation.map_library import own_map_path
+    from pdtui.stimulation.map_library import user_map_path
     from pdtui.stimulation.map_writer import replace_effects, rewrite_map
 
     source = Path(config.stimulation_map.source)
-    output = own_map_path(source) if update else source
+    output = user_map_path(source) if update else source
     if update and len(seeds) < 2:
         raise MapError("--update needs at least 2 seeds: one seed gives no confidence interval")
     if drawn is not None:
@@ -241,7 +245,7 @@ def _evaluate_behaviors(
     if update:
         measured = result.measured_effects()
         rewrite_map(source, lambda text: replace_effects(text, measured, str(source)), output)
-        told = f"{output}: wrote the effects{describe_copied_map(source, output)}"
+        told = f"{output}: wrote the effects{describe_map_copy(source, output)}"
         click.echo(make_printable(told), err=True)
     print_result(asdict(result), as_json, lambda: behavior_tables(result))
     if drawn is not None:

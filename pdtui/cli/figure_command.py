@@ -16,7 +16,7 @@ from pdtui.cli.options.shared_options import (
     own_policy_option,
     preset_option,
 )
-from pdtui.cli.output.printed_result import progress_bar
+from pdtui.cli.output.command_output import progress_bar
 from pdtui.core.printable_text import make_printable
 
 

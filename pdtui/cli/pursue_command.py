@@ -19,7 +19,7 @@ from pdtui.cli.options.shared_options import (
     search_seed_option,
     workers_option,
 )
-from pdtui.cli.output.printed_result import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result, progress_bar
 
 
 @click.command()

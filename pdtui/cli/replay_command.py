@@ -12,7 +12,7 @@ import click
 
 from pdtui.cli.drive_command import show_drive
 from pdtui.cli.options.shared_options import FILE_PATH, policy_option
-from pdtui.cli.output.printed_result import progress_bar
+from pdtui.cli.output.command_output import progress_bar
 from pdtui.core.errors import SessionError
 from pdtui.core.printable_text import make_printable
 

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from pdtui.cli.options.shared_options import json_option
-from pdtui.cli.output.printed_result import print_result
+from pdtui.cli.output.command_output import print_result
 
 
 @click.command()

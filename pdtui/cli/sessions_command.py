@@ -10,9 +10,9 @@ from typing import Any
 import click
 
 from pdtui.cli.options.shared_options import FILE_PATH, json_option
-from pdtui.cli.output.printed_result import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result, progress_bar
 from pdtui.cli.replay_command import replay_options
-from pdtui.cli.sessions.export_session import export_command
+from pdtui.cli.sessions.export_subcommand import export_command
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.printable_text import make_printable, to_json
 

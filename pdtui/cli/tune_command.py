@@ -18,7 +18,7 @@ from pdtui.cli.options.shared_options import (
     minutes_option,
     workers_option,
 )
-from pdtui.cli.output.printed_result import describe_copied_map, print_result, progress_bar
+from pdtui.cli.output.command_output import describe_map_copy, print_result, progress_bar
 from pdtui.core.errors import MapError
 from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
@@ -75,11 +75,11 @@ def tune_command(
     from pdtui.evaluation.evaluation_tables import tuning_table
     from pdtui.search.gain_search import TuningSettings
     from pdtui.search.gain_tuning import tune_gains
-    from pdtui.stimulation.map_library import find_map, own_map_path
+    from pdtui.stimulation.map_library import find_map, user_map_path
     from pdtui.stimulation.map_writer import add_seeds, replace_gains, rewrite_map
 
     path = find_map(map_name)
-    output = path if dry_run else own_map_path(path)
+    output = path if dry_run else user_map_path(path)
     config = build_drive_config(
         str(path), None, policy, import_options, force=force, robot_options=robot_options
     )
@@ -100,5 +100,5 @@ def tune_command(
     data = {"map": str(output if written else path), "behaviors": rows, "written": written}
     print_result(data, as_json, lambda: tuning_table(results))
     if not as_json:
-        told = f"wrote the gains of {', '.join(written)}{describe_copied_map(path, output)}"
+        told = f"wrote the gains of {', '.join(written)}{describe_map_copy(path, output)}"
         click.echo(make_printable(f"{output}: {told}" if written else f"{path}: not changed"))

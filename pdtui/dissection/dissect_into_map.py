@@ -18,7 +18,7 @@ from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_summary import summarise_dissection
 from pdtui.dissection.dissection_text import render_dissection
 from pdtui.dissection.draft_map import draft_map
-from pdtui.stimulation.map_policy_lookup import name_policy_from_map
+from pdtui.stimulation.map_policy_lookup import relative_policy_name
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.map_writer import replace_policy
 
@@ -66,7 +66,7 @@ def dissect_into_map(
     check_writable(output, MapError)
     journal = journal_path(output)
     dissection = dissect(replace(config, journal=journal))
-    named = name_policy_from_map(dissection.policy, dissection.import_options, output)
+    named = relative_policy_name(dissection.policy, dissection.import_options, output)
     text = replace_policy(draft_map(dissection), *named, str(output))
     behaviors = tuple(parse_map(text, str(output)).behaviors)
     write_file(output, text, MapError)

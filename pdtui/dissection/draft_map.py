@@ -8,7 +8,7 @@ from pdtui.core.units import Stimulation, describe_units, format_unit
 from pdtui.dissection.dissection_config import SEEDS_PER_DISSECTION
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.search_task_into_map import draft_task_behavior
-from pdtui.dissection.steering.attribute_behaviors import draft_attribute_behaviors
+from pdtui.dissection.steering.behavior_drafts import draft_attribute_behaviors
 from pdtui.robots.robot_goals import HoldBehaviorGoal
 from pdtui.search.behavior_search import BehaviorSearchResult
 from pdtui.search.controller_search import ControllerSearchResult

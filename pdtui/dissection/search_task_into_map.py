@@ -24,7 +24,7 @@ from pdtui.search.task_rollout import StimulationWithDuration
 from pdtui.search.task_search import TaskSearch, TaskSearchResult
 from pdtui.search.task_search_settings import TaskSearchSettings
 from pdtui.stimulation.interventions.intervention import Onset
-from pdtui.stimulation.map_policy_lookup import name_policy_from_map
+from pdtui.stimulation.map_policy_lookup import relative_policy_name
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.map_robot_options import map_robot
 from pdtui.stimulation.map_writer import add_behavior, add_seeds, compose_map, rewrite_map
@@ -116,7 +116,7 @@ def search_task_into_map(
         begin = [] if known is None else _known_plans(known, task, pool)
         search = TaskSearch(pool, goal, seed, settings, begin)
         result = search.run(SharedTimeBudget(minutes).share(), progress)
-        named, named_options = name_policy_from_map(policy, import_options, output)
+        named, named_options = relative_policy_name(policy, import_options, output)
         new_map = StimulationMap(
             robot.name,
             named,

@@ -20,7 +20,7 @@ from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts
-from pdtui.driving.ghost.ghost_tracker import GhostTracker
+from pdtui.driving.ghost.ghost_runner import GhostRunner
 from pdtui.driving.keystrokes import interpret_keys
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.pacer import Pacer
@@ -49,7 +49,7 @@ class DriveServer:
     ) -> None:
         self._connection, self._send, self._config = connection, send, config
         self._loop: ControlLoop = build_control_loop(config)
-        self._ghost = GhostTracker(config, self._loop)
+        self._ghost = GhostRunner(config, self._loop)
         self._builder = SnapshotBuilder(self._loop, self._ghost)
         self._recorder: SessionRecorder | None = None
         if config.recording:

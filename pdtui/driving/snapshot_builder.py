@@ -10,7 +10,7 @@ from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_snapshot import DriveSnapshot, KeyPress, StimulatedUnit
-from pdtui.driving.ghost.ghost_tracker import GhostTracker
+from pdtui.driving.ghost.ghost_runner import GhostRunner
 from pdtui.sessions.episode_statistics import EpisodeStatisticsCounter
 
 _ROWS_KEPT = 4000  # control steps between two snapshots that a stopped screen does not lose
@@ -24,7 +24,7 @@ class SnapshotBuilder:
         ghost: its ghost, if it can have one.
     """
 
-    def __init__(self, loop: ControlLoop, ghost: GhostTracker | None = None) -> None:
+    def __init__(self, loop: ControlLoop, ghost: GhostRunner | None = None) -> None:
         self._loop, self._ghost = loop, ghost
         self._rows = {name: row for row, name in enumerate(loop.map.behaviors)}
         self._history: list[np.ndarray] = []

@@ -12,7 +12,7 @@ from pdtui.core.errors import SimulationDiverged
 from pdtui.core.outcome import Outcome
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy
-from pdtui.probing.intervention_plan import ControlStepStimulation, InterventionPlan
+from pdtui.probing.intervention_rollout_plan import ControlStepStimulation, InterventionRolloutPlan
 from pdtui.probing.start_states import StartState
 from pdtui.robots.robot import Robot
 from pdtui.stimulation.pid_magnitude import PidMagnitude
@@ -38,7 +38,7 @@ class PidStimulationPlan:
     base: tuple[float, ...] = ()
 
 
-RolloutPlan = Stimulation | PidStimulationPlan | InterventionPlan
+RolloutPlan = Stimulation | PidStimulationPlan | InterventionRolloutPlan
 RolloutJob = tuple[RolloutPlan, int]
 """A plan and the index of its start."""
 
@@ -105,7 +105,7 @@ def _plan_stimulation(
 ) -> ControlStepStimulation:
     if controller is not None:
         return lambda _, values: controller.stimulate(values)
-    if isinstance(plan, InterventionPlan):
+    if isinstance(plan, InterventionRolloutPlan):
         return plan.bind(robot, policy)
     fixed = plan if isinstance(plan, Stimulation) else NO_STIMULATION
     return lambda _step, _values: fixed

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pdtui.core.errors import RobotError
-from pdtui.robots.environments.environment_lookup import find_environment
+from pdtui.robots.environments.environment_lookup import resolve_environment_id
 from pdtui.robots.options.constructor_options import read_constructor_options
 from pdtui.robots.options.robot_option import OptionValue, RobotOption, check_robot_options
 from pdtui.robots.options.robot_spec import RobotSpec
@@ -86,7 +86,7 @@ def require_robot_name(name: str) -> str:
         RobotError: There is no robot of that name; the message lists close matches.
     """
     if name not in find_own_robots() and _find_entry_point(name) is None:
-        find_environment(name, list_robot_names())
+        resolve_environment_id(name, list_robot_names())
     return name
 
 
@@ -104,7 +104,7 @@ def list_robot_options(name: str) -> tuple[RobotOption, ...]:
         return read_constructor_options(_load_entry(entry))
     from pdtui.robots.environments.environment_options import read_environment_options
 
-    return read_environment_options(find_environment(name, list_robot_names()))
+    return read_environment_options(resolve_environment_id(name, list_robot_names()))
 
 
 def make_robot(robot: str | RobotSpec, **options: OptionValue) -> Robot:
@@ -204,7 +204,7 @@ def _build_environment(name: str, options: Mapping[str, OptionValue]) -> Robot:
     from pdtui.robots.environments.plain_gymnasium_robot import PlainGymnasiumRobot
     from pdtui.robots.simulators.mujoco_robot import suppress_warnings
 
-    environment = find_environment(name, list_robot_names())
+    environment = resolve_environment_id(name, list_robot_names())
     with suppress_warnings(), closing(make_environment(environment, options)) as env:
         kind = MujocoGymnasiumRobot if is_mujoco(env) else PlainGymnasiumRobot
     return kind(name, environment=environment, options=options)

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 from pdtui.core.printable_text import make_printable
 
 APP = "pdtui"
-"""The application of a session, or how its name begins: see `name_application`."""
+"""The application of a session, or how its name begins: see `rerun_application_id`."""
 SCHEMA = 1
 STEP, TIME = "step", "time"
 
@@ -55,7 +55,7 @@ ActivationsKept = Literal["all", "half", "off"]
 ACTIVATIONS_KEPT: tuple[ActivationsKept, ...] = get_args(ActivationsKept)
 
 
-def name_application(robot: str, created: str, recording_id: str) -> str:
+def rerun_application_id(robot: str, created: str, recording_id: str) -> str:
     """Return the name of the application that a session is a recording of: one of its own.
 
     A viewer has one layout for all recordings of an application, and takes them for one data set.
@@ -69,6 +69,6 @@ def name_application(robot: str, created: str, recording_id: str) -> str:
     return " ".join(make_printable(f"{APP} {robot[:60]} {began} {recording_id[:6]}").split())
 
 
-def is_session_application(name: str) -> bool:
+def is_session_application_id(name: str) -> bool:
     """Return whether recordings of an application are sessions; those of earlier versions shared one."""
     return name == APP or name.startswith(f"{APP} ")

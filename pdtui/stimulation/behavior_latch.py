@@ -168,7 +168,7 @@ class BehaviorLatch:
             for one in latched.interventions:
                 made = one.make_edits(factor, latched.age, attributes, self._clocks, latched.fade_factor)
                 # What fades is not cut off by an imprint of the same units: that begins where it is now.
-                edits += [e.seen_through(fading) if isinstance(e, ImprintUnits) else e for e in made]
+                edits += [e.after_edits(fading) if isinstance(e, ImprintUnits) else e for e in made]
                 if latched.fading:
                     fading += {e.edit_observation: None for e in made if isinstance(e, ImprintUnits)}
         return Stimulation(tuple(values), tuple(values.values()), tuple(edits))

@@ -42,7 +42,7 @@ def find_map(name: str) -> Path:
     raise MapError(f"no map '{name}'; available: {known}")
 
 
-def own_map_path(path: Path) -> Path:
+def user_map_path(path: Path) -> Path:
     """Return the file that a change of a map shall be written into: the map's own, or for a map that comes
     with pdtui a new one of its name in ``./maps``.
 

@@ -12,7 +12,7 @@ from pdtui.policies.weights.import_options import (
     ImportOptions,
     ObservationActionSpaces,
 )
-from pdtui.policies.weights.policy_file_lookup import find_file_inside_folders, folders_of_file, is_file
+from pdtui.policies.weights.policy_file_lookup import find_file_inside_folders, is_file, policy_search_folders
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import RobotSpec, open_robot
 from pdtui.stimulation.map_writer import compose_map, replace_policy
@@ -70,7 +70,7 @@ def is_of_another_policy(
     return given.sha256 != stimulation_map.policy_hash
 
 
-def name_policy_from_map(
+def relative_policy_name(
     policy: str, import_options: ImportOptions, output: Path
 ) -> tuple[str, ImportOptions]:
     """Return how a map names a policy and its statistics: a file by its path from the map's folder.
@@ -93,7 +93,7 @@ def _path_from_map(name: str, output: Path) -> str:
 
 def _path_from_here(name: str, source: str) -> str:
     """Return a file's name as seen from the working directory; unchanged if found that way, or nowhere."""
-    found = find_file_inside_folders(name, folders_of_file(Path(source)), source) if name else None
+    found = find_file_inside_folders(name, policy_search_folders(Path(source)), source) if name else None
     if found is None or found == Path(name):
         return name
     here = Path.cwd()

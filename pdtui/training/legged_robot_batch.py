@@ -18,8 +18,8 @@ from pdtui.robots.legged import observations_and_rewards as legged
 from pdtui.robots.legged.legged_robot import LeggedRobot
 from pdtui.robots.legged.legged_robot_state import LeggedRobotState, LeggedStateReader, compute_yaws
 from pdtui.robots.simulators.mujoco_robot import suppress_warnings
-from pdtui.training.legged_training_grounds import LeggedTrainingGrounds
 from pdtui.training.robot_batch import RobotBatchState, TransitionBatch
+from pdtui.training.terrain_curriculum import TerrainCurriculum
 
 _THREADS = 2
 # Control steps between pushes, and their largest change of each horizontal velocity (m/s).
@@ -39,7 +39,7 @@ class LeggedRobotBatch:
     """A batch of robots of one description, with the interface of `RobotBatch`.
 
     A robot that starts on rough ground starts on ground that becomes rougher the longer it stays on its feet;
-    see `LeggedTrainingGrounds`.
+    see `TerrainCurriculum`.
 
     Args:
         robot: One of the robots. Commands that cannot be given, or have no range, stay 0.
@@ -56,7 +56,7 @@ class LeggedRobotBatch:
             for index, name in enumerate(robot.command_names)
             if name in robot.commands and name in robot.command_ranges
         }
-        self._grounds = LeggedTrainingGrounds(robot, count)
+        self._grounds = TerrainCurriculum(robot, count)
         self.frictions = self._grounds.frictions
         model = self._grounds.models[0]
         self._reader = LeggedStateReader(model, self._one)
@@ -110,7 +110,7 @@ class LeggedRobotBatch:
         self._age += 1
         self.restarted = fell | (self._age >= self._episode)
         following = self._observe(motion)
-        self._grounds.change_levels(self.restarted, fell, self._rng)
+        self._grounds.update_levels(self.restarted, fell, self._rng)
         self._start_over(self.restarted)
         self.observations = following.copy()
         changed = self.restarted | self._disturb()
@@ -170,7 +170,7 @@ class LeggedRobotBatch:
         rng, joints = self._rng, self._action.shape[1]
         fresh = np.zeros((count, 1 + self._nq + self._nv))
         yaw = rng.uniform(-np.pi, np.pi, count)
-        fresh[:, 1:3], fresh[:, 3] = self._grounds.draw_places(which, rng)
+        fresh[:, 1:3], fresh[:, 3] = self._grounds.sample_start_places(which, rng)
         fresh[:, 3] += self._one.start_height
         fresh[:, 4], fresh[:, 7] = np.cos(yaw / 2), np.sin(yaw / 2)
         angle_noise = rng.uniform(-_START_ANGLE_NOISE, _START_ANGLE_NOISE, (count, joints))

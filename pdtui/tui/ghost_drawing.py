@@ -57,7 +57,7 @@ def draw_ghost(
             canvas.draw_capsule(dots[row, 0], dots[row, 1], thick, ink)
 
 
-def point_to_ghost(
+def draw_ghost_arrow(
     canvas: BrailleCanvas, camera: PerspectiveCamera, ghost: Floats, robot: Floats, ink: int
 ) -> None:
     """Say at the edge how far away the ghost is if it is outside the picture; poses (7,) of both roots."""

@@ -22,7 +22,7 @@ from pdtui.driving.headless_drive import drive_headless
 from pdtui.driving.keystrokes import format_keystrokes, interpret_keys, read_keystrokes
 from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.robots import make_robot
-from pdtui.sessions.export.session_export import export_stream
+from pdtui.sessions.export.export_writer import export_stream
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_summary import read_session_summary, summarise_session

@@ -10,7 +10,7 @@ from pdtui.core.errors import PolicyError
 from pdtui.policies.weights.policy_file_lookup import (
     POLICY_FOLDERS_VARIABLE,
     find_file_inside_folders,
-    folders_of_file,
+    policy_search_folders,
 )
 
 
@@ -47,14 +47,14 @@ def test_a_file_in_a_folder_of_maps_may_name_what_lies_above_it(
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     for name in ("own.st", "../own.st"):
-        found = find_file_inside_folders(name, folders_of_file(here / "maps" / "a.toml"), "m")
+        found = find_file_inside_folders(name, policy_search_folders(here / "maps" / "a.toml"), "m")
         assert found is not None
         assert found.samefile(here / "own.st")
-    assert folders_of_file(here / "own.toml") == (here,)
+    assert policy_search_folders(here / "own.toml") == (here,)
     with pytest.raises(PolicyError, match="lies outside"):
-        find_file_inside_folders("../outside.st", folders_of_file(here / "own.toml"), "m")
+        find_file_inside_folders("../outside.st", policy_search_folders(here / "own.toml"), "m")
     with pytest.raises(PolicyError, match="lies outside"):
-        find_file_inside_folders("../../outside.st", folders_of_file(here / "maps" / "a.toml"), "m")
+        find_file_inside_folders("../../outside.st", policy_search_folders(here / "maps" / "a.toml"), "m")
 
 
 @pytest.mark.parametrize(

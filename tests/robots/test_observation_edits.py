@@ -125,7 +125,7 @@ def test_a_quaternion_is_the_same_after_two_turns_and_not_after_one() -> None:
     np.testing.assert_allclose(once[1:5], -offset.apply(observation, 0.4)[1:5])
     np.testing.assert_allclose(once[5:], offset.apply(observation, 0.4)[5:], atol=1e-12)
     for size in (5.0, -6.0, 7.0, 21.25, -21.25):
-        short = offset.shortest(size)
+        short = offset.wrap_size(size)
         assert abs(short) <= 2 * np.pi
         np.testing.assert_allclose(offset.apply(observation, short), offset.apply(observation, size))
 
@@ -140,5 +140,5 @@ def test_a_heading_is_set_in_the_same_way_however_often_the_robot_has_turned() -
 def test_an_angle_is_the_same_after_one_turn_and_a_length_never() -> None:
     pytest.importorskip("pybullet", reason="PyBullet has no wheels for every Python")
     robot, _ = _walked("a1", 4)
-    assert _edit(robot, "heading offset").shortest(7.0) == pytest.approx(7.0 - 2 * np.pi)
-    assert _edit(robot, "speed offset").shortest(7.0) == 7.0
+    assert _edit(robot, "heading offset").wrap_size(7.0) == pytest.approx(7.0 - 2 * np.pi)
+    assert _edit(robot, "speed offset").wrap_size(7.0) == 7.0

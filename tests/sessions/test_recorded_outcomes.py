@@ -9,7 +9,7 @@ import pytest
 from pdtui.core.outcome import Outcome
 from pdtui.driving.headless_drive import drive_headless
 from pdtui.driving.session_replay import replay_session
-from pdtui.sessions.export.session_export import export_stream
+from pdtui.sessions.export.export_writer import export_stream
 from pdtui.sessions.recorded_outcomes import decode_outcomes
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_header_decoding import scan_session_header

@@ -18,7 +18,7 @@ from pdtui.core.errors import SessionError
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.geometry import compute_link_poses
 from pdtui.sessions.export.export_streams import STREAMS
-from pdtui.sessions.export.session_export import export_all_streams, export_stream
+from pdtui.sessions.export.export_writer import export_all_streams, export_stream
 from pdtui.sessions.session_reader import read_activations, read_session
 from tests.sessions.conftest import Recorded
 

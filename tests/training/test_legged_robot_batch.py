@@ -15,7 +15,7 @@ from pdtui.robots.legged.legged_robot_state import compute_yaws
 from pdtui.robots.legged.mujoco_ground import lay_rough_ground
 from pdtui.robots.legged.terrain import draw_rough_ground
 from pdtui.training.legged_robot_batch import LeggedRobotBatch
-from pdtui.training.legged_training_grounds import LeggedTrainingGrounds
+from pdtui.training.terrain_curriculum import TerrainCurriculum
 from tests.small_legged_robot import SmallLeggedRobot, describe_small_robot
 
 
@@ -63,13 +63,13 @@ def test_a_cassie_on_rough_ground_moves_and_observes_as_one_alone_does() -> None
 
 
 def test_robots_that_stay_on_their_feet_go_on_to_rougher_ground() -> None:
-    grounds, rng = LeggedTrainingGrounds(Cassie(terrain="rough"), 4), np.random.default_rng(0)
+    grounds, rng = TerrainCurriculum(Cassie(terrain="rough"), 4), np.random.default_rng(0)
     over = np.array([True, True, False, True])
-    grounds.change_levels(over, np.array([False, True, False, False]), rng)
+    grounds.update_levels(over, np.array([False, True, False, False]), rng)
     assert grounds.levels.tolist() == [1, 0, 0, 1]
     assert not grounds.models[1].hfield_data.any()
     assert 0.0 < grounds.models[0].hfield_data.max() <= 0.2 * 0.05 + 1e-6
-    grounds.change_levels(over, np.array([True, False, False, False]), rng)
+    grounds.update_levels(over, np.array([True, False, False, False]), rng)
     assert grounds.levels.tolist() == [0, 1, 0, 2]
 
 

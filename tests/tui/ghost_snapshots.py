@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pdtui.driving.drive_snapshot import DriveSnapshot, KeyPress
-from pdtui.driving.ghost.ghost_snapshot import GhostMoment, GhostSnapshot
+from pdtui.driving.ghost.ghost_snapshot import GhostPose, GhostSnapshot
 
 DELAY = 12
 """Snapshots by which the ghost's numbers are older than the drive's."""
@@ -26,7 +26,7 @@ def with_ghost(snapshots: list[DriveSnapshot], since: int) -> list[DriveSnapshot
         ghost = GhostSnapshot(
             "running",
             first=first,
-            latest=GhostMoment(snapshot.step, older.attributes, snapshot.attributes, older.poses),
+            latest=GhostPose(snapshot.step, older.attributes, snapshot.attributes, older.poses),
             history=np.resize(older.history, (rows, snapshot.history.shape[1])),
             path=np.resize(older.path[:, :2], (rows, 2)),
         )

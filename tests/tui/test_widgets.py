@@ -14,7 +14,7 @@ from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number, format_sign
 from pdtui.tui.theme import STYLES
 from pdtui.tui.widgets.activation_heatmap import UnitGrid, allocate_layer_rows
 from pdtui.tui.widgets.attribute_history import AttributeHistory
-from pdtui.tui.widgets.key_marks import KeyMarks, mark_of_key
+from pdtui.tui.widgets.key_press_axis import KeyPressAxis, key_symbol
 from pdtui.tui.widgets.path_trail import MOST_POINTS, PathTrail
 from pdtui.tui.widgets.sparklines import draw_line_plots, draw_sparklines, fit_scales, format_range
 from pdtui.tui.widgets.unit_table import behaviors_of_units
@@ -217,9 +217,9 @@ def test_a_key_is_marked_in_the_cell_of_its_step() -> None:
     history = AttributeHistory(12, 1)
     history.extend(np.arange(7.0)[:, None])
     assert [history.cell_of(step, 4, 2) for step in range(7)] == [0, 0, 1, 1, 2, 2, 3]
-    marks, line = KeyMarks(), ScreenRow(6)
+    marks, line = KeyPressAxis(), ScreenRow(6)
     marks.extend([KeyPress(-90, "x", 0), KeyPress(1, "space", -1), KeyPress(6, "w", 0)])
-    marks.add_axis(line, 4, lambda step: history.cell_of(step, 4, 2))
+    marks.draw_axis(line, 4, lambda step: history.cell_of(step, 4, 2))
     assert line.strip().text == "␣──w  "
 
 
@@ -227,7 +227,7 @@ def test_a_key_is_marked_in_the_cell_of_its_step() -> None:
     ("key", "mark"), [("a", "a"), ("space", "␣"), ("plus", "+"), ("up", "↑"), ("f5", "f"), ("ß", "ß")]
 )
 def test_marks_of_keys(key: str, mark: str) -> None:
-    assert mark_of_key(key) == mark
+    assert key_symbol(key) == mark
 
 
 def test_plots_have_a_zero_line_only_where_zero_is_inside() -> None:

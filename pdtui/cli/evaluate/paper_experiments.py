@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pdtui.cli.output.printed_result import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result, progress_bar
 
 if TYPE_CHECKING:
     from pdtui.paper.experiment import Experiment

@@ -11,7 +11,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.units import Stimulation, format_unit
 from pdtui.dissection.steering.linear_probes import LinearProbe
-from pdtui.probing.intervention_plan import InterventionPlan
+from pdtui.probing.intervention_rollout_plan import InterventionRolloutPlan
 from pdtui.probing.stimulated_rollout import RolloutPlan
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 from pdtui.stimulation.interventions.intervention import Intervention, LayerVectors
@@ -150,7 +150,7 @@ def affine_candidates(probe: LinearProbe, doses: Sequence[float]) -> list[Steeri
         )
         edit = Intervention("affine", vectors="write", readout="read", bias="bias")
         source = f"reading of layer {probe.layer}"
-        plan = InterventionPlan(edit, vectors)
+        plan = InterventionRolloutPlan(edit, vectors)
         found.append(SteeringCandidate(SteeringMethod.AFFINE, probe.column, source, dose, plan))
     return found
 
@@ -163,7 +163,7 @@ def observation_edit_candidates(
     for edit in edits:
         for factor in factors:
             size = factor * _EDIT_SIZES.get(edit.unit, _OTHER_EDIT_SIZE)
-            plan = InterventionPlan(Intervention("imprint", values={edit.name: size}, units=("0:*",)))
+            plan = InterventionRolloutPlan(Intervention("imprint", values={edit.name: size}, units=("0:*",)))
             found.append(SteeringCandidate(SteeringMethod.IMPRINT, None, edit.name, size, plan))
     return found
 
@@ -187,7 +187,7 @@ def _added(
             column,
             f"{name} of layer {layer}",
             dose,
-            InterventionPlan(
+            InterventionRolloutPlan(
                 Intervention("direction", vectors="along", coordinates=(dose * spread,)), vectors
             ),
         )

@@ -43,14 +43,14 @@ class SteeringResult:
         return self.candidate.method
 
     @property
-    def moves(self) -> bool:
+    def is_significant(self) -> bool:
         """Whether it moves the attribute at all."""
         return self.p <= self.level
 
     @property
-    def steers(self) -> bool:
+    def beats_baseline(self) -> bool:
         """Whether it moves the attribute more than its baseline does, if it has one."""
-        return self.moves and (self.p_random is None or self.p_random <= self.level)
+        return self.is_significant and (self.p_random is None or self.p_random <= self.level)
 
 
 @dataclass(frozen=True)

@@ -101,12 +101,12 @@ def _summarise_method(
     method: SteeringMethod, tried: int, results: Sequence[SteeringResult]
 ) -> dict[str, Any]:
     """Return how many results count, and the medians of those."""
-    steering = [one for one in results if one.steers]
-    counted = [one for one in results if one.moves] if method in BASELINES else steering
+    steering = [one for one in results if one.beats_baseline]
+    counted = [one for one in results if one.is_significant] if method in BASELINES else steering
     return {
         "method": str(method),
         "tried": tried,
-        "moves": sum(one.moves for one in results),
+        "moves": sum(one.is_significant for one in results),
         "steers": None if method in BASELINES else len(steering),
         "main": median(one.main for one in counted) if counted else None,
         "side": median(one.side for one in counted) if counted else None,
@@ -133,7 +133,7 @@ def _summarise_result(one: SteeringResult, attributes: Sequence[Attribute]) -> d
         "side": one.side,
         "p": one.p,
         "p_random": one.p_random,
-        "steers": one.steers,
+        "steers": one.beats_baseline,
     }
 
 

@@ -14,11 +14,11 @@ from pdtui.core.processes.worker_pool import WorkerProcess, describe_exit
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.ghost.ghost_simulation import (
     GhostStart,
-    GhostStep,
-    GhostTask,
+    GhostStepInput,
+    GhostStepResult,
     build_ghost_loop,
-    load_ghost,
     run_ghost,
+    warm_up_ghost,
 )
 
 _STEPS_PER_CALL = 10  # control steps; a ghost that has fallen behind still hears soon of a new start
@@ -38,8 +38,8 @@ class GhostProcess(Closable):
         self._changed = threading.Condition()
         self._worker: WorkerProcess | None = None
         self._start: GhostStart | None = None
-        self._tasks: deque[GhostTask] = deque()
-        self._steps: list[GhostStep] = []
+        self._tasks: deque[GhostStepInput] = deque()
+        self._steps: list[GhostStepResult] = []
         self._over = False  # the episode of the present ghost has ended
         self._number = 0  # of the present ghost, so that steps of an earlier one are dropped
         self._closed = False
@@ -67,10 +67,10 @@ class GhostProcess(Closable):
         """Have the ghost do its next control step, after these events, unless its episode is over."""
         with self._changed:
             if not self._over:
-                self._tasks.append(GhostTask(step, tuple(events)))
+                self._tasks.append(GhostStepInput(step, tuple(events)))
                 self._changed.notify()
 
-    def take_steps(self) -> list[GhostStep]:
+    def take_steps(self) -> list[GhostStepResult]:
         """Return the steps of the present ghost that were done since the last call."""
         with self._changed:
             steps, self._steps = self._steps, []
@@ -95,7 +95,7 @@ class GhostProcess(Closable):
 
     def _serve(self, worker: WorkerProcess) -> None:
         try:
-            worker.send(load_ghost)
+            worker.send(warm_up_ghost)
             worker.receive()
             self.loaded = True
             while not self._closed:
@@ -116,7 +116,7 @@ class GhostProcess(Closable):
             tasks = [self._tasks.popleft() for _ in range(min(_STEPS_PER_CALL, len(self._tasks)))]
             number = self._number
         worker.send(run_ghost, start, tasks)
-        steps: list[GhostStep] = worker.receive()
+        steps: list[GhostStepResult] = worker.receive()
         with self._changed:
             if number == self._number:
                 self._steps += steps

@@ -33,14 +33,14 @@ class GhostStart:
     digest: int
 
 
-class GhostTask(NamedTuple):
+class GhostStepInput(NamedTuple):
     """A control step that the ghost has to do, and those of the drive's events that it follows."""
 
     step: int
     events: tuple[DriveEvent, ...]
 
 
-class GhostStep(NamedTuple):
+class GhostStepResult(NamedTuple):
     """What is kept of one control step of the ghost.
 
     Attributes:
@@ -65,12 +65,14 @@ def build_ghost_loop(config: DriveConfig) -> ControlLoop:
     return loop
 
 
-def load_ghost(loop: ControlLoop) -> None:
+def warm_up_ghost(loop: ControlLoop) -> None:
     """Do nothing, with a loop that has been built for it."""
     del loop
 
 
-def run_ghost(loop: ControlLoop, start: GhostStart | None, tasks: Sequence[GhostTask]) -> list[GhostStep]:
+def run_ghost(
+    loop: ControlLoop, start: GhostStart | None, tasks: Sequence[GhostStepInput]
+) -> list[GhostStepResult]:
     """Begin anew if there is a start, then run control steps until all are done or the episode ends.
 
     Raises:
@@ -83,10 +85,12 @@ def run_ghost(loop: ControlLoop, start: GhostStart | None, tasks: Sequence[Ghost
             raise RobotError(
                 f"{loop.robot.name}: expected the state in which the behavior was latched, got another"
             )
-    steps: list[GhostStep] = []
+    steps: list[GhostStepResult] = []
     for task in tasks:
         record = loop.advance(task.events)
-        steps.append(GhostStep(record.step, record.attributes, record.poses, record.digest, record.ended))
+        steps.append(
+            GhostStepResult(record.step, record.attributes, record.poses, record.digest, record.ended)
+        )
         if record.ended:
             break
     return steps

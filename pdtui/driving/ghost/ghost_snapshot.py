@@ -12,7 +12,7 @@ GhostCondition = Literal["loading", "waiting", "starting", "running", "over", "f
 
 
 @dataclass(frozen=True)
-class GhostMoment:
+class GhostPose:
     """Ghost and drive after the same control step, the latest that both have done.
 
     Attributes:
@@ -45,6 +45,6 @@ class GhostSnapshot:
     condition: GhostCondition
     message: str = ""
     first: int = -1
-    latest: GhostMoment | None = None
+    latest: GhostPose | None = None
     history: Floats | None = None
     path: Floats | None = None

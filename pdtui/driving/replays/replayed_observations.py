@@ -49,11 +49,11 @@ def replay_observations(
         loop = build_control_loop(config, world)
         act, seen = loop.act, list[NDArray[Any]]()
 
-        def note_and_act(observation: NDArray[Any], *others: Any) -> PolicyStep:
+        def record_observation_and_act(observation: NDArray[Any], *others: Any) -> PolicyStep:
             seen.append(np.array(observation).reshape(-1))
             return act(observation, *others)
 
-        loop.act = note_and_act
+        loop.act = record_observation_and_act
         for block in read_step_blocks(header):
             digests = dict(zip(block.steps.tolist(), block.digests.tolist(), strict=True))
             rows = []

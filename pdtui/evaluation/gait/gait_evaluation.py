@@ -16,9 +16,9 @@ from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import run_episode
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.evaluation.gait.gait_figures import align_contacts
+from pdtui.evaluation.gait.foot_metrics import undo_contact_delays
 from pdtui.evaluation.gait.quadruped_gaits import average_lags, name_gait
-from pdtui.evaluation.gait.walk_figures import WalkFigures, find_foot_links, measure_walk
+from pdtui.evaluation.gait.walk_metrics import WalkMetrics, compute_walk_metrics, find_foot_links
 
 WALKED_STEPS = 1000
 """Control steps of a walk that are measured."""
@@ -43,8 +43,8 @@ class MeanWithDeviation:
 
 
 @dataclass(frozen=True)
-class FootEvaluation:
-    """The figures of one foot over all walks; `FootFigures` says what they are."""
+class FootMetricsSummary:
+    """The figures of one foot over all walks; `FootMetrics` says what they are."""
 
     name: str
     touchdown_rate: MeanWithDeviation
@@ -75,7 +75,7 @@ class GaitEvaluation:
     dt: float
     contacts_by: Literal["simulator", "height"]
     outcomes: OutcomeCounts
-    feet: tuple[FootEvaluation, ...]
+    feet: tuple[FootMetricsSummary, ...]
     airborne: MeanWithDeviation
     feet_down: tuple[float, ...]
     alternation: MeanWithDeviation | None
@@ -84,7 +84,7 @@ class GaitEvaluation:
     regularity: float
     speed: MeanWithDeviation
     tilt: MeanWithDeviation
-    walks: tuple[WalkFigures, ...]
+    walks: tuple[WalkMetrics, ...]
 
 
 def evaluate_gait(
@@ -118,7 +118,7 @@ def evaluate_gait(
 
 def _walk(
     built: ControlLoop, links: Sequence[Link], seed: int, steps: int
-) -> tuple[WalkFigures | None, Outcome]:
+) -> tuple[WalkMetrics | None, Outcome]:
     """Walk once; return the figures, unless the walk was too short, and how it ended."""
     robot, poses, touching = built.robot, [], []
     loop = ControlLoop(robot, built.policy, built.map, seed, start=built.start)
@@ -132,20 +132,22 @@ def _walk(
         return None, outcome
     told = [row for row in touching if row is not None]
     if len(told) < len(poses):
-        return measure_walk(robot, links, np.array(poses), None), outcome
-    contacts = align_contacts(np.array(told), [foot.contact_delay for foot in robot.feet])
-    return measure_walk(robot, links, np.array(poses)[: len(contacts)], contacts), outcome
+        return compute_walk_metrics(robot, links, np.array(poses), None), outcome
+    contacts = undo_contact_delays(np.array(told), [foot.contact_delay for foot in robot.feet])
+    return compute_walk_metrics(robot, links, np.array(poses)[: len(contacts)], contacts), outcome
 
 
 def _summarise(
-    built: ControlLoop, seeds: tuple[int, ...], steps: int, walks: list[WalkFigures], outcomes: OutcomeCounts
+    built: ControlLoop, seeds: tuple[int, ...], steps: int, walks: list[WalkMetrics], outcomes: OutcomeCounts
 ) -> GaitEvaluation:
     robot, over = built.robot, MeanWithDeviation.of
     feet = []
     for index, foot in enumerate(robot.feet):
         own = [walk.feet[index] for walk in walks]
         names = ("touchdown_rate", "duty_factor", "clearance", "slip")
-        feet.append(FootEvaluation(foot.name, *(over([getattr(one, name) for one in own]) for name in names)))
+        feet.append(
+            FootMetricsSummary(foot.name, *(over([getattr(one, name) for one in own]) for name in names))
+        )
     strides = [walk.lags for walk in walks if walk.lags is not None]
     lags = average_lags(strides) if strides else None
     return GaitEvaluation(

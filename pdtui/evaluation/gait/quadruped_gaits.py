@@ -8,7 +8,7 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.robot_links_and_state import FootPlace
-from pdtui.evaluation.gait.gait_figures import Contacts, find_touchdowns
+from pdtui.evaluation.gait.foot_metrics import Contacts, find_touchdowns
 
 PLACES: tuple[FootPlace, ...] = ("front left", "front right", "rear left", "rear right")
 """The order of the feet; lags are those behind the first."""

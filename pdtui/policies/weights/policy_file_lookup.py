@@ -41,7 +41,7 @@ def find_file_beside(name: str, folders: Sequence[Path]) -> Path | None:
     return next((path for path in places if is_file(path)), None)
 
 
-def folders_of_file(path: Path) -> tuple[Path, ...]:
+def policy_search_folders(path: Path) -> tuple[Path, ...]:
     """Return the folders in which a map or a session may name weights, besides the working directory.
 
     They are its own and, if that is called ``maps`` or ``sessions``, the one above: there, pdtui was run that

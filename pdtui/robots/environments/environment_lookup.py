@@ -35,7 +35,7 @@ def trust_module(robot: str) -> None:
         os.environ[TRUSTED] = ",".join([*_trusted_modules(), module])
 
 
-def find_environment(name: str, robots: Sequence[str]) -> str:
+def resolve_environment_id(name: str, robots: Sequence[str]) -> str:
     """Return the id, registered with Gymnasium, behind a name, without its module.
 
     Args:

@@ -28,7 +28,7 @@ class ObservationEdit:
     apply: Callable[[Floats, float], Floats]
     period: float = 0.0
 
-    def shortest(self, size: float) -> float:
+    def wrap_size(self, size: float) -> float:
         """Return the size nearest to 0 that gives the same observation."""
         return math.remainder(size, self.period) if self.period else size
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.task import TaskVerdict
-from pdtui.search.onsets.gait_oscillations import find_gait_marks
+from pdtui.search.onsets.gait_signals import find_gait_marks
 from pdtui.search.task_rollout import StimulationWithDuration
 from pdtui.spectra.episode_monitor import monitor_episodes
 from pdtui.stimulation.interventions.intervention import Onset

@@ -18,7 +18,7 @@ from pdtui.sessions.rrd.message_reader import (
     decode_message,
     read_payload,
 )
-from pdtui.sessions.session_schema import APP, is_session_application
+from pdtui.sessions.session_schema import APP, is_session_application_id
 
 RESCUE = "`pdtui sessions repair` rescues what is whole"
 _MAX_STORES = 16
@@ -142,7 +142,7 @@ class ChunkStream:
             return
         if len(self._stores) == _MAX_STORES:
             raise SessionError(f"expected at most {_MAX_STORES} recordings and blueprints, found more")
-        if not is_session_application(store.application_id):
+        if not is_session_application_id(store.application_id):
             raise SessionError(f"expected a recording of {APP}, found one of '{store.application_id[:60]}'")
         self._stores.append(store)
         if self.store is None and store.is_recording:

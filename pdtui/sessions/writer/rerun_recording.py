@@ -16,7 +16,7 @@ from rerun.recording_stream import is_enabled
 
 from pdtui.core.errors import SessionError
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.session_schema import name_application
+from pdtui.sessions.session_schema import rerun_application_id
 from pdtui.sessions.viewer.session_blueprint import session_blueprint
 from pdtui.sessions.writer.message_pipe import MessagePipe
 from pdtui.sessions.writer.session_file import SessionFile
@@ -44,7 +44,7 @@ class RerunRecording:
 
     def __init__(self, file: SessionFile, info: DriveInfo, created: str, recording_id: str = "") -> None:
         self.recording_id = recording_id or uuid4().hex
-        self.application = name_application(info.robot, created, self.recording_id)
+        self.application = rerun_application_id(info.robot, created, self.recording_id)
         self.stream = rr.RecordingStream(self.application, recording_id=self.recording_id)
         if not is_enabled(self.stream):
             why = "recording is disabled by the environment variable RERUN=off"

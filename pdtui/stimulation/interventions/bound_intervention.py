@@ -238,7 +238,7 @@ def _bind_imprint(
             grown = intervention.values.get(name, 0.0) + seconds * intervention.rates.get(name, 0.0)
             size = intervention.base.get(name, 0.0) + strength * grown
             if share < 1.0:  # the shorter way back
-                size = share * by_name[name].shortest(size)
+                size = share * by_name[name].wrap_size(size)
             observation = by_name[name].apply(observation, size)
         return observation
 

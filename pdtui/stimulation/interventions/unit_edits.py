@@ -85,7 +85,7 @@ class ImprintUnits(UnitEdit):
     def __init__(self, units: NDArray[np.int64], edit_observation: EditObservation) -> None:
         self.units, self.edit_observation = units, edit_observation
 
-    def seen_through(self, earlier: Sequence[EditObservation]) -> ImprintUnits:
+    def after_edits(self, earlier: Sequence[EditObservation]) -> ImprintUnits:
         """Return the imprint of an observation to which other edits come first."""
 
         def edit_observation(observation: Floats) -> Floats:

@@ -13,14 +13,14 @@ from textual.strip import Strip
 from pdtui.core.attributes import Floats, wrap_angle
 from pdtui.core.printable_text import make_printable
 from pdtui.driving.drive_snapshot import DriveSnapshot
-from pdtui.driving.ghost.ghost_snapshot import GhostMoment
+from pdtui.driving.ghost.ghost_snapshot import GhostPose
 from pdtui.tui.cell_text import ScreenRow, format_number, format_signed
 from pdtui.tui.ghost_drawing import describe_ghost
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 from pdtui.tui.widgets import sparklines
 from pdtui.tui.widgets.attribute_history import AttributeHistory
-from pdtui.tui.widgets.key_marks import KeyMarks
+from pdtui.tui.widgets.key_press_axis import KeyPressAxis
 
 _SECONDS = 12.0  # length of the history that a plot shows
 _ROWS_KEPT = 4096  # control steps
@@ -66,7 +66,7 @@ class AttributeTable(SnapshotWidget):
     _ghost_began = -1
 
     def on_mount(self) -> None:
-        self._keys = KeyMarks()
+        self._keys = KeyPressAxis()
 
     def remember(self, snapshot: DriveSnapshot) -> None:
         if self._history is None:
@@ -128,7 +128,7 @@ class AttributeTable(SnapshotWidget):
                 line.add(" " + said, STYLES.faint, layout.target)
             line.add(" ", STYLES.text)
             dim = STYLES.below if target is None else style
-            for text, is_below in sparklines.split_runs(plots[row], below[:, row]):
+            for text, is_below in sparklines.split_marked_text(plots[row], below[:, row]):
                 line.add(text, dim if is_below else style)
             strips.append(line.strip())
         return strips
@@ -145,14 +145,14 @@ class AttributeTable(SnapshotWidget):
             top, bottom = float(scales.top[row]), float(scales.bottom[row])
             pair = (self._begin_line(index, layout, targets), self._begin_ghost_line(index, layout, moment))
             for number, (line, end) in enumerate(zip(pair, (top, bottom), strict=True)):
-                said = sparklines.format_scale_end(end, top - bottom)
+                said = sparklines.format_scale_limit(end, top - bottom)
                 line.add(said + " ", STYLES.faint, _END, right=True)
                 if plots:
                     line.add_strip(plots[2 * row + number])
                 strips.append(line.strip())
         return strips
 
-    def _moment(self) -> GhostMoment | None:
+    def _moment(self) -> GhostPose | None:
         """Return the control step in which drive and ghost are compared, if any."""
         ghost = None if self.snapshot is None else self.snapshot.ghost
         return None if ghost is None or ghost.condition == "over" else ghost.latest
@@ -171,7 +171,7 @@ class AttributeTable(SnapshotWidget):
             line.add("" if target is None else f"→ {format_number(target)}", style, layout.target)
         return line
 
-    def _begin_ghost_line(self, index: int, layout: _Layout, moment: GhostMoment | None) -> ScreenRow:
+    def _begin_ghost_line(self, index: int, layout: _Layout, moment: GhostPose | None) -> ScreenRow:
         """Return a line with the value without the behavior, and by how much it is another."""
         assert self.facts is not None
         assert self.snapshot is not None
@@ -192,7 +192,7 @@ class AttributeTable(SnapshotWidget):
         history, steps = self._history, self._steps_per_point(layout)
         reach = f"last {layout.points * steps * self.facts.dt:.0f} s "
         line = ScreenRow(layout.width).add(reach, STYLES.faint, layout.width - layout.plot, right=True)
-        self._keys.add_axis(
+        self._keys.draw_axis(
             line,
             layout.plot,
             lambda step: history.cell_of(step, layout.points, steps) // max(1, layout.lines),

@@ -36,7 +36,7 @@ class PathTrail:
         if restarted and len(self.points):
             self.past, self.points, self.recent = self.points, np.empty((0, 3)), np.empty((0, 3))
             self._stride, self._skip = 1, 0
-        path = path[are_near(path)]
+        path = path[are_within_view(path)]
         self.recent = np.concatenate([self.recent, path])[-MOST_POINTS:]
         kept = path[self._skip :: self._stride]
         self._skip = (self._skip - len(path)) % self._stride
@@ -63,7 +63,7 @@ class PathTrail:
         return starts[joined, :2], ends[joined, :2], ends[joined, 2].astype(np.int16)
 
 
-def are_near(places: Floats) -> NDArray[np.bool_]:
+def are_within_view(places: Floats) -> NDArray[np.bool_]:
     """Return which places (..., n) are finite and near enough to be drawn, shape (...)."""
     near: NDArray[np.bool_] = np.asarray((np.abs(places) < _FARTHEST).all(axis=-1))
     return near

@@ -16,7 +16,7 @@ from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
-from pdtui.tui.widgets.path_trail import MOST_POINTS, PathTrail, are_near
+from pdtui.tui.widgets.path_trail import MOST_POINTS, PathTrail, are_within_view
 
 _ARROWS = "→↗↑↖←↙↓↘"
 _LEAST_SIZE = 2.0  # of the area shown, m
@@ -60,11 +60,11 @@ class PathView(SnapshotWidget):
         if began != self._ghost_began:
             self._ghost_path, self._ghost_began = np.empty((0, 2)), began
         if ghost is not None and ghost.path is not None:
-            near = ghost.path[are_near(ghost.path)]
+            near = ghost.path[are_within_view(ghost.path)]
             self._ghost_path = np.concatenate([self._ghost_path, near])[-MOST_POINTS:]
         if self.facts is not None and len(snapshot.poses):
             root = snapshot.poses[root_body_row(self.facts.links)]
-            if are_near(root):  # else the mark stays where it was
+            if are_within_view(root):  # else the mark stays where it was
                 ahead = rotate_vectors(root[3:], np.array([1.0, 0.0, 0.0]))
                 self._here = root[:2]
                 self._heading = atan2(float(ahead[1]), float(ahead[0]))

@@ -16,7 +16,7 @@ from pdtui.pictures.view_ahead import AHEAD, ViewAhead, frame_road, heading_on_g
 from pdtui.robots.geometry import capsule_ends, compute_link_poses, root_body_row
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.cell_text import ScreenRow, format_number
-from pdtui.tui.ghost_drawing import draw_ghost, point_to_ghost
+from pdtui.tui.ghost_drawing import draw_ghost, draw_ghost_arrow
 from pdtui.tui.obstacle_drawing import draw_obstacles_from_above, draw_obstacles_from_side
 from pdtui.tui.road_drawing import (
     RoadLineDrawing,
@@ -186,7 +186,7 @@ class RobotView(SnapshotWidget):
         if ghost is not None and ghost.latest is not None and len(ghost.latest.poses):
             poses = ghost.latest.poses
             draw_ghost(canvas, camera, self.facts.links, poses, _GHOST)
-            point_to_ghost(canvas, camera, poses[root_body_row(self.facts.links)], root, _GHOST)
+            draw_ghost_arrow(canvas, camera, poses[root_body_row(self.facts.links)], root, _GHOST)
 
     def _draw_heading(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
         """Draw the direction of the robot's own x axis as an arrow on the ground."""

@@ -36,7 +36,7 @@ class PlotScales(NamedTuple):
         """Whether 0 lies between the ends, shape (J,)."""
         return (self.bottom < 0.0) & (self.top > 0.0)
 
-    def shares(self, values: Floats) -> Floats:
+    def scale_to_unit(self, values: Floats) -> Floats:
         """Return how high values (n, J) lie: 0 at the lower end, 1 at the upper end."""
         shares: Floats = (values - self.bottom) / (self.top - self.bottom)
         return shares
@@ -60,7 +60,7 @@ def fit_scales(values: Floats, low: Floats, high: Floats) -> PlotScales:
 def draw_sparklines(means: Floats, scales: PlotScales) -> list[str]:
     """Return one line of block characters per column of means (cells, J)."""
     with np.errstate(invalid="ignore"):
-        share = np.nan_to_num(scales.shares(means))
+        share = np.nan_to_num(scales.scale_to_unit(means))
     level = np.where(np.isfinite(means), 1 + np.clip(share * 8, 0, 7), 0).astype(np.int64)
     text = _LEVELS[level.T]
     return [row.tobytes().decode("utf-32-le") for row in text]
@@ -75,10 +75,10 @@ def draw_line_plots(own: Floats, ghost: Floats, scales: PlotScales, styles: Sequ
     canvas = BrailleCanvas(points // DOTS_X, plots * ROWS_PER_PLOT)
     x = np.arange(points) + 0.5
 
-    def rows_of(values: Floats) -> Floats:
+    def dot_rows(values: Floats) -> Floats:
         """The rows of dots of values (n, J), shape (n, J)."""
         with np.errstate(invalid="ignore"):
-            within = np.clip(scales.shares(values), 0.0, 1.0)
+            within = np.clip(scales.scale_to_unit(values), 0.0, 1.0)
         rows: Floats = np.arange(plots) * _DOTS + 0.5 + (1.0 - within) * (_DOTS - 1)
         return rows
 
@@ -88,9 +88,9 @@ def draw_line_plots(own: Floats, ghost: Floats, scales: PlotScales, styles: Sequ
         canvas.draw_points(columns[shown], rows[::distance][shown], ink)
 
     zeros = np.where(scales.crosses_zero, 0.0, np.nan)
-    draw_dots(rows_of(np.broadcast_to(zeros, own.shape)), _DOTS_PER_ZERO, _ZERO)
-    draw_dots(rows_of(ghost), _DOTS_PER_GHOST, _GHOST)
-    rows = rows_of(own)
+    draw_dots(dot_rows(np.broadcast_to(zeros, own.shape)), _DOTS_PER_ZERO, _ZERO)
+    draw_dots(dot_rows(ghost), _DOTS_PER_GHOST, _GHOST)
+    rows = dot_rows(own)
     line = np.stack([np.broadcast_to(x[:, None], rows.shape), rows], axis=-1)
     starts, ends = line[:-1].reshape(-1, 2), line[1:].reshape(-1, 2)
     inks = np.tile(np.arange(plots, dtype=np.int16) + _FIRST_OWN, points - 1)
@@ -98,13 +98,13 @@ def draw_line_plots(own: Floats, ghost: Floats, scales: PlotScales, styles: Sequ
     return canvas.render_strips([STYLES.faint, STYLES.ghost, *styles])
 
 
-def split_runs(text: str, marked: NDArray[np.bool_]) -> list[tuple[str, bool]]:
+def split_marked_text(text: str, marked: NDArray[np.bool_]) -> list[tuple[str, bool]]:
     """Return the parts of a text in which all characters are marked, or none is, and which of the two."""
     cuts = [0, *(np.flatnonzero(marked[1:] != marked[:-1]) + 1).tolist(), len(text)]
     return [(text[a:b], bool(marked[a])) for a, b in pairwise(cuts) if a < b]
 
 
-def format_scale_end(value: float, span: float) -> str:
+def format_scale_limit(value: float, span: float) -> str:
     """Format an end of a scale with as many digits as tell it from the other, in about 6 characters."""
     if not math.isfinite(value):
         return ""

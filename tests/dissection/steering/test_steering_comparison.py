@@ -21,7 +21,7 @@ from pdtui.dissection.steering.steering_comparison import compare_steering
 from pdtui.dissection.steering.steering_results import SteeringComparison
 from pdtui.dissection.steering.steering_summary import steering_tables, summarise_steering
 from pdtui.probing.effect_probe import EffectProbe
-from pdtui.probing.intervention_plan import InterventionPlan
+from pdtui.probing.intervention_rollout_plan import InterventionRolloutPlan
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
 from pdtui.probing.stimulated_rollout import RolloutPlan
@@ -70,11 +70,11 @@ def test_the_unit_that_spins_steers_and_one_that_does_nothing_does_not(
 ) -> None:
     found = comparison.result_of(RATE, sign, SteeringMethod.PROBED_UNIT)
     assert found is not None
-    assert found.steers
+    assert found.beats_baseline
     assert found.candidate.source == f"0:{SPIN}"
     assert sign * found.measured.low > 0
     idle = comparison.result_of(RATE, sign, SteeringMethod.MATCHED_UNIT)
-    assert idle is None or not idle.steers
+    assert idle is None or not idle.beats_baseline
 
 
 def test_adding_along_the_probe_and_setting_its_reading_steer_and_random_directions_hardly_do(
@@ -83,7 +83,7 @@ def test_adding_along_the_probe_and_setting_its_reading_steer_and_random_directi
     for method in (SteeringMethod.DIRECTION, SteeringMethod.AFFINE):
         found = comparison.result_of(RATE, 1, method)
         assert found is not None
-        assert found.steers
+        assert found.beats_baseline
         assert found.main > 0
     drawn = comparison.result_of(RATE, 1, SteeringMethod.RANDOM_DIRECTION)
     along = comparison.result_of(RATE, 1, SteeringMethod.DIRECTION)
@@ -97,7 +97,7 @@ def test_a_reading_is_set_to_what_the_dose_says() -> None:
     with RolloutPool(Compass(), compass_policy(), 1) as pool:
         start = collect_start_states(pool.robot, pool.policy, 1000, 1, at=5)[0]
         pool.robot.restore(start.snapshot)
-        assert isinstance(one.plan, InterventionPlan)
+        assert isinstance(one.plan, InterventionRolloutPlan)
         stimulation = one.plan.bind(pool.robot, pool.policy)(0, pool.robot.read_attributes())
         acted = pool.policy.act(pool.robot.observe(), stimulation)
     # Twice the deviation of 0.5 above the mean of 0.
@@ -121,11 +121,11 @@ def test_plans_that_differ_only_in_their_vectors_are_told_apart() -> None:
     rows = np.eye(3, dtype=np.float32)
     intervention = Intervention("direction", vectors="along", coordinates=(1.0,))
     texts = {
-        repr(InterventionPlan(intervention, (LayerVectors("along", "0", rows[[number]]),)))
+        repr(InterventionRolloutPlan(intervention, (LayerVectors("along", "0", rows[[number]]),)))
         for number in range(3)
     }
     assert len(texts) == 3
-    again = InterventionPlan(intervention, (LayerVectors("along", "0", rows[[0]].copy()),))
+    again = InterventionRolloutPlan(intervention, (LayerVectors("along", "0", rows[[0]].copy()),))
     assert repr(again) in texts
 
 
@@ -134,7 +134,7 @@ def test_an_intervention_of_a_roll_out_does_what_the_same_stimulation_does() -> 
         starts = collect_start_states(pool.robot, pool.policy, 1000, 2, at=5)
         plans: list[RolloutPlan] = [
             Stimulation((SPIN,), (2.0,)),
-            InterventionPlan(Intervention("overwrite", values={f"0:{SPIN}": 2.0})),
+            InterventionRolloutPlan(Intervention("overwrite", values={f"0:{SPIN}": 2.0})),
         ]
         result = EffectProbe(pool).measure_plans(plans, starts, steps=20)
     np.testing.assert_array_equal(result.effects[0], result.effects[1])

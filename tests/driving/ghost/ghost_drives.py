@@ -11,8 +11,8 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.drive_events import DriveEvent
 from pdtui.driving.drive_config import DriveConfig
+from pdtui.driving.ghost.ghost_runner import GhostRunner
 from pdtui.driving.ghost.ghost_snapshot import GhostCondition, GhostSnapshot
-from pdtui.driving.ghost.ghost_tracker import GhostTracker
 from pdtui.driving.headless_drive import events_of_pressed_keys
 from pdtui.driving.loop_builder import build_control_loop
 
@@ -28,7 +28,7 @@ class GhostDrive:
 
     def __init__(self, config: DriveConfig) -> None:
         self.loop = build_control_loop(config)
-        self.tracker = GhostTracker(config, self.loop)
+        self.tracker = GhostRunner(config, self.loop)
         self.events: list[DriveEvent] = []
         self.digests: list[int] = []
         self.ghost_rows: list[Floats] = []

@@ -24,7 +24,7 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.evaluation.gait.gait_evaluation import evaluate_gait
 from pdtui.evaluation.gait.gait_tables import gait_tables
-from pdtui.evaluation.gait.walk_figures import find_foot_links
+from pdtui.evaluation.gait.walk_metrics import find_foot_links
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot
 from pdtui.stimulation.map_library import find_map

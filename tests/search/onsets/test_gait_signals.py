@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.attributes import Attribute, Floats
-from pdtui.search.onsets.gait_oscillations import find_gait_marks
+from pdtui.search.onsets.gait_signals import find_gait_marks
 
 DT = 0.02
 NAMES = ("foot height", "wobble", "noise", "way", "yaw", "slow")

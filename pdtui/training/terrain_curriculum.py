@@ -25,7 +25,7 @@ _LEVELS, _SEED = 6, 20_000
 _MARGIN = 1.0
 
 
-class LeggedTrainingGrounds:
+class TerrainCurriculum:
     """Models of one robot, with the friction and the ground of each robot of a batch.
 
     Attributes:
@@ -66,7 +66,7 @@ class LeggedTrainingGrounds:
         frictions = _FRICTIONS[-1]
         self.models = [self._shared[level][index % frictions] for index, level in enumerate(levels.tolist())]
 
-    def change_levels(
+    def update_levels(
         self, over: NDArray[np.bool_], fell: NDArray[np.bool_], rng: np.random.Generator
     ) -> None:
         """Send robots whose episode is over to rougher ground, or back if they fell.
@@ -80,7 +80,7 @@ class LeggedTrainingGrounds:
         moved[beyond] = rng.integers(0, _LEVELS, int(beyond.sum()))
         self.set_levels(moved)
 
-    def draw_places(
+    def sample_start_places(
         self, which: NDArray[np.bool_], rng: np.random.Generator
     ) -> tuple[Floats | float, Floats | float]:
         """Return places of chosen robots, x and y, shape (n, 2), and heights of the ground there, shape (n,).

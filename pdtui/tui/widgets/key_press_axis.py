@@ -16,7 +16,7 @@ _KEPT = 500  # key presses
 _SYMBOLS = {"space": "␣"}
 
 
-class KeyMarks:
+class KeyPressAxis:
     """The latest key presses, as marks on a time axis, in the colours of their behaviors."""
 
     def __init__(self) -> None:
@@ -26,12 +26,12 @@ class KeyMarks:
         """Add key presses."""
         self._presses.extend(presses)
 
-    def add_axis(self, line: ScreenRow, cells: int, cell_of: Callable[[int], int]) -> None:
+    def draw_axis(self, line: ScreenRow, cells: int, cell_of: Callable[[int], int]) -> None:
         """Add an axis of so many cells to a line; `cell_of` returns the cell of a control step."""
         marks: dict[int, tuple[str, Style]] = {}
         for press in self._presses:
             style = STYLES.title if press.behavior < 0 else STYLES.behavior(press.behavior)
-            marks[cell_of(press.step)] = (mark_of_key(press.key), style)
+            marks[cell_of(press.step)] = (key_symbol(press.key), style)
         blank = 0
         for cell in [*sorted(cell for cell in marks if 0 <= cell < cells), cells]:
             line.add("─" * (cell - blank), STYLES.faint)
@@ -39,7 +39,7 @@ class KeyMarks:
             blank = cell + 1
 
 
-def mark_of_key(key: str) -> str:
+def key_symbol(key: str) -> str:
     """Return one cell that stands for a key."""
     name = _SYMBOLS.get(key) or displayed_key_name(key)
     return name if cell_len(name) == 1 else next((sign for sign in name if cell_len(sign) == 1), "·")

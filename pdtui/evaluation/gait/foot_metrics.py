@@ -15,7 +15,7 @@ Contacts = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class FootFigures:
+class FootMetrics:
     """How one foot walks.
 
     Attributes:
@@ -33,7 +33,7 @@ class FootFigures:
     slip: float
 
 
-def align_contacts(reported: Contacts, delays: Sequence[int]) -> Contacts:
+def undo_contact_delays(reported: Contacts, delays: Sequence[int]) -> Contacts:
     """Return the contacts at each control step, shape (T − longest delay, F).
 
     Args:
@@ -52,7 +52,9 @@ def find_touchdowns(contacts: Contacts) -> Contacts:
     return touchdowns
 
 
-def measure_foot(contact: NDArray[np.bool_], height: Floats, sole_speed: Floats, dt: float) -> FootFigures:
+def compute_foot_metrics(
+    contact: NDArray[np.bool_], height: Floats, sole_speed: Floats, dt: float
+) -> FootMetrics:
     """Return the figures of one foot.
 
     Args:
@@ -63,7 +65,7 @@ def measure_foot(contact: NDArray[np.bool_], height: Floats, sole_speed: Floats,
     """
     stands = contact[1:] & contact[:-1]
     clearances = measure_clearances(contact, height)
-    return FootFigures(
+    return FootMetrics(
         float(find_touchdowns(contact[:, None]).sum() / ((len(contact) - 1) * dt)),
         float(contact.mean()),
         float(clearances.mean()) if len(clearances) else float("nan"),
@@ -86,7 +88,7 @@ def measure_clearances(contact: NDArray[np.bool_], height: Floats) -> Floats:
     return np.array(found)
 
 
-def share_by_feet_down(contacts: Contacts) -> Floats:
+def time_share_by_feet_down(contacts: Contacts) -> Floats:
     """Return the share of the time on 0, 1, … and all F feet, shape (F + 1,)."""
     feet = contacts.shape[1]
     shares: Floats = np.bincount(contacts.sum(axis=1), minlength=feet + 1) / len(contacts)

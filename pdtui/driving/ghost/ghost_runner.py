@@ -15,8 +15,8 @@ from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.ghost.ghost_process import GhostProcess
-from pdtui.driving.ghost.ghost_simulation import GhostStart, GhostStep
-from pdtui.driving.ghost.ghost_snapshot import GhostMoment, GhostSnapshot
+from pdtui.driving.ghost.ghost_simulation import GhostStart, GhostStepResult
+from pdtui.driving.ghost.ghost_snapshot import GhostPose, GhostSnapshot
 from pdtui.stimulation.latched_behavior import LatchState
 
 MOST_BEHIND = 2000
@@ -25,7 +25,7 @@ _TAKEOVER = ("takeover", "control", "hand back")
 _NOTHING_LATCHED = LatchState([], {}, None)
 
 
-class GhostTracker(Closable):
+class GhostRunner(Closable):
     """Begins and ends the ghost of a drive: the twin that runs on without the behavior.
 
     While it is on, a ghost begins whenever a behavior is latched, in the state of that step, and follows the
@@ -46,7 +46,7 @@ class GhostTracker(Closable):
         self._process: GhostProcess | None = None
         self._turned_on = False
         self._first = -1
-        self._latest: GhostMoment | None = None
+        self._latest: GhostPose | None = None
         self._unmatched: dict[int, Floats] = {}
         self._ended = self._failure = ""
         self.notice = ""
@@ -94,7 +94,7 @@ class GhostTracker(Closable):
         steps = self._process.take_steps()
         for step in steps:
             own = self._unmatched.pop(step.step)
-            self._latest = GhostMoment(step.step + 1, step.attributes, own, step.poses)
+            self._latest = GhostPose(step.step + 1, step.attributes, own, step.poses)
             self._ended = step.ended
         if self._ended:
             self._unmatched.clear()
@@ -148,6 +148,6 @@ class GhostTracker(Closable):
         self._failure = self.notice = reason
 
 
-def _path(steps: Sequence[GhostStep]) -> Floats:
+def _path(steps: Sequence[GhostStepResult]) -> Floats:
     places = [step.poses[0, :2] for step in steps if len(step.poses)]
     return np.array(places).reshape(-1, 2)

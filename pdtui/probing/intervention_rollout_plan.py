@@ -18,7 +18,7 @@ ControlStepStimulation = Callable[[int, Floats], Stimulation]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class InterventionPlan:
+class InterventionRolloutPlan:
     """An intervention that acts at full strength from the start of a roll-out on. It has no phase gate.
 
     Attributes:
@@ -34,7 +34,7 @@ class InterventionPlan:
         digest = blake2b(digest_size=16)
         for one in self.vectors:
             digest.update(f"{one.name} {one.layer} {one.rows.shape}".encode() + one.rows.tobytes())
-        return f"InterventionPlan({self.intervention!r}, {digest.hexdigest()})"
+        return f"InterventionRolloutPlan({self.intervention!r}, {digest.hexdigest()})"
 
     def bind(self, robot: Robot, policy: Policy) -> ControlStepStimulation:
         """Return what it does at each control step.

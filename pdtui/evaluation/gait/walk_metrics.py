@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError
 from pdtui.core.robot_links_and_state import Link
-from pdtui.evaluation.gait.gait_figures import (
+from pdtui.evaluation.gait.foot_metrics import (
     Contacts,
-    FootFigures,
+    FootMetrics,
+    compute_foot_metrics,
     measure_alternation,
-    measure_foot,
     measure_tilt,
     measure_walking_speed,
-    share_by_feet_down,
+    time_share_by_feet_down,
 )
 from pdtui.evaluation.gait.quadruped_gaits import PLACES, PhaseLags, measure_phase_lags
 from pdtui.evaluation.gait.sole_motion import find_soles, measure_sole_speeds
@@ -27,7 +27,7 @@ CONTACT_HEIGHT = 0.01
 
 
 @dataclass(frozen=True)
-class WalkFigures:
+class WalkMetrics:
     """The figures of one walk.
 
     Attributes:
@@ -41,7 +41,7 @@ class WalkFigures:
     """
 
     seconds: float
-    feet: tuple[FootFigures, ...]
+    feet: tuple[FootMetrics, ...]
     feet_down: tuple[float, ...]
     alternation: float
     lags: PhaseLags | None
@@ -68,9 +68,9 @@ def find_foot_links(robot: Robot) -> list[Link]:
     return [by_name[foot.link] for foot in robot.feet]
 
 
-def measure_walk(
+def compute_walk_metrics(
     robot: Robot, links: Sequence[Link], poses: Floats, contacts: Contacts | None
-) -> WalkFigures:
+) -> WalkMetrics:
     """Return the figures of a walk.
 
     Args:
@@ -90,10 +90,10 @@ def measure_walk(
     if sorted(places) == sorted(PLACES):
         ordered = [places.index(place) for place in PLACES]
         lags = measure_phase_lags(contacts[:, ordered])
-    return WalkFigures(
+    return WalkMetrics(
         len(poses) * dt,
-        tuple(measure_foot(contacts[:, one], heights[:, one], speeds[:, one], dt) for one in columns),
-        tuple(share_by_feet_down(contacts).tolist()),
+        tuple(compute_foot_metrics(contacts[:, one], heights[:, one], speeds[:, one], dt) for one in columns),
+        tuple(time_share_by_feet_down(contacts).tolist()),
         measure_alternation(contacts) if len(links) == 2 else float("nan"),
         lags,
         measure_walking_speed(trunk[:, :2], dt),

@@ -17,7 +17,7 @@ _UNCUT = 10_000
 """Columns that are wide enough for every table."""
 
 
-def describe_copied_map(path: Path, output: Path) -> str:
+def describe_map_copy(path: Path, output: Path) -> str:
     """Return what to add where a changed map was written into another file than its own."""
     return "" if output == path else f"; it is a copy, since {path} comes with pdtui and is not changed"
 

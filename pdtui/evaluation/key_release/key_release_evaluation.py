@@ -26,7 +26,7 @@ LAST_BINS = 8
 
 
 @dataclass(frozen=True)
-class BehaviorRelease:
+class KeyReleaseResult:
     """What happens once a behavior is let go.
 
     Attributes:
@@ -56,24 +56,24 @@ class BehaviorRelease:
 
 
 @dataclass(frozen=True)
-class ReleaseEvaluation:
+class KeyReleaseEvaluation:
     """What happens once the behaviors of a map are let go."""
 
     robot: str
     policy: str
     seeds: tuple[int, ...]
     followed: int
-    behaviors: tuple[BehaviorRelease, ...]
+    behaviors: tuple[KeyReleaseResult, ...]
 
 
-def evaluate_releases(
+def evaluate_key_releases(
     config: DriveConfig,
     seeds: Sequence[int],
     *,
     held: int | None = None,
     workers: int = 1,
     progress: StepProgress | None = None,
-) -> ReleaseEvaluation:
+) -> KeyReleaseEvaluation:
     """Hold each behavior of a map, let it go, and watch for 300 control steps.
 
     It is pressed at the step that the seed draws, as `evaluate_behaviors` does. Behaviors of mode ``pid`` are
@@ -103,12 +103,12 @@ def evaluate_releases(
     traces = {(plan.behavior, plan.seed): trace for plan, trace in zip(plans, found, strict=True)}
     attributes = [attribute.name for attribute in loop.robot.attributes]
     column = attributes.index("speed") if "speed" in attributes else None
-    return ReleaseEvaluation(
+    return KeyReleaseEvaluation(
         loop.robot.name,
         loop.policy.name,
         tuple(seeds),
         FOLLOWED_STEPS,
-        tuple(summarise_release(name, seeds, times, traces, column) for name in names),
+        tuple(summarise_key_release(name, seeds, times, traces, column) for name in names),
     )
 
 
@@ -119,13 +119,13 @@ def _plan_times(loop: ControlLoop, name: str, seed: int, held: int) -> RunTimes:
     return RunTimes(usual.press, steps, FOLLOWED_STEPS, usual.window, usual.bin, dt)
 
 
-def summarise_release(
+def summarise_key_release(
     name: str,
     seeds: Sequence[int],
     times: Mapping[tuple[str, int], RunTimes],
     traces: Mapping[tuple[str, int], HeldRunTrace],
     column: int | None,
-) -> BehaviorRelease:
+) -> KeyReleaseResult:
     """Return the figures of one behavior.
 
     Args:
@@ -142,7 +142,7 @@ def summarise_release(
     failed = sum(end is not None for end in let_go)
     by_itself = [end for end in alone if end is None or end >= held]
     low, high = share_interval(failed, len(let_go)) if let_go else (float("nan"), float("nan"))
-    return BehaviorRelease(
+    return KeyReleaseResult(
         name,
         held,
         len(seeds) - len(let_go),

@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from pdtui.evaluation.gait.gait_figures import (
-    align_contacts,
+from pdtui.evaluation.gait.foot_metrics import (
+    compute_foot_metrics,
     find_touchdowns,
     measure_alternation,
     measure_clearances,
-    measure_foot,
     measure_tilt,
     measure_walking_speed,
-    share_by_feet_down,
+    time_share_by_feet_down,
+    undo_contact_delays,
 )
 
 
@@ -33,7 +33,7 @@ def test_the_figures_of_a_foot() -> None:
     contact = _contacts("##..##..###")[:, 0]
     height = np.array([0.0, 0.0, 0.1, 0.2, 0.1, 0.1, 0.3, 0.2, 0.0, 0.0, 0.0])
     sole_speed = np.array([0.5, 9.0, 9.0, 9.0, 0.1, 9.0, 9.0, 9.0, 0.3, 0.3])
-    foot = measure_foot(contact, height, sole_speed, 0.1)
+    foot = compute_foot_metrics(contact, height, sole_speed, 0.1)
     assert foot.touchdown_rate == pytest.approx(2.0)  # 2 in 10 intervals of 0.1 s
     assert foot.duty_factor == pytest.approx(7 / 11)
     assert foot.clearance == pytest.approx(0.2)  # 0.2 above 0.0, then 0.3 above 0.1
@@ -43,14 +43,14 @@ def test_the_figures_of_a_foot() -> None:
 def test_swings_that_the_walk_cuts_off_have_no_clearance() -> None:
     contact = _contacts("..##..")[:, 0]
     assert len(measure_clearances(contact, np.arange(6.0))) == 0
-    foot = measure_foot(np.zeros(6, bool), np.ones(6), np.ones(5), 0.1)
+    foot = compute_foot_metrics(np.zeros(6, bool), np.ones(6), np.ones(5), 0.1)
     assert math.isnan(foot.clearance)
     assert math.isnan(foot.slip)
     assert (foot.touchdown_rate, foot.duty_factor) == (0.0, 0.0)
 
 
 def test_the_time_is_shared_out_by_the_number_of_feet_on_the_ground() -> None:
-    shares = share_by_feet_down(_contacts("##..", "#.#."))
+    shares = time_share_by_feet_down(_contacts("##..", "#.#."))
     np.testing.assert_allclose(shares, [0.25, 0.5, 0.25])
 
 
@@ -74,7 +74,7 @@ def test_one_touchdown_cannot_alternate() -> None:
 
 
 def test_contacts_that_are_reported_late_are_moved_back() -> None:
-    aligned = align_contacts(_contacts(".##.", "..#."), (0, 1))
+    aligned = undo_contact_delays(_contacts(".##.", "..#."), (0, 1))
     np.testing.assert_array_equal(aligned, _contacts(".##", ".#."))
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from rich.table import Table
 
 from pdtui.core.text_tables import format_seed_range, new_table
-from pdtui.evaluation.release.release_evaluation import WALKS_ON, ReleaseEvaluation
+from pdtui.evaluation.key_release.key_release_evaluation import WALKS_ON, KeyReleaseEvaluation
 
 
-def release_table(result: ReleaseEvaluation) -> Table:
+def key_release_table(result: KeyReleaseEvaluation) -> Table:
     """Return one row per behavior."""
     table = new_table(
         f"Letting go: {result.robot}, policy {result.policy}, {format_seed_range(result.seeds)}",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from pdtui.cli.output.printed_result import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result, progress_bar
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
@@ -41,11 +41,13 @@ def print_policy_alone(config: DriveConfig, seeds: range, as_json: bool, *, gait
         print_result(asdict(result), as_json, lambda: policy_evaluation_table(result))
 
 
-def print_releases(config: DriveConfig, seeds: range, held: int | None, workers: int, as_json: bool) -> None:
+def print_key_releases(
+    config: DriveConfig, seeds: range, held: int | None, workers: int, as_json: bool
+) -> None:
     """Measure what happens once each behavior is let go, and print it."""
-    from pdtui.evaluation.release.release_evaluation import evaluate_releases
-    from pdtui.evaluation.release.release_table import release_table
+    from pdtui.evaluation.key_release.key_release_evaluation import evaluate_key_releases
+    from pdtui.evaluation.key_release.key_release_table import key_release_table
 
     with progress_bar("letting go", quiet=as_json) as advance:
-        result = evaluate_releases(config, seeds, held=held, workers=workers, progress=advance)
-    print_result(asdict(result), as_json, lambda: release_table(result))
+        result = evaluate_key_releases(config, seeds, held=held, workers=workers, progress=advance)
+    print_result(asdict(result), as_json, lambda: key_release_table(result))

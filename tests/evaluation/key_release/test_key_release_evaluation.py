@@ -11,9 +11,13 @@ from pdtui.cli import main
 from pdtui.core.outcome import Outcome
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.held_run import HeldRunTrace
+from pdtui.evaluation.key_release.key_release_evaluation import (
+    FOLLOWED_STEPS,
+    evaluate_key_releases,
+    summarise_key_release,
+)
+from pdtui.evaluation.key_release.key_release_table import key_release_table
 from pdtui.evaluation.protocol_settings import RunTimes
-from pdtui.evaluation.release.release_evaluation import FOLLOWED_STEPS, evaluate_releases, summarise_release
-from pdtui.evaluation.release.release_table import release_table
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 HELD, BIN = 40, 5
@@ -44,7 +48,7 @@ def test_falls_count_by_whether_they_come_before_or_after_the_release() -> None:
     seeds = range(len(held))
     traces = {("it", seed): trace for seed, trace in zip(seeds, held, strict=True)}
     traces |= {("", seed): trace for seed, trace in zip(seeds, alone, strict=True)}
-    row = summarise_release("it", seeds, {("it", seed): TIMES for seed in seeds}, traces, 0)
+    row = summarise_key_release("it", seeds, {("it", seed): TIMES for seed in seeds}, traces, 0)
     assert (row.failed_while_held, row.let_go, row.failed) == (2, 5, 2)
     assert row.low < 2 / 5 < row.high
     assert (row.failed_by_itself, row.by_itself) == (1, 6)
@@ -59,7 +63,7 @@ def config(small_map: StimulationMap) -> DriveConfig:
 
 def test_every_behavior_without_a_target_is_held_and_let_go(config: DriveConfig) -> None:
     told: list[tuple[int, int]] = []
-    result = evaluate_releases(config, (3, 4), held=20, progress=lambda done, of: told.append((done, of)))
+    result = evaluate_key_releases(config, (3, 4), held=20, progress=lambda done, of: told.append((done, of)))
     assert [row.behavior for row in result.behaviors] == ["push", "twitch"]
     assert [row.held for row in result.behaviors] == [20, 10]  # twitch has a period of 0.5 s
     for row in result.behaviors:
@@ -68,7 +72,7 @@ def test_every_behavior_without_a_target_is_held_and_let_go(config: DriveConfig)
     assert told[-1] == (6, 6)
     console = Console(width=120)
     with console.capture() as shown:
-        console.print(release_table(result))
+        console.print(key_release_table(result))
     assert "twitch" in shown.get()
     assert "hold heading" not in shown.get()
 

@@ -9,7 +9,7 @@ from pdtui.core.reserved_keys import KeyAllocator
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.steering.steering_results import SteeringResult
-from pdtui.probing.intervention_plan import InterventionPlan
+from pdtui.probing.intervention_rollout_plan import InterventionRolloutPlan
 from pdtui.stimulation.interventions.intervention import LayerVectors
 from pdtui.stimulation.stimulation_map import Behavior
 
@@ -53,10 +53,10 @@ def _strongest_other_way(dissection: Dissection, column: int, sign: int) -> Stee
         one
         for one in dissection.steering.results
         if (one.column, one.sign) == (column, sign)
-        and one.steers
+        and one.beats_baseline
         and not one.measured.falls
         and one.p_random is not None
-        and isinstance(one.candidate.plan, InterventionPlan)
+        and isinstance(one.candidate.plan, InterventionRolloutPlan)
     ]
     return max(ways, key=lambda one: one.main, default=None)
 
@@ -76,7 +76,7 @@ def _draft_behavior(
         units = found.stimulation.by_address(dissection.layers)
         return Behavior(name, key, f"{verb} {attribute}{says}", units, aim=aim, measured=found.measured), []
     plan = found.candidate.plan
-    assert isinstance(plan, InterventionPlan)
+    assert isinstance(plan, InterventionRolloutPlan)
     renamed = {one.name: f"{name}: {one.name}" for one in plan.vectors}
     own = plan.intervention
     intervention = replace(

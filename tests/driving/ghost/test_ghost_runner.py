@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.ghost import ghost_tracker
+from pdtui.driving.ghost import ghost_runner
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
 from pdtui.policies.weights.weights_file import hash_file, save_network
@@ -147,7 +147,7 @@ def test_a_ghost_whose_own_episode_is_over_says_how_and_stays(tmp_path: Path) ->
 def test_a_ghost_that_is_too_far_behind_is_given_up(
     small_map: StimulationMap, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ghost_tracker, "MOST_BEHIND", 30)
+    monkeypatch.setattr(ghost_runner, "MOST_BEHIND", 30)
     with ghost_drive(DriveConfig("ant", small_map, 3)) as drive:
         drive.run(40, "w")  # the ghost's process is still loading
         ghost = drive.wait_for("failed")

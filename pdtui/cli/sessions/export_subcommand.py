@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     "--format",
     "form",
     type=click.Choice(EXPORT_FORMATS),
-    help="Format of the table; default: by the extension of the file. MCAP needs pip install 'pdtui[export]'.",
+    help="Format of the table; default: from the file's extension. MCAP needs pip install 'pdtui[export]'.",
 )
 @click.option(
     "-o",
@@ -56,7 +56,7 @@ def export_command(
     `pdtui drive --headless --keys` reads the keystrokes.
     """
     from pdtui.sessions.export.export_streams import STREAMS
-    from pdtui.sessions.export.session_export import export_all_streams, export_stream
+    from pdtui.sessions.export.export_writer import export_all_streams, export_stream
 
     if (stream is None) != (output is None):
         raise SessionError("--stream and -o must be given together")

@@ -21,7 +21,7 @@ from pdtui.sessions.export.export_streams import (
     event_columns,
     observation_columns,
 )
-from pdtui.sessions.export.table_files import choose_export_format, concatenate_streams, open_table_file
+from pdtui.sessions.export.table_writers import choose_export_format, concatenate_streams, open_table_file
 from pdtui.sessions.session_header import SessionHeader, read_session_header
 from pdtui.sessions.session_reader import require_activations
 from pdtui.sessions.session_schema import ExportFormat
