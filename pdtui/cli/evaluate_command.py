@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from pdtui.cli.drive_command import require_terminal
 from pdtui.cli.evaluate.paper_experiments import (
     EXPERIMENTS,
     check_experiment,
     experiment_options,
     run_experiment,
 )
+from pdtui.cli.evaluate.printed_behaviors import print_behaviors
 from pdtui.cli.evaluate.printed_measurements import (
     print_key_releases,
     print_policy_alone,
     print_target_tracking,
 )
-from pdtui.cli.evaluate.run_watching import watch_runs
 from pdtui.cli.options.robot_option_flag import robot_option_flag
 from pdtui.cli.options.shared_options import (
     FILE_PATH,
@@ -38,14 +36,8 @@ from pdtui.cli.options.shared_options import (
     start_option,
     workers_option,
 )
-from pdtui.cli.output.command_output import describe_map_copy, print_result, progress_bar
 from pdtui.core.errors import MapError
-from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
-
-if TYPE_CHECKING:
-    from pdtui.driving.drive_config import DriveConfig
-    from pdtui.evaluation.protocol_settings import ProtocolSettings
 
 
 @experiment_options
@@ -205,54 +197,7 @@ def evaluate_command(
 
         settings, drawn = choose_protocol(quick=quick, hold=hold), (strip, overwrite) if strip else None
         seeds = seeds[:QUICK_SEEDS] if quick else seeds
-        _evaluate_behaviors(
-            config, seeds, settings, workers, drawn, watch=watch, update=update, as_json=as_json
-        )
-
-
-def _evaluate_behaviors(
-    config: DriveConfig,
-    seeds: range,
-    settings: ProtocolSettings,
-    workers: int,
-    drawn: tuple[Path, bool] | None,
-    *,
-    watch: bool,
-    update: bool,
-    as_json: bool,
-) -> None:
-    from pdtui.evaluation import behavior_evaluation as evaluation
-    from pdtui.evaluation.behavior_tables import behavior_tables
-    from pdtui.evaluation.ranked_runs import rank_runs
-    from pdtui.pictures.behavior_strips import draw_strips, film_strips
-    from pdtui.pictures.matplotlib_page import check_figure_path
-    from pdtui.stimulation.map_library import user_map_path
-    from pdtui.stimulation.map_writer import replace_effects, rewrite_map
-
-    source = Path(config.stimulation_map.source)
-    output = user_map_path(source) if update else source
-    if update and len(seeds) < 2:
-        raise MapError("--update needs at least 2 seeds: one seed gives no confidence interval")
-    if drawn is not None:
-        check_figure_path(*drawn)
-    if watch:
-        require_terminal()
-    plan = evaluation.plan_evaluation(config, seeds, settings)
-    if not as_json:
-        click.echo(f"{evaluation.count_control_steps(plan):,} control steps, {workers} processes", err=True)
-    with progress_bar("evaluating", quiet=as_json) as advance:
-        result = evaluation.evaluate_behaviors(config, plan, workers=workers, progress=advance)
-    if update:
-        measured = result.measured_effects()
-        rewrite_map(source, lambda text: replace_effects(text, measured, str(source)), output)
-        told = f"{output}: wrote the effects{describe_map_copy(source, output)}"
-        click.echo(make_printable(told), err=True)
-    print_result(asdict(result), as_json, lambda: behavior_tables(result))
-    if drawn is not None:
-        with progress_bar("filming", quiet=as_json) as advance:
-            draw_strips(drawn[0], plan, film_strips(plan, rank_runs(plan, result), advance))
-    if watch:
-        watch_runs(plan, rank_runs(plan, result))
+        print_behaviors(config, seeds, settings, workers, drawn, watch=watch, update=update, as_json=as_json)
 
 
 def _check_modes(modes: Mapping[str, Any], behaviors_only: Mapping[str, Any]) -> None:
