@@ -21,7 +21,8 @@ from tests.real_viewer import RealViewer, free_port, is_blank
 
 
 def run(*arguments: str | Path | int) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+    # A worker of xdist would say how wide its terminal is.
+    return CliRunner().invoke(main, [str(argument) for argument in arguments], env={"COLUMNS": None})
 
 
 @pytest.fixture

@@ -30,7 +30,8 @@ KEYS = "10 w\n20 t\n30 space\n35 h\n40 left\n50 r\n"
 
 
 def run(*arguments: str | Path | int, columns: int | None = None) -> Result:
-    environment = None if columns is None else {"COLUMNS": str(columns)}
+    # Without it, a worker of xdist would say how wide its terminal is.
+    environment = {"COLUMNS": None if columns is None else str(columns)}
     return CliRunner().invoke(main, [str(argument) for argument in arguments], env=environment)
 
 
