@@ -48,6 +48,20 @@ def test_the_authors_policy_walks_as_fast_as_measured(observed: float, speed: fl
     assert abs(_value(robot, "yaw")) < 0.4  # it sways
 
 
+@pytest.mark.parametrize("command", [0.5, 1.5])
+def test_the_shipped_policy_walks_on_rough_ground_as_fast_as_it_is_told(command: float) -> None:
+    robot, policy = Cassie(terrain="rough"), load_policy("cassie")
+    robot.reset(seed=100)
+    robot.set_commands({"forward": command, "heading": 0.0})
+    observation, speeds = robot.observe(), []
+    for _ in range(400):
+        observation, _, terminated, _, _ = robot.step(policy.act(observation).action)
+        assert not terminated
+        speeds.append(_value(robot, "forward"))
+    assert np.mean(speeds[150:]) == pytest.approx(command, abs=0.2)
+    assert abs(_value(robot, "yaw")) < 0.5
+
+
 def test_it_weighs_what_the_figures_say_and_stands_on_its_toes(cassie: Cassie) -> None:
     assert cassie.model.body_mass.sum() == pytest.approx(30.37, abs=0.01)
     for _ in range(15):
