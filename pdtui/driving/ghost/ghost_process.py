@@ -16,9 +16,9 @@ from pdtui.driving.ghost.ghost_simulation import (
     GhostStart,
     GhostStepInput,
     GhostStepResult,
+    answer_when_loaded,
     build_ghost_loop,
     run_ghost,
-    warm_up_ghost,
 )
 
 _STEPS_PER_CALL = 10  # control steps; a ghost that has fallen behind still hears soon of a new start
@@ -95,7 +95,7 @@ class GhostProcess(Closable):
 
     def _serve(self, worker: WorkerProcess) -> None:
         try:
-            worker.send(warm_up_ghost)
+            worker.send(answer_when_loaded)
             worker.receive()
             self.loaded = True
             while not self._closed:

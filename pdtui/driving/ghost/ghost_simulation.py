@@ -65,8 +65,8 @@ def build_ghost_loop(config: DriveConfig) -> ControlLoop:
     return loop
 
 
-def warm_up_ghost(loop: ControlLoop) -> None:
-    """Do nothing, with a loop that has been built for it."""
+def answer_when_loaded(loop: ControlLoop) -> None:
+    """Return once the loop has been built, which says that robot and policy are loaded."""
     del loop
 
 

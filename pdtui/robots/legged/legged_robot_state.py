@@ -55,7 +55,7 @@ class LeggedRobotState:
     height: Floats
 
     @cached_property
-    def linear(self) -> Floats:
+    def linear_velocity(self) -> Floats:
         """The trunk's velocity in its own frame, m/s, shape (n, 3)."""
         return rotate_vectors(self.qpos[:, 3:7] * _CONJUGATE, self.qvel[:, :3])
 

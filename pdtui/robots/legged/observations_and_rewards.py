@@ -39,7 +39,7 @@ def compute_legged_observations(motion: LeggedRobotState, description: LeggedRob
     """
     parts = [
         motion.height[:, None],
-        LINEAR_SCALE * motion.linear,
+        LINEAR_SCALE * motion.linear_velocity,
         ANGULAR_SCALE * motion.qvel[:, 3:6],
         -motion.up,
         (motion.command * COMMAND_SCALES)[:, : description.observed_commands],
@@ -83,7 +83,7 @@ def compute_legged_rewards(
     touching = motion.touching
     landed = touching & (air_time > 0.0)
     moving = (np.linalg.norm(motion.command, axis=1) > _MIN_COMMAND).astype(np.float64)
-    error = motion.command[:, :2] - motion.linear[:, :2]
+    error = motion.command[:, :2] - motion.linear_velocity[:, :2]
     yaw_error = motion.command[:, 2] - motion.qvel[:, 5]
     foot_speed = np.linalg.norm(motion.feet_velocity[:, :, :2], axis=2)
     too_low = np.minimum(0.0, motion.feet_height - weights.swing_height)
@@ -93,7 +93,7 @@ def compute_legged_rewards(
     reward = (
         weights.velocity * np.exp(-np.square(error).sum(1) / weights.tracking_width)
         + weights.yaw_rate * np.exp(-np.square(yaw_error) / weights.tracking_width)
-        - weights.vertical_speed * np.square(motion.linear[:, 2])
+        - weights.vertical_speed * np.square(motion.linear_velocity[:, 2])
         - weights.tilt_rate * np.square(motion.qvel[:, 3:5]).sum(1)
         - weights.tilt * np.square(motion.up[:, :2]).sum(1)
         - weights.torque * np.square(motion.torque).sum(1)
