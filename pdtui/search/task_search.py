@@ -117,7 +117,7 @@ class TaskSearch:
         search_score, best = self._search_again_and_again(problem, deadline, progress)
         if settings.onset:
             seeds, fresh = (self._seeds(stage, settings.selection_seeds) for stage in (1, 2))
-            best = search_onset(self._pool, best, seeds, fresh, self._judge)
+            best = search_onset(self._pool, best, seeds, fresh, self._judge, start=self._task.start)
         plans, seeds = [best, StimulationWithDuration()], JUDGING_SEEDS[-settings.held_out_seeds :]
         verdicts, untouched = map(tuple, self._judge(plans, seeds))
         return TaskSearchResult(

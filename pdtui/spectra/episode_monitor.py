@@ -41,22 +41,29 @@ class MonitoredEpisode:
 
 
 def monitor_episodes(
-    robot: Robot, policy: Policy, seeds: Sequence[int], steps: int, progress: StepProgress | None = None
+    robot: Robot,
+    policy: Policy,
+    seeds: Sequence[int],
+    steps: int,
+    progress: StepProgress | None = None,
+    *,
+    start: str = "",
 ) -> list[MonitoredEpisode]:
     """Run one episode per seed with the policy's mean action and no stimulation (section 3.2, "monitoring").
 
-    The paper uses five episodes. Each lasts at most `steps` control steps.
+    The paper uses five episodes. Each lasts at most `steps` control steps, and begins in the state `start`,
+    or in the robot's usual one.
     """
     episodes = []
     for seed in seeds:
-        episodes.append(_record(robot, policy, seed, steps))
+        episodes.append(_record(robot, policy, seed, steps, start))
         if progress is not None:
             progress(len(episodes), len(seeds))
     return episodes
 
 
-def _record(robot: Robot, policy: Policy, seed: int, steps: int) -> MonitoredEpisode:
-    observation, _ = robot.reset(seed=seed)
+def _record(robot: Robot, policy: Policy, seed: int, steps: int, start: str) -> MonitoredEpisode:
+    observation, _ = robot.reset(seed=seed, options={"start": start} if start else None)
     policy.reset()
     activations, attributes, ended = [], [], ""
     for _ in range(steps):

@@ -34,6 +34,15 @@ def test_angles_do_not_jump(policy_file: Path) -> None:
                 assert np.abs(np.diff(one.attributes[:, column])).max() < np.pi
 
 
+def test_walks_begin_in_the_state_that_is_asked_for() -> None:
+    robot, policy = make_robot("cassie"), load_policy("cassie")
+    plane, rough = (monitor_episodes(robot, policy, [5], 4, start=start)[0] for start in ("", "rough"))
+    assert not np.array_equal(plane.attributes, rough.attributes)
+    observation, _ = robot.reset(seed=5, options={"start": "rough"})
+    robot.step(policy.act(observation).action)
+    np.testing.assert_array_equal(rough.attributes[0], robot.read_attributes())
+
+
 def test_scales_bring_torques_to_the_size_of_commands(policy_file: Path) -> None:
     robot, policy = make_robot("ant"), load_policy(policy_file)
     (recorded,) = monitor_episodes(robot, policy, [1], 20)

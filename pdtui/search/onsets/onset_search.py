@@ -26,6 +26,8 @@ def search_onset(
     seeds: Sequence[int],
     fresh: Sequence[int],
     judge: JudgePlans,
+    *,
+    start: str = "",
 ) -> StimulationWithDuration:
     """Return the plan with the onset that does a task on most walks, or as it is if none does better.
 
@@ -37,9 +39,10 @@ def search_onset(
         seeds: Seeds of the walks on which an onset is chosen.
         fresh: Seeds of the walks on which it is compared with none.
         judge: Runs the roll-outs.
+        start: State in which the walks begin; empty for the robot's usual one.
     """
     robot = pool.robot
-    episodes = monitor_episodes(robot, pool.policy, seeds[:_WALKS], _WALKED_STEPS)
+    episodes = monitor_episodes(robot, pool.policy, seeds[:_WALKS], _WALKED_STEPS, start=start)
     walks = [episode.attributes[_SKIPPED:] for episode in episodes if episode.steps > _SKIPPED]
     plans = [
         replace(plan, onset=Onset(mark, round(number * length / _PHASES, 3)))
