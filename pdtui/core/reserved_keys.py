@@ -96,6 +96,47 @@ KEY_TABLE = (
     ),
     ReservedKey("zoom_in", "right_square_bracket", "shows less of the path", action="zoom_path(-1)"),
     ReservedKey("zoom_out", "left_square_bracket", "shows more of the path", action="zoom_path(1)"),
+    ReservedKey(
+        "seek_back",
+        "less_than_sign",
+        "shows the run a second earlier",
+        action="timeline('back')",
+        hint="earlier",
+        hint_rank=13,
+    ),
+    ReservedKey(
+        "seek_forward",
+        "greater_than_sign",
+        "shows the run a second later",
+        action="timeline('forward')",
+        hint="later",
+        hint_rank=14,
+    ),
+    ReservedKey(
+        "mark_back",
+        "left_curly_bracket",
+        "shows the run at the key or the ending before",
+        action="timeline('earlier mark')",
+    ),
+    ReservedKey(
+        "mark_forward",
+        "right_curly_bracket",
+        "shows the run at the next key or ending",
+        action="timeline('later mark')",
+    ),
+    ReservedKey("seek_oldest", "home", "shows the oldest step that is kept", action="timeline('oldest')"),
+    ReservedKey(
+        "seek_last", "end", "returns to the present, or to the end of a recording", action="timeline('last')"
+    ),
+    # Not ctrl+b, which many who work in tmux could not press.
+    ReservedKey(
+        "branch",
+        "ctrl+n",
+        "begins a new session that goes on from the step that is shown",
+        action="branch",
+        hint="branch",
+        hint_rank=15,
+    ),
     ReservedKey("help", "question_mark", "shows all keys", action="help", hint="help", hint_rank=0),
     ReservedKey("quit", "q", "ends the drive and quits", action="leave", hint="quit", hint_rank=1),
 )

@@ -40,6 +40,15 @@ class DriveConnection(Protocol):
     def toggle_ghost(self) -> None:
         """Turn the ghost on or off, which is no part of the run and is not recorded."""
 
+    def seek(self, moment: int) -> None:
+        """Pause, and show the moment at which so many control steps had been done.
+
+        A replay that is watched goes on to a moment that is still to come, without its pace.
+        """
+
+    def branch(self) -> None:
+        """Begin a drive, with a recording of its own, that goes on from the moment that is shown."""
+
     def close(self) -> str:
         """End the drive, wait until its recording is complete, and return one line on how it ended."""
 
@@ -49,9 +58,9 @@ def _simulate(connection: Connection, config: DriveConfig) -> None:
     os.environ.setdefault("RUST_LOG", "off")
     # The drive ends by itself once the screen has gone, unless its world is stuck in a step.
     threading.Thread(target=end_with_parent, args=(_PATIENCE,), daemon=True).start()
-    from pdtui.driving import drive_server  # loads torch and the simulator, which the screen does without
+    from pdtui.driving import drive_process  # loads torch and the simulator, which the screen does without
 
-    drive_server.serve_drive(connection, config)
+    drive_process.serve_drive(connection, config)
 
 
 class DriveClient(DriveConnection):
@@ -114,6 +123,12 @@ class DriveClient(DriveConnection):
     def toggle_ghost(self) -> None:
         self._send("ghost", None)
 
+    def seek(self, moment: int) -> None:
+        self._send("seek", moment)
+
+    def branch(self) -> None:
+        self._send("branch", None)
+
     def close(self) -> str:
         self._send("close", None)
         deadline = time.monotonic() + _PATIENCE
@@ -142,7 +157,7 @@ class DriveClient(DriveConnection):
             return PdtuiError(self._describe_death())
         return message
 
-    def _send(self, kind: str, value: str | None) -> None:
+    def _send(self, kind: str, value: str | int | None) -> None:
         try:
             self._connection.send((kind, value))
         except OSError:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pdtui.core.attributes import Attribute, Floats
+    from pdtui.core.outcome import Outcome
     from pdtui.core.robot_links_and_state import Link
     from pdtui.core.scenery import Scenery, Traffic
     from pdtui.core.step_record import ActiveBehavior
@@ -33,6 +34,9 @@ class DriveFacts:
         recording: file that the drive is recorded into, or will be; empty if it is not recorded.
         recorded: whether that file was created, which happens with the first control step.
         manual_controls: names of the controls that the operator can take over.
+        length: number of control steps of the recording that the drive follows; 0 if it follows none.
+        known_keys, known_ends: key presses and ends of episodes of that recording.
+        branches: number of times that the drive has branched off; then, it begins again.
     """
 
     title: str
@@ -45,6 +49,10 @@ class DriveFacts:
     recording: str = ""
     recorded: bool = False
     manual_controls: tuple[str, ...] = ()
+    length: int = 0
+    known_keys: tuple[KeyPress, ...] = ()
+    known_ends: tuple[EpisodeEnd, ...] = ()
+    branches: int = 0
 
 
 @dataclass(frozen=True)
@@ -68,6 +76,20 @@ class KeyPress(NamedTuple):
     step: int
     key: str
     behavior: int
+
+
+class EpisodeEnd(NamedTuple):
+    """How an episode ended, or that its task was done, with a control step."""
+
+    step: int
+    outcome: Outcome
+
+
+class PastPosition(NamedTuple):
+    """Where a past moment lies: number of control steps of the run, and the earliest moment to look at."""
+
+    present: int
+    oldest: int
 
 
 @dataclass(frozen=True)
@@ -101,6 +123,8 @@ class DriveSnapshot:
         scenery: `Robot.scenery` if it has changed since the last snapshot; else None.
         traffic: what was around the robot after the last step.
         key_presses: keys that changed the run since the last snapshot.
+        ends: ends of episodes since the last snapshot.
+        past: where the moment lies that is shown; None for the present.
         ghost: the ghost; None while it is off.
     """
 
@@ -129,4 +153,6 @@ class DriveSnapshot:
     scenery: Scenery | None = None
     traffic: Traffic = NO_TRAFFIC
     key_presses: tuple[KeyPress, ...] = ()
+    ends: tuple[EpisodeEnd, ...] = ()
+    past: PastPosition | None = None
     ghost: GhostSnapshot | None = None

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from pdtui.core.drive_events import describe_event
+from pdtui.core.drive_events import DriveEvent, describe_event
 from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.driving.drive_snapshot import DriveSnapshot, KeyPress, StimulatedUnit
+from pdtui.driving.drive_snapshot import DriveSnapshot, EpisodeEnd, KeyPress, StimulatedUnit
 from pdtui.driving.ghost.ghost_runner import GhostRunner
 from pdtui.sessions.episode_statistics import EpisodeStatisticsCounter
 
@@ -30,6 +32,8 @@ class SnapshotBuilder:
         self._history: list[np.ndarray] = []
         self._path: list[tuple[float, float, float]] = []
         self._key_presses: list[KeyPress] = []
+        self._ends: list[EpisodeEnd] = []
+        self._moved = False  # by an event, since the last control step
         self._restarted = False
         self._episode = 0
         self._involvement, self._cost = 0, 0.0
@@ -54,7 +58,8 @@ class SnapshotBuilder:
             for event in record.events
             if event.key
         ]
-        del self._history[:-_ROWS_KEPT], self._path[:-_ROWS_KEPT], self._key_presses[:-_ROWS_KEPT]
+        for rows in (self._history, self._path, self._key_presses, self._ends):
+            del rows[:-_ROWS_KEPT]
         involved = record.involved
         self._involvement += involved
         self._cost += record.cost
@@ -62,6 +67,7 @@ class SnapshotBuilder:
             self._arrivals = (self._arrivals or 0) + 1
         if record.outcome is not None:
             self._statistics.add_outcome(record.episode, record.outcome)
+            self._ends.append(EpisodeEnd(record.step, record.outcome))
         self._statistics.add(
             record.episode, involved=involved, cost=record.cost, attributes=record.attributes
         )
@@ -70,9 +76,19 @@ class SnapshotBuilder:
                 self.notice = describe_event(event)
         if record.outcome is not None:
             self.notice = record.ended or f"{record.outcome}; the episode goes on"
-        self._last = record
+        self._last, self._moved = record, False
         if self._ghost is not None:
             self._ghost.add_step(record)
+
+    def show_events(self, events: Sequence[DriveEvent]) -> None:
+        """Show what events have changed before the next control step is done."""
+        self._moved = self._moved or any(event.jumps for event in events)
+        if events:
+            self.notice = f"before step {events[0].step}: {'; '.join(map(describe_event, events))}"
+
+    def show_other_scenery(self) -> None:
+        """Send the scenery with the next snapshot, as the screen shows that of another moment."""
+        self._scenery = NO_SCENERY
 
     def build_snapshot(
         self, *, paused: bool, speed: float, achieved_speed: float, recorded_bytes: int, finished: str
@@ -98,7 +114,7 @@ class SnapshotBuilder:
             stimulated_units=units,
             activations=np.zeros(loop.policy.units, np.float32) if last is None else last.activations,
             attributes=loop.attributes,
-            poses=loop.robot.read_poses() if last is None else last.poses,
+            poses=last.poses if last is not None and not self._moved else loop.robot.read_poses(),
             history=np.array(self._history).reshape(-1, size),
             path=np.array(self._path).reshape(-1, 3),
             restarted=self._restarted,
@@ -114,10 +130,11 @@ class SnapshotBuilder:
             statistics=self._statistics.of(loop.episode),
             manual=tuple(loop.takeover.values.items()),
             scenery=self._scenery if other_scenery else None,
-            traffic=loop.robot.read_traffic() if last is None else last.traffic,
+            traffic=last.traffic if last is not None and not self._moved else loop.robot.read_traffic(),
             key_presses=tuple(self._key_presses),
+            ends=tuple(self._ends),
             ghost=ghost,
         )
-        self._history, self._path, self._key_presses = [], [], []
+        self._history, self._path, self._key_presses, self._ends = [], [], [], []
         self._restarted, self.notice = False, ""
         return snapshot

@@ -27,6 +27,7 @@ from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
 from pdtui.tui.terminal_driver import TerminalDriver
 from pdtui.tui.terminal_size_notice import LEAST_SIZE, TerminalSizeNotice
 from pdtui.tui.theme import THEME
+from pdtui.tui.timeline.timeline_bar import TimelineBar, TimelineRequest, describe_past_keys
 from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
 from pdtui.tui.widgets.attribute_table import AttributeTable
 from pdtui.tui.widgets.behavior_list import BehaviorList
@@ -106,6 +107,7 @@ class DriveApp(App[str], inherit_bindings=False):
                 yield bound(BehaviorList(self.map, id="behaviors"))
                 yield bound(AttributeTable(self.map, id="attributes"))
         yield bound(ActivationHeatmap(self.map, id="heat"))
+        yield bound(TimelineBar(self.map, self.connection, id="timeline"))
         yield bound(NoticeLine(self.map, id="notice")).data_bind(DriveApp.notice)
         yield KeyLine(self.map, id="keys")
         yield TerminalSizeNotice(id="too-small")
@@ -114,8 +116,7 @@ class DriveApp(App[str], inherit_bindings=False):
         self.query_one(StatusLine).watching = self.watching
         self._show_keys()
         self.set_interval(1.0 / self.fps, self._poll)
-        # By default, these signals would leave the terminal raw and the recording unfinished. The event loop
-        # removes the handlers when it is closed.
+        # By default, these signals would leave the terminal raw and the recording unfinished.
         loop = asyncio.get_running_loop()
         for number in _ENDING_SIGNALS:
             loop.add_signal_handler(number, self._end, number)
@@ -124,6 +125,8 @@ class DriveApp(App[str], inherit_bindings=False):
         """Leave out the robot's picture for a world without links, and show the keys that the robot has."""
         self.screen_stack[0].set_class(facts is not None and not facts.links, "-bodiless")
         self._show_keys()
+        if facts is not None and facts.branches:  # the drive has left the recording
+            self.query_one(StatusLine).watching = self.watching = False
 
     def _end(self, number: signal.Signals) -> None:
         self.exit(f"ended by {number.name}", return_code=1)
@@ -160,7 +163,8 @@ class DriveApp(App[str], inherit_bindings=False):
         )
         self.screen_stack[0].query_one(KeyLine).keys = shown
         leave = now.get("quit", now["quit_always"])[0]
-        self.screen_stack[0].query_one(NoticeLine).hints = f"{displayed_key_name(leave)} quits"
+        notices = self.screen_stack[0].query_one(NoticeLine)
+        notices.hints, notices.past_hints = f"{displayed_key_name(leave)} quits", describe_past_keys(now)
 
     def _poll(self) -> None:
         if self._notice_until and monotonic() > self._notice_until:
@@ -192,6 +196,8 @@ class DriveApp(App[str], inherit_bindings=False):
 
     def action_run_key(self, key: str) -> None:
         """Send a key that changes the run, unless a recording is being watched."""
+        if self.query_one(TimelineBar).takes_key(key):
+            return
         if self.watching:
             self.say(f"{displayed_key_name(key)}: this drive follows a recording, so keys cannot change it")
         elif self.snapshot is not None and self.snapshot.finished:
@@ -204,6 +210,14 @@ class DriveApp(App[str], inherit_bindings=False):
     def action_pace(self, request: str) -> None:
         """Change the drive's pace."""
         self.connection.change_pace(cast(PaceRequest, request))
+
+    def action_timeline(self, request: TimelineRequest) -> None:
+        """Show another moment of the run."""
+        self.query_one(TimelineBar).seek_by_key(request)
+
+    def action_branch(self) -> None:
+        """Begin a session that goes on from the moment that is shown."""
+        self.connection.branch()
 
     def action_toggle_ghost(self) -> None:
         """Turn the ghost on or off; it is no part of the run, so it may run beside a recording, too."""

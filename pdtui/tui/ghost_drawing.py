@@ -37,6 +37,14 @@ def describe_ghost(ghost: GhostSnapshot, step: int) -> str:
     return _CONDITIONS.get(ghost.condition, "")
 
 
+def add_ghost_to_title(title: str, ghost: GhostSnapshot | None, step: int) -> str:
+    """Return the title of a table that compares the drive with its ghost, if there is one."""
+    if ghost is None:
+        return title
+    said = describe_ghost(ghost, step)
+    return said if ghost.condition == "failed" else f"{title} · {said}"
+
+
 def draw_ghost(
     canvas: BrailleCanvas, camera: PerspectiveCamera, links: Sequence[Link], poses: Floats, ink: int
 ) -> None:

@@ -44,6 +44,7 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         self._framed: list[Strip | None] = []
         self._painted_size = Size(0, 0)
         self._sides: Sides | None = None
+        self.forget()
 
     @abstractmethod
     def paint(self, width: int, height: int) -> list[Strip]:
@@ -56,7 +57,12 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         """Keep what later frames need of a snapshot; called once per snapshot."""
         del snapshot
 
-    def watch_facts(self) -> None:
+    def forget(self) -> None:
+        """Drop what was kept of snapshots, as another run begins."""
+
+    def watch_facts(self, old: DriveFacts | None, facts: DriveFacts | None) -> None:
+        if old is not None and facts is not None and old.branches != facts.branches:
+            self.forget()
         self.redraw()
 
     def watch_snapshot(self, snapshot: DriveSnapshot | None) -> None:

@@ -8,7 +8,8 @@ DRIVE = """
 Screen { background: $background; overflow: hidden; }
 
 SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
-#status, #notice, #keys { height: 1; }
+#status, #notice, #keys, #timeline { height: 1; }
+#timeline { display: none; }
 #status, #keys { background: $surface; }
 
 #body { layout: horizontal; height: 1fr; }
@@ -28,10 +29,13 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 #units { display: none; }
 #heat { height: 3; border-bottom: none; border-left: none; border-right: none; padding: 0; }
 
+/* Where there is little room, only while time stands still or a recording is watched. */
+.-tall #timeline, .-timeline #timeline { display: block; }
+
 #too-small { display: none; width: 1fr; height: 1fr; }
 .-too-small #too-small { display: block; }
 .-too-small #status, .-too-small #body, .-too-small #heat { display: none; }
-.-too-small #notice, .-too-small #keys { display: none; }
+.-too-small #notice, .-too-small #keys, .-too-small #timeline { display: none; }
 
 .-wide #right { width: 60; }
 .-full #right { width: 74; }

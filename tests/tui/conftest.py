@@ -26,6 +26,8 @@ class ScriptedConnection:
         self.pressed: list[str] = []
         self.paced: list[PaceRequest] = []
         self.toggled = 0
+        self.sought: list[int] = []
+        self.branched = 0
 
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:
         if not self.messages:
@@ -43,6 +45,12 @@ class ScriptedConnection:
 
     def toggle_ghost(self) -> None:
         self.toggled += 1
+
+    def seek(self, moment: int) -> None:
+        self.sought.append(moment)
+
+    def branch(self) -> None:
+        self.branched += 1
 
     def close(self) -> str:
         return "stopped: 0 steps"

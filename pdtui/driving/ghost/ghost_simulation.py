@@ -13,7 +13,7 @@ from pdtui.core.errors import RobotError
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.driving.rewind_history import DriveState
+from pdtui.driving.timeline.rewind_history import DriveState
 
 _NICENESS = 5  # the drive goes first where there are not enough processors for both
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,9 @@ from pdtui.tui.widgets.unit_table import behaviors_of_units
 
 _LABEL = 4  # width of the layers' numbers, in cells
 
+if TYPE_CHECKING:
+    from pdtui.driving.drive_snapshot import DriveFacts
+
 # More stimulated units than this are summed up.
 _MAX_MARKED = 16
 
@@ -36,12 +40,12 @@ class ActivationHeatmap(SnapshotWidget):
     BORDER_TITLE = "hidden units"
     _scale = 1e-6
 
-    def watch_facts(self) -> None:
+    def watch_facts(self, old: DriveFacts | None, facts: DriveFacts | None) -> None:
         if self.facts is not None:
             widths = enumerate(self.facts.layers)
             layers = " · ".join(f"layer {layer}: {width}" for layer, width in widths)
             self.border_title = f"hidden units · {layers}"
-        super().watch_facts()
+        super().watch_facts(old, facts)
 
     def remember(self, snapshot: DriveSnapshot) -> None:
         finite = np.abs(snapshot.activations[np.isfinite(snapshot.activations)])

@@ -37,7 +37,7 @@ class PathView(SnapshotWidget):
     BORDER_TITLE = "path · last 20 s"
     stretch: reactive[int] = reactive(_USUAL, init=False, repaint=False)
 
-    def on_mount(self) -> None:
+    def forget(self) -> None:
         self.trail = PathTrail()
         self._ghost_path: Floats = np.empty((0, 2))
         self._ghost_began = -1

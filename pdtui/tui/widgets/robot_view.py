@@ -182,7 +182,8 @@ class RobotView(SnapshotWidget):
     def _draw_ghost(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
         """Draw the ghost beneath the robot, or say where it is."""
         assert self.facts is not None
-        ghost = None if self.snapshot is None else self.snapshot.ghost
+        shown = self.snapshot is not None and self.snapshot.past is None
+        ghost = self.snapshot.ghost if self.snapshot is not None and shown else None
         if ghost is not None and ghost.latest is not None and len(ghost.latest.poses):
             poses = ghost.latest.poses
             draw_ghost(canvas, camera, self.facts.links, poses, _GHOST)

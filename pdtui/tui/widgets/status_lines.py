@@ -85,6 +85,9 @@ class StatusLine(SnapshotWidget):
         if snapshot.finished:
             return "■ over", STYLES.bad
         kind = "watching " if self.watching else ""
+        if snapshot.past is not None:
+            sign = "⏸" if snapshot.paused else f"▶ {snapshot.speed:g}×"
+            return f"{sign} {snapshot.past.present - snapshot.step} steps ago", STYLES.warn
         asked = f"{snapshot.speed:g}×"
         if snapshot.paused:
             return f"{kind}⏸ paused at {asked}", STYLES.warn
@@ -100,6 +103,7 @@ class NoticeLine(SnapshotWidget):
 
     notice: reactive[str] = reactive("", init=False, repaint=False)
     hints: reactive[str] = reactive("", init=False, repaint=False)
+    past_hints: reactive[str] = reactive("", init=False, repaint=False)
 
     def watch_notice(self) -> None:
         self.redraw()
@@ -107,7 +111,8 @@ class NoticeLine(SnapshotWidget):
     def paint(self, width: int, height: int) -> list[Strip]:
         del height
         row, counters = ScreenRow(width), self._counters()
-        finished = self.snapshot.finished if self.snapshot is not None else ""
+        past = self.snapshot is not None and self.snapshot.past is not None
+        finished = self.snapshot.finished if self.snapshot is not None and not past else ""
         if finished:
             said, style = f" ■ the drive is over: {make_printable(finished)}   {self.hints} ", STYLES.alert
         elif self.notice:
@@ -148,7 +153,9 @@ class NoticeLine(SnapshotWidget):
         """Return the line shown while there is no notice."""
         if self.snapshot is None or self.facts is None:
             return "the drive starts once the policy is loaded"
-        facts = self.facts
+        facts, past = self.facts, self.snapshot.past
+        if past is not None:
+            return f"step {self.snapshot.step} of {past.present}, as it was   {self.past_hints}"
         place = make_printable(facts.recording) or "not recorded"
         if self._counters():
             return f"seed {facts.seed} · {place}"
