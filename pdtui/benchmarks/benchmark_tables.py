@@ -89,4 +89,10 @@ def screen_benchmark_table(result: ScreenBenchmark) -> Table:
     table.add_row(
         f"CPU time of the screen's process over {result.seconds:g} s", f"{result.cpu_share:.0%} of one core"
     )
+    for name, times in (("key to its echo", result.echo), ("key to the drive's answer", result.confirmation)):
+        if times:
+            table.add_row(
+                f"{name}, of {len(times)}: median, largest",
+                f"{1000 * times[len(times) // 2]:.0f} ms, {1000 * times[-1]:.0f} ms",
+            )
     return table

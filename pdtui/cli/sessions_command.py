@@ -174,18 +174,36 @@ def repair_command(file: Path, output: Path | None, in_place: bool) -> None:
 @sessions_command.command()
 @click.argument("a", type=FILE_PATH)
 @click.argument("b", type=FILE_PATH)
+@click.option(
+    "--figure", type=FILE_PATH, metavar="FILE", help="Also draw both: a new .png, .pdf or .svg file."
+)
 @json_option
-def compare_command(a: Path, b: Path, as_json: bool) -> None:
-    """Compare sessions A and B step by step, in every stream.
+def compare_command(a: Path, b: Path, figure: Path | None, as_json: bool) -> None:
+    """Compare sessions A and B step by step, in every stream: two branches of a drive, for example.
 
     Exit codes: 0 if they are identical; 3 if they differ.
     """
     from pdtui.cli.output import session_tables
+    from pdtui.sessions.drive_course import compare_courses, read_drive_course
     from pdtui.sessions.session_comparison import compare_sessions
     from pdtui.sessions.session_header import read_session_header
 
-    result = compare_sessions(read_session_header(a), read_session_header(b))
-    print_result(asdict(result), as_json, lambda: session_tables.session_comparison_table(result))
+    if figure is not None:
+        from pdtui.pictures.matplotlib_page import check_figure_path
+
+        check_figure_path(figure, overwrite=False)
+    headers = read_session_header(a), read_session_header(b)
+    result = compare_sessions(*headers)
+    courses = read_drive_course(headers[0]), read_drive_course(headers[1])
+    apart = result.first_difference is not None
+    paths = compare_courses(*courses, result.first_difference or 0) if apart else ()
+    data = {**asdict(result), "paths": [asdict(row) for row in paths]}
+    print_result(data, as_json, lambda: session_tables.session_comparison_table(result, headers, paths))
+    if figure is not None:
+        from pdtui.pictures.session_figure import draw_session_comparison
+
+        draw_session_comparison(figure, headers, courses, result)
+        click.echo(make_printable(f"wrote {figure}"), err=True)
     if result.first_difference is not None or result.lengths[0] != result.lengths[1]:
         sys.exit(DIFFERS)
 

@@ -38,8 +38,7 @@ from pdtui.tui.widgets.unit_table import UnitTable
 
 NOTICE_SECONDS = 4.0
 _ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
-# A key that changes the run goes to the drive under its original name, whatever key the user gave it.
-# Each binding has an id, so that users can remap it.
+# A key that changes the run goes to the drive under its original name, whatever key has its binding's id.
 BINDINGS: list[Binding] = [
     *(Binding(row.key, row.action or f"run_key('{row.key}')", row.says, id=row.id) for row in KEY_TABLE),
     Binding("ctrl+c", "leave", "ends the drive and quits, always", id="quit_always", priority=True),
@@ -206,6 +205,7 @@ class DriveApp(App[str], inherit_bindings=False):
             self.say("the policy is still loading")
         else:
             self.connection.press_key(key)
+            self.query_one(BehaviorList).echo(key)
 
     def action_pace(self, request: str) -> None:
         """Change the drive's pace."""

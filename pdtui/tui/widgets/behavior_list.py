@@ -15,8 +15,10 @@ from pdtui.tui.theme import STYLES
 
 if TYPE_CHECKING:
     from pdtui.core.step_record import ActiveBehavior
+    from pdtui.driving.drive_snapshot import DriveSnapshot
     from pdtui.stimulation.stimulation_map import Behavior
 
+_ECHO_SNAPSHOTS = 12  # after which a key that the drive did not mention is no longer shown as pressed
 _BAR = 10  # length of the bar of the time left, in cells
 _BLOCKS = " ▏▎▍▌▋▊▉"
 
@@ -25,6 +27,24 @@ class BehaviorList(SnapshotWidget):
     """Shows two lines per behavior if there is room, else one; latched behaviors are never hidden."""
 
     BORDER_TITLE = "behaviors"
+
+    def forget(self) -> None:
+        self._echoes: dict[str, int] = {}
+
+    def echo(self, key: str) -> None:
+        """Show a key as pressed at once, until the drive has confirmed or refused it."""
+        self._echoes[key] = _ECHO_SNAPSHOTS
+        self.redraw()
+
+    def remember(self, snapshot: DriveSnapshot) -> None:
+        if self._echoes:
+            latched = {view.name for view in snapshot.active_behaviors}
+            done = {press.key for press in snapshot.key_presses}
+            done |= {self.map.behaviors[name].key for name in latched if name in self.map.behaviors}
+            if not latched:
+                done.add(self.map.default_key)
+            left = {key: count - 1 for key, count in self._echoes.items() if key not in done}
+            self._echoes = {key: count for key, count in left.items() if count and not snapshot.notice}
 
     def paint(self, width: int, height: int) -> list[Strip]:
         active = (
@@ -49,7 +69,8 @@ class BehaviorList(SnapshotWidget):
         latched = [behavior.name in active for behavior in behaviors]
         shown = self._crop(entries, latched, width, height - 1 - len(gap))
         default = ScreenRow(width)
-        self._add_cap(default, self.map.default_key, STYLES.key)
+        echoed = self.map.default_key in self._echoes
+        self._add_cap(default, self.map.default_key, STYLES.caps[0] if echoed else STYLES.key)
         default.add("  clears all stimulation", STYLES.good if active else STYLES.muted)
         return [*shown, *gap, default.strip()]
 
@@ -60,7 +81,11 @@ class BehaviorList(SnapshotWidget):
         color = STYLES.behavior(row)
         says = make_printable(behavior.says)
         line = ScreenRow(width)
-        if active is None:
+        if active is None and behavior.key in self._echoes:
+            self._add_cap(line, behavior.key, STYLES.caps[row % len(STYLES.caps)])
+            line.add(" ▌", color).add(make_printable(behavior.name), color, name_width)
+            lines = [line.add("  pressed", color).strip()]
+        elif active is None:
             self._add_cap(line, behavior.key, STYLES.key)
             line.add("  " + make_printable(behavior.name), color, name_width + 2).add("  ", STYLES.text)
             line.add(self._kind(behavior) if roomy else says, STYLES.muted)
