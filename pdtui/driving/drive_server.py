@@ -17,13 +17,13 @@ from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_recording import DriveRecording
-from pdtui.driving.drive_snapshot import DriveFacts
 from pdtui.driving.ghost.ghost_runner import GhostRunner
 from pdtui.driving.keystrokes import interpret_keys
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.pacer import Pacer
+from pdtui.driving.pictures.world_pictures import WorldPictures
 from pdtui.driving.replays.step_by_step_comparison import StepByStepComparison
-from pdtui.driving.snapshot_builder import SnapshotBuilder
+from pdtui.driving.snapshot_builder import SnapshotBuilder, describe_loop
 from pdtui.driving.timeline.branching import BRANCHES_OF_RECORDINGS, configure_branch, find_branch_origin
 from pdtui.driving.timeline.past_snapshot import show_past_moment
 from pdtui.driving.timeline.run_timeline import RunTimeline
@@ -67,30 +67,24 @@ class DriveServer:
         self._ghost = GhostRunner(config, loop)
         self._builder = SnapshotBuilder(loop, self._ghost)
         self._recording = DriveRecording(config, replace(loop.info, branch=origin))
-        self._builder.notice, self._recording.notice = self._recording.notice, ""
+        self._pictures = WorldPictures(loop.robot)
+        self._builder.notice, self._recording.notice = self._recording.notice or self._pictures.notice, ""
         self._pressed_keys: list[str] = []
         self._finished, self.failed = "", False
         self._watched = None if config.watched is None else StepByStepComparison(config.watched, loop.info)
 
     def send_facts(self) -> None:
         """Send the facts of the drive."""
-        loop = self._loop
         keys, ends = list_watched_marks(self._config)
         self._sent = self._send(
-            DriveFacts(
-                title=loop.robot.full_title,
-                policy=loop.policy.name,
-                seed=loop.seed,
-                dt=loop.robot.control_dt,
-                attributes=loop.robot.attributes,
-                links=loop.robot.links,
-                layers=loop.policy.layers,
+            replace(
+                describe_loop(self._loop),
                 recording=self._recording.path,
                 recorded=self._recording.created,
-                manual_controls=tuple(control.name for control in loop.robot.manual_controls),
                 length=self._timeline.length,
                 known_keys=keys,
                 known_ends=ends,
+                pictured=self._pictures.available,
                 branches=self._branches,
             )
         )
@@ -107,7 +101,7 @@ class DriveServer:
                 self._closing = format_error_in_one_line(error)
             raise
         finally:
-            self._ghost.close()
+            self._close_helpers()
             self._recording.close(self._finished or self._closing or "an error ended the drive")
 
     def stop(self, reason: str) -> None:
@@ -186,13 +180,17 @@ class DriveServer:
         origin = find_branch_origin(self._config, old, moment)
         folder = Path(old.path).parent if old.path else BRANCHES_OF_RECORDINGS
         old.close(f"left at step {self._loop.step} for a branch from step {moment}")
-        self._ghost.close()
+        self._close_helpers()
         self._pacer.paused, self._branches = True, self._branches + 1
         config = configure_branch(self._config, origin, folder)
         loop = build_control_loop(config, self._loop.robot, self._loop.policy)
         self._begin(config, loop, self._timeline.branch(), origin)
         self._builder.notice = f"branching off: step {moment} is driven again"
         self.send_facts()
+
+    def _close_helpers(self) -> None:
+        self._ghost.close()
+        self._pictures.close()
 
     def _advance(self) -> None:
         record = self._loop.advance(self._events())
@@ -241,5 +239,6 @@ class DriveServer:
         if self._timeline.viewed is not None:
             snapshot = show_past_moment(snapshot, self._timeline)
             self._builder.show_other_scenery()
+        picture = self._pictures.draw(self._timeline.moment, past=snapshot.past is not None)
         self._snapshot_requested = False
-        self._sent = self._send(snapshot)
+        self._sent = self._send(replace(snapshot, picture=picture))

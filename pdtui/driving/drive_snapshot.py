@@ -36,6 +36,7 @@ class DriveFacts:
         manual_controls: names of the controls that the operator can take over.
         length: number of control steps of the recording that the drive follows; 0 if it follows none.
         known_keys, known_ends: key presses and ends of episodes of that recording.
+        pictured: whether the world is shown by pictures, as it has no links.
         branches: number of times that the drive has branched off; then, it begins again.
     """
 
@@ -52,6 +53,7 @@ class DriveFacts:
     length: int = 0
     known_keys: tuple[KeyPress, ...] = ()
     known_ends: tuple[EpisodeEnd, ...] = ()
+    pictured: bool = False
     branches: int = 0
 
 
@@ -124,6 +126,7 @@ class DriveSnapshot:
         traffic: what was around the robot after the last step.
         key_presses: keys that changed the run since the last snapshot.
         ends: ends of episodes since the last snapshot.
+        picture: picture of a world without links, shape (rows, columns, 3); None where there is no new one.
         past: where the moment lies that is shown; None for the present.
         ghost: the ghost; None while it is off.
     """
@@ -154,5 +157,6 @@ class DriveSnapshot:
     traffic: Traffic = NO_TRAFFIC
     key_presses: tuple[KeyPress, ...] = ()
     ends: tuple[EpisodeEnd, ...] = ()
+    picture: NDArray[np.uint8] | None = None
     past: PastPosition | None = None
     ghost: GhostSnapshot | None = None

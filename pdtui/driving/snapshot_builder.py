@@ -11,11 +11,25 @@ from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.driving.drive_snapshot import DriveSnapshot, EpisodeEnd, KeyPress, StimulatedUnit
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, EpisodeEnd, KeyPress, StimulatedUnit
 from pdtui.driving.ghost.ghost_runner import GhostRunner
 from pdtui.sessions.episode_statistics import EpisodeStatisticsCounter
 
 _ROWS_KEPT = 4000  # control steps between two snapshots that a stopped screen does not lose
+
+
+def describe_loop(loop: ControlLoop) -> DriveFacts:
+    """Return the facts of a drive that its loop knows."""
+    return DriveFacts(
+        title=loop.robot.full_title,
+        policy=loop.policy.name,
+        seed=loop.seed,
+        dt=loop.robot.control_dt,
+        attributes=loop.robot.attributes,
+        links=loop.robot.links,
+        layers=loop.policy.layers,
+        manual_controls=tuple(control.name for control in loop.robot.manual_controls),
+    )
 
 
 class SnapshotBuilder:

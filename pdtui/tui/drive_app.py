@@ -35,6 +35,7 @@ from pdtui.tui.widgets.path_view import PathView
 from pdtui.tui.widgets.robot_view import RobotView
 from pdtui.tui.widgets.status_lines import KeyLine, NoticeLine, StatusLine
 from pdtui.tui.widgets.unit_table import UnitTable
+from pdtui.tui.widgets.world_picture import WorldPicture
 
 NOTICE_SECONDS = 4.0
 _ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
@@ -83,7 +84,6 @@ class DriveApp(App[str], inherit_bindings=False):
     ) -> None:
         super().__init__(driver_class=TerminalDriver)
         self.connection, self.map, self.fps, self.watching = connection, stimulation_map, fps, watching
-        # The map's keys come before the application's own.
         behaviors = stimulation_map.behaviors.values()
         self._map_keys = {stimulation_map.default_key, *(behavior.key for behavior in behaviors)}
         self._notice_until = 0.0
@@ -99,6 +99,7 @@ class DriveApp(App[str], inherit_bindings=False):
         with Container(id="body"):
             with Container(id="left"):
                 yield bound(RobotView(self.map, id="robot"))
+                yield bound(WorldPicture(self.map, id="world"))
                 with Container(id="below"):
                     yield bound(PathView(self.map, id="path"))
                     yield bound(UnitTable(self.map, id="units"))
@@ -115,14 +116,13 @@ class DriveApp(App[str], inherit_bindings=False):
         self.query_one(StatusLine).watching = self.watching
         self._show_keys()
         self.set_interval(1.0 / self.fps, self._poll)
-        # By default, these signals would leave the terminal raw and the recording unfinished.
-        loop = asyncio.get_running_loop()
-        for number in _ENDING_SIGNALS:
-            loop.add_signal_handler(number, self._end, number)
+        for number in _ENDING_SIGNALS:  # which would leave the terminal raw and the recording unfinished
+            asyncio.get_running_loop().add_signal_handler(number, self._end, number)
 
     def watch_facts(self, facts: DriveFacts | None) -> None:
         """Leave out the robot's picture for a world without links, and show the keys that the robot has."""
-        self.screen_stack[0].set_class(facts is not None and not facts.links, "-bodiless")
+        bodiless, pictured = (False, False) if facts is None else (not facts.links, facts.pictured)
+        self.screen_stack[0].set_class(bodiless, "-bodiless").set_class(pictured, "-pictured")
         self._show_keys()
         if facts is not None and facts.branches:  # the drive has left the recording
             self.query_one(StatusLine).watching = self.watching = False

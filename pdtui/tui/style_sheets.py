@@ -17,7 +17,7 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 #right { width: 46; }
 #below { layout: horizontal; height: 7; }
 
-#robot, #path, #units, #behaviors, #attributes, #heat {
+#robot, #world, #path, #units, #behaviors, #attributes, #heat {
     border: round $foreground 22%;
     border-title-color: $primary;
     border-title-style: bold;
@@ -26,7 +26,7 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 }
 #behaviors, #attributes, #units { padding: 0 1; }
 #attributes { height: 8; }
-#units { display: none; }
+#units, #world { display: none; }
 #heat { height: 3; border-bottom: none; border-left: none; border-right: none; padding: 0; }
 
 /* Where there is little room, only while time stands still or a recording is watched. */
@@ -52,6 +52,15 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 .-full.-bodiless #left { display: block; width: 46; }
 .-bodiless #robot, .-bodiless #path { display: none; }
 .-bodiless #below { height: 1fr; }
+
+/* With pictures of its world, these take the robot's place. */
+.-pictured #left { display: block; width: 1fr; }
+.-pictured #world { display: block; height: 3fr; }
+.-pictured #right { width: 46; }
+.-wide.-pictured #right { width: 60; }
+.-pictured #below { display: none; }
+.-full.-pictured #below { display: block; height: 12; }
+.-full.-pictured #units { width: 1fr; }
 
 HelpScreen { align: center middle; background: $background 60%; }
 #help {
