@@ -16,6 +16,7 @@ from pdtui.driving.pacer import PaceRequest
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
+    from pdtui.driving.live_spectra.spectra_snapshot import SpectraChoice
 
 _PATIENCE = 60.0
 """Longest wait for the recording to be completed, s; after it, the process ends at once."""
@@ -45,6 +46,9 @@ class DriveConnection(Protocol):
 
         A replay that is watched goes on to a moment that is still to come, without its pace.
         """
+
+    def choose_spectra(self, choice: SpectraChoice | None) -> None:
+        """Have snapshots bring spectrograms of an attribute and a unit, or none."""
 
     def branch(self) -> None:
         """Begin a drive, with a recording of its own, that goes on from the moment that is shown."""
@@ -126,6 +130,9 @@ class DriveClient(DriveConnection):
     def seek(self, moment: int) -> None:
         self._send("seek", moment)
 
+    def choose_spectra(self, choice: SpectraChoice | None) -> None:
+        self._send("spectra", choice)
+
     def branch(self) -> None:
         self._send("branch", None)
 
@@ -157,7 +164,7 @@ class DriveClient(DriveConnection):
             return PdtuiError(self._describe_death())
         return message
 
-    def _send(self, kind: str, value: str | int | None) -> None:
+    def _send(self, kind: str, value: str | int | SpectraChoice | None) -> None:
         try:
             self._connection.send((kind, value))
         except OSError:

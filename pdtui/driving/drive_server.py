@@ -19,6 +19,7 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_recording import DriveRecording
 from pdtui.driving.ghost.ghost_runner import GhostRunner
 from pdtui.driving.keystrokes import interpret_keys
+from pdtui.driving.live_spectra.live_spectra import LiveSpectra
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.pacer import Pacer
 from pdtui.driving.pictures.world_pictures import WorldPictures
@@ -68,6 +69,7 @@ class DriveServer:
         self._builder = SnapshotBuilder(loop, self._ghost)
         self._recording = DriveRecording(config, replace(loop.info, branch=origin))
         self._pictures = WorldPictures(loop.robot)
+        self._spectra = LiveSpectra(loop.robot.attributes, loop.robot.control_dt)
         self._builder.notice, self._recording.notice = self._recording.notice or self._pictures.notice, ""
         self._pressed_keys: list[str] = []
         self._finished, self.failed = "", False
@@ -148,6 +150,8 @@ class DriveServer:
                 self._seek(value)
             case "branch":
                 self._branch()
+            case "spectra":
+                self._spectra.choose(value)
             case "ghost":
                 self._ghost.toggle()
             case "frame":
@@ -191,6 +195,7 @@ class DriveServer:
     def _close_helpers(self) -> None:
         self._ghost.close()
         self._pictures.close()
+        self._spectra.close()
 
     def _advance(self) -> None:
         record = self._loop.advance(self._events())
@@ -240,5 +245,6 @@ class DriveServer:
             snapshot = show_past_moment(snapshot, self._timeline)
             self._builder.show_other_scenery()
         picture = self._pictures.draw(self._timeline.moment, past=snapshot.past is not None)
+        spectra = self._spectra.update(self._timeline.past, self._timeline.moment)
         self._snapshot_requested = False
-        self._sent = self._send(replace(snapshot, picture=picture))
+        self._sent = self._send(replace(snapshot, picture=picture, spectra=spectra))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pdtui.core.scenery import Scenery, Traffic
     from pdtui.core.step_record import ActiveBehavior
     from pdtui.driving.ghost.ghost_snapshot import GhostSnapshot
+    from pdtui.driving.live_spectra.spectra_snapshot import SpectraSnapshot
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,7 @@ class DriveSnapshot:
         key_presses: keys that changed the run since the last snapshot.
         ends: ends of episodes since the last snapshot.
         picture: picture of a world without links, shape (rows, columns, 3); None where there is no new one.
+        spectra: spectrograms of a unit and an attribute, where they were asked for.
         past: where the moment lies that is shown; None for the present.
         ghost: the ghost; None while it is off.
     """
@@ -158,5 +160,6 @@ class DriveSnapshot:
     key_presses: tuple[KeyPress, ...] = ()
     ends: tuple[EpisodeEnd, ...] = ()
     picture: NDArray[np.uint8] | None = None
+    spectra: SpectraSnapshot | None = None
     past: PastPosition | None = None
     ghost: GhostSnapshot | None = None

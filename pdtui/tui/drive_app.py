@@ -23,11 +23,12 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import displayed_key_name
 from pdtui.tui.help_screen import HelpScreen
 from pdtui.tui.snapshot_widget import SnapshotWidget
+from pdtui.tui.spectra.spectra_pane import SpectraPane
 from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
 from pdtui.tui.terminal_driver import TerminalDriver
 from pdtui.tui.terminal_size_notice import LEAST_SIZE, TerminalSizeNotice
 from pdtui.tui.theme import THEME
-from pdtui.tui.timeline.timeline_bar import TimelineBar, TimelineRequest, describe_past_keys
+from pdtui.tui.timeline.timeline_bar import TimelineBar, describe_past_keys
 from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
 from pdtui.tui.widgets.attribute_table import AttributeTable
 from pdtui.tui.widgets.behavior_list import BehaviorList
@@ -103,6 +104,7 @@ class DriveApp(App[str], inherit_bindings=False):
                 with Container(id="below"):
                     yield bound(PathView(self.map, id="path"))
                     yield bound(UnitTable(self.map, id="units"))
+                yield bound(SpectraPane(self.map, self.connection, id="spectra"))
             with Container(id="right"):
                 yield bound(BehaviorList(self.map, id="behaviors"))
                 yield bound(AttributeTable(self.map, id="attributes"))
@@ -211,13 +213,9 @@ class DriveApp(App[str], inherit_bindings=False):
         """Change the drive's pace."""
         self.connection.change_pace(cast(PaceRequest, request))
 
-    def action_timeline(self, request: TimelineRequest) -> None:
-        """Show another moment of the run."""
-        self.query_one(TimelineBar).seek_by_key(request)
-
-    def action_branch(self) -> None:
-        """Begin a session that goes on from the moment that is shown."""
-        self.connection.branch()
+    def action_pane(self, pane: str, request: str) -> None:
+        """Have a pane do what its key asks for."""
+        self.query_one(f"#{pane}", SnapshotWidget).act(request)
 
     def action_toggle_ghost(self) -> None:
         """Turn the ghost on or off; it is no part of the run, so it may run beside a recording, too."""

@@ -57,6 +57,9 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         """Keep what later frames need of a snapshot; called once per snapshot."""
         del snapshot
 
+    def act(self, request: str) -> None:
+        """Do what a key asks of this pane."""
+
     def forget(self) -> None:
         """Drop what was kept of snapshots, as another run begins."""
 

@@ -17,7 +17,7 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 #right { width: 46; }
 #below { layout: horizontal; height: 7; }
 
-#robot, #world, #path, #units, #behaviors, #attributes, #heat {
+#robot, #world, #path, #units, #behaviors, #attributes, #heat, #spectra {
     border: round $foreground 22%;
     border-title-color: $primary;
     border-title-style: bold;
@@ -26,7 +26,7 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 }
 #behaviors, #attributes, #units { padding: 0 1; }
 #attributes { height: 8; }
-#units, #world { display: none; }
+#units, #world, #spectra { display: none; }
 #heat { height: 3; border-bottom: none; border-left: none; border-right: none; padding: 0; }
 
 /* Where there is little room, only while time stands still or a recording is watched. */
@@ -61,6 +61,13 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 .-pictured #below { display: none; }
 .-full.-pictured #below { display: block; height: 12; }
 .-full.-pictured #units { width: 1fr; }
+
+/* The spectrograms take the place of the path, and where there is little room, of the robot, too. */
+.-spectra #left { display: block; width: 1fr; }
+.-spectra #spectra { display: block; height: 3fr; }
+.-spectra #below, .-low.-spectra #robot, .-low.-spectra #world { display: none; }
+.-spectra #right { width: 46; }
+.-wide.-spectra #right { width: 60; }
 
 HelpScreen { align: center middle; background: $background 60%; }
 #help {

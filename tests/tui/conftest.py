@@ -9,6 +9,7 @@ import pytest
 
 from pdtui.core.errors import PdtuiError
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.driving.live_spectra.spectra_snapshot import SpectraChoice
 from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.drive_app import DriveApp
@@ -28,6 +29,7 @@ class ScriptedConnection:
         self.toggled = 0
         self.sought: list[int] = []
         self.branched = 0
+        self.spectra: list[SpectraChoice | None] = []
 
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:
         if not self.messages:
@@ -48,6 +50,9 @@ class ScriptedConnection:
 
     def seek(self, moment: int) -> None:
         self.sought.append(moment)
+
+    def choose_spectra(self, choice: SpectraChoice | None) -> None:
+        self.spectra.append(choice)
 
     def branch(self) -> None:
         self.branched += 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from rich.style import Style
 from textual.strip import Strip
@@ -20,13 +20,7 @@ if TYPE_CHECKING:
     from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
     from pdtui.stimulation.stimulation_map import StimulationMap
 
-TimelineRequest = Literal["back", "forward", "earlier mark", "later mark", "oldest", "last"]
-ARROW_REQUESTS: dict[str, TimelineRequest] = {
-    "left": "back",
-    "right": "forward",
-    "up": "earlier mark",
-    "down": "later mark",
-}
+ARROW_REQUESTS = {"left": "back", "right": "forward", "up": "earlier mark", "down": "later mark"}
 """What the arrows do where they can move no target: in the past, and while a recording is watched."""
 _HINTS = (("seek_back", "seek"), ("seek_last", "present"), ("branch", "branch off here"))
 _LABEL = 10  # width of the times at both ends, cells
@@ -97,8 +91,8 @@ class TimelineBar(SnapshotWidget):
             self._connection.seek(self._asked)
             self.redraw()
 
-    def seek_by_key(self, request: TimelineRequest) -> None:
-        """Ask for another moment than the one that is shown."""
+    def act(self, request: str) -> None:
+        """Ask for another moment than the one that is shown, or for a branch from there."""
         second = 1 if self.facts is None else max(1, round(1.0 / self.facts.dt))
         match request:
             case "back" | "forward":
@@ -111,13 +105,15 @@ class TimelineBar(SnapshotWidget):
                 self.seek(0)
             case "last":
                 self.seek(self.last)
+            case "branch":
+                self._connection.branch()
 
     def takes_key(self, key: str) -> bool:
         """Use a key that would change the run if it could: arrows seek, and the past refuses others."""
         past = self.snapshot is not None and self.snapshot.past is not None
         watching = self.facts is not None and self.facts.length > 0
         if (past or watching) and key in ARROW_REQUESTS:
-            self.seek_by_key(ARROW_REQUESTS[key])
+            self.act(ARROW_REQUESTS[key])
             return True
         return False
 
