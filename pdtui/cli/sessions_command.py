@@ -83,6 +83,7 @@ def show_command(file: Path, as_json: bool) -> None:
         "robot_options": dict(session.info.robot_options),
         "policy_sha256": session.info.policy_hash,
         **{name: getattr(session.info, name) for name in _SHOWN},
+        "branch": None if session.info.branch is None else asdict(session.info.branch),
         "map": session.info.map_text,
         "created": session.created,
         "outcome": session.outcome,

@@ -119,8 +119,8 @@ def measure_discrepancies(
 ) -> Floats:
     """Compute the discrepancies of J attributes and U units over one episode, shape (J, U).
 
-    As `match_units` does, but in this thread alone, and without changing how many threads other libraries use. The
-    episode is at least one window long.
+    As `match_units` does, but in this thread alone, and without changing how many threads other libraries
+    use. The episode is at least one window long.
     """
     (target,) = scaled_attribute_series([episode], attributes, preset)
     (series,) = scaled_activation_series([episode], slice(None), preset)
