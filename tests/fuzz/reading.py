@@ -77,6 +77,7 @@ def read_session_file(path: Path) -> None:
     from rich.console import Console
 
     from pdtui.cli.output.session_tables import session_comparison_table, session_details
+    from pdtui.sessions.drive_course import compare_courses, read_drive_course
     from pdtui.driving.keystrokes import format_keystrokes
     from pdtui.driving.session_replay import config_from_session
     from pdtui.sessions.session_comparison import compare_sessions
@@ -101,7 +102,9 @@ def read_session_file(path: Path) -> None:
     with Path("/dev/null").open("w") as nowhere:
         console = Console(file=nowhere)
         console.print(session_details(session, summarise_session(session)))
-        console.print(session_comparison_table(compare_sessions(session, session)))
+        course = read_drive_course(session)
+        paths = compare_courses(course, course, 0)
+        console.print(session_comparison_table(compare_sessions(session, session), (session, session), paths))
     format_keystrokes(session.events)
     config_from_session(session, str(path))
 

@@ -84,8 +84,8 @@ def compute_spectra(
     The windows end with the last step. Discrepancies are those of section 3.2 over these windows.
     """
     if len(stretch) < preset.length:
-        missing = f"{len(stretch)} of the {preset.length} control steps of a window since the last jump"
-        return SpectraSnapshot(choice, missing)
+        found = f"a window needs {preset.length} control steps without a jump, here are {len(stretch)}"
+        return SpectraSnapshot(choice, found)
     steps = len(stretch) - (len(stretch) - preset.length) % preset.hop
     records = stretch[-steps:]
     values = unwrap_angles(np.array([record.attributes for record in records]), attributes)

@@ -10,9 +10,9 @@ from pdtui.core.drive_events import DriveEvent
 from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
 
-MOST_BYTES = 64 << 20
-"""Memory of the steps that are kept: of the Ant, 20 minutes."""
-_OVERHEAD = 2048  # bytes of a record besides its arrays
+MOST_BYTES = 48 << 20
+"""Memory of the steps that are kept: of the Ant, ten minutes."""
+_OVERHEAD = 1024  # bytes of a record besides its arrays
 
 
 class PastStep(NamedTuple):

@@ -100,4 +100,5 @@ def shrink_picture(
     for down in range(min(block, rows)):  # much faster than a mean over two axes of a view
         for across in range(min(block, columns)):
             total += picture[down::block, across::block][:high, :wide]
-    return (total // (min(block, rows) * min(block, columns))).astype(np.uint8)
+    means: NDArray[np.uint8] = (total // (min(block, rows) * min(block, columns))).astype(np.uint8)
+    return means

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -107,7 +108,7 @@ class SpectraPane(SnapshotWidget):
             said = "computing the spectrograms" if spectra is None else spectra.message
             return [
                 ScreenRow(width).add(name, STYLES.title).strip(),
-                ScreenRow(width).add(said, STYLES.muted).strip(),
+                *(ScreenRow(width).add(line, STYLES.muted).strip() for line in wrap(said, width)),
             ]
         beside = width >= _LEAST_WIDE
         listed = max(0, min(len(spectra.ranking), height - 1 if beside else max(1, height // 4)))

@@ -22,14 +22,23 @@ if TYPE_CHECKING:
 
 ARROW_REQUESTS = {"left": "back", "right": "forward", "up": "earlier mark", "down": "later mark"}
 """What the arrows do where they can move no target: in the past, and while a recording is watched."""
-_HINTS = (("seek_back", "seek"), ("seek_last", "present"), ("branch", "branch off here"))
+_HINTS = (
+    (("seek_back", "seek_forward"), "seek"),
+    (("pause",), "play"),
+    (("seek_last",), "present"),
+    (("branch",), "branch off here"),
+)
 _LABEL = 10  # width of the times at both ends, cells
 _PATIENCE = 4  # snapshots within which the drive shows what was asked for, or something else instead
 
 
 def describe_past_keys(keys: Mapping[str, tuple[str, str]]) -> str:
     """Return what can be done while the past is shown; keys with their descriptions by id of the binding."""
-    return "  ".join(f"{displayed_key_name(keys[name][0])} {says}" for name, says in _HINTS if name in keys)
+    said = []
+    for names, says in _HINTS:
+        known = [displayed_key_name(keys[name][0]) for name in names if name in keys]
+        said += [" ".join([*known, says])] if known else []
+    return "  ".join(said)
 
 
 class TimelineBar(SnapshotWidget):

@@ -17,7 +17,8 @@ from pdtui.tui.cell_text import ScreenRow
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
-_LEVELS = 4  # bits that are kept of each colour, so that neighbours are often the same
+# Of each colour, four bits are kept, so that neighbours are often the same.
+_KEPT_BITS, _MIDDLE = np.uint8(0xF0), np.uint8(0x08)
 
 
 class WorldPicture(SnapshotWidget):
@@ -36,7 +37,7 @@ class WorldPicture(SnapshotWidget):
         if self._picture is None:
             return [ScreenRow(width).add("waiting for the picture", STYLES.faint).strip()]
         pixels = fit_picture(self._picture, 2 * height, width)
-        pixels = (pixels >> (8 - _LEVELS) << (8 - _LEVELS)) | (1 << (7 - _LEVELS))
+        pixels = (pixels & _KEPT_BITS) | _MIDDLE
         lines, columns = len(pixels) // 2, pixels.shape[1]
         left = (width - columns) // 2
         margin = [Segment(" " * left)] if left else []
@@ -64,7 +65,8 @@ def fit_picture(picture: NDArray[np.uint8], most_rows: int, most_columns: int) -
     wide = max(1, min(most_columns, round(columns * scale)))
     down = ((np.arange(high) + 0.5) * rows / high).astype(np.int64)
     across = ((np.arange(wide) + 0.5) * columns / wide).astype(np.int64)
-    return picture[down[:, None], across]
+    fitted: NDArray[np.uint8] = picture[down[:, None], across]
+    return fitted
 
 
 def _line(upper: NDArray[np.uint8], lower: NDArray[np.uint8]) -> list[Segment]:

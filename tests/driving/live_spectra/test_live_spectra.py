@@ -66,7 +66,7 @@ def test_too_few_steps_since_a_jump_are_said(driven: tuple[ControlLoop, PastStep
     found = compute_spectra(
         past.latest_stretch(60, 1000), loop.robot.attributes, SpectraChoice(0), PAPER, 0.05
     )
-    assert found.message == "40 of the 64 control steps of a window since the last jump"
+    assert found.message == "a window needs 64 control steps without a jump, here are 40"
 
 
 def test_they_come_while_they_are_asked_for(driven: tuple[ControlLoop, PastSteps]) -> None:
