@@ -77,9 +77,9 @@ def read_session_file(path: Path) -> None:
     from rich.console import Console
 
     from pdtui.cli.output.session_tables import session_comparison_table, session_details
-    from pdtui.sessions.drive_course import compare_courses, read_drive_course
     from pdtui.driving.keystrokes import format_keystrokes
     from pdtui.driving.session_replay import config_from_session
+    from pdtui.sessions.drive_course import compare_courses, read_drive_course
     from pdtui.sessions.session_comparison import compare_sessions
     from pdtui.sessions.session_header import read_session_header
     from pdtui.sessions.session_integrity import examine_session
