@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pdtui.cli.options.ghost_options import ghost_options
 from pdtui.cli.options.robot_option_flag import robot_option_flag
 from pdtui.cli.options.shared_options import (
     FILE_PATH,
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
 @robot_option_flag
 @map_option
 @map_policy_option
+@ghost_options
 @import_option_flags
 @force_option
 @integer_option("--seed", least=0, most=2**31 - 1, default=0, help="Seed of every random choice.")
@@ -88,10 +91,12 @@ def drive_command(
     headless: bool,
     keys: Path | None,
     steps: int,
+    add_ghost: Callable[[DriveConfig], DriveConfig],
     **options: Any,
 ) -> None:
     """Drive ROBOT with the keys of its map. ROBOT may also be a map file."""
     config = build_drive_config(robot, map_name, policy, import_options, without_map=True, **options)
+    config = add_ghost(config)
     if record is not None and record.exists() and not overwrite:
         raise SessionError(f"{record}: already exists; --overwrite replaces it")
     if overwrite and record is None:

@@ -215,7 +215,7 @@ class DriveApp(App[str], inherit_bindings=False):
 
     def action_pane(self, pane: str, request: str) -> None:
         """Have a pane do what its key asks for."""
-        cast(SnapshotWidget, self.query_one(f"#{pane}")).act(request)
+        cast(SnapshotWidget, self.query_one(f"#{pane}")).answer_key(request)
 
     def action_toggle_ghost(self) -> None:
         """Turn the ghost on or off; it is no part of the run, so it may run beside a recording, too."""

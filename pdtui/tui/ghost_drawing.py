@@ -32,7 +32,7 @@ def describe_ghost(ghost: GhostSnapshot, step: int) -> str:
         return f"ghost: {make_printable(ghost.message)}"
     if ghost.condition == "running" and ghost.latest is not None:
         behind = step - ghost.latest.step
-        since = f"ghost since step {ghost.first}"
+        since = " ".join(filter(None, ("ghost", make_printable(ghost.label), f"since step {ghost.first}")))
         return since if behind < _BEHIND else f"ghost: {behind} steps behind"
     return _CONDITIONS.get(ghost.condition, "")
 

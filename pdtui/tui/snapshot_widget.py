@@ -57,7 +57,7 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         """Keep what later frames need of a snapshot; called once per snapshot."""
         del snapshot
 
-    def act(self, request: str) -> None:
+    def answer_key(self, request: str) -> None:
         """Do what a key asks of this pane."""
 
     def forget(self) -> None:

@@ -43,6 +43,10 @@ class GhostRunner(Closable):
 
     def __init__(self, config: DriveConfig, loop: ControlLoop) -> None:
         self._config, self._loop = config, loop
+        self._variant = config.ghost
+        self._label = "" if config.ghost is None else config.ghost.label
+        # A ghost with another policy runs on also while nothing is latched.
+        self._runs_alone = config.ghost is not None and config.ghost.has_other_policy
         self._process: GhostProcess | None = None
         self._turned_on = False
         self._first = -1
@@ -62,7 +66,8 @@ class GhostRunner(Closable):
         """Turn the ghost on, for which a process is started, or off, which ends the process."""
         if self._process is None:
             self._process, self._turned_on, self._failure = GhostProcess(self._config), True, ""
-            self.notice = "the ghost is on: it runs on without the behavior that you latch"
+            told = f"it is {self._label}" if self._label else "it runs on without the behavior that you latch"
+            self.notice = f"the ghost is on: {told}"
         else:
             self.close()
             self.notice = "the ghost is off"
@@ -76,6 +81,8 @@ class GhostRunner(Closable):
         elif not self._ended:
             later = record.step > self._first  # earlier events are part of the state
             events = [event for event in record.events if later and event.kind in _TAKEOVER]
+            if self._variant is not None:
+                events += self._variant.list_events(record, self._loop.map, first=not later)
             self._unmatched[record.step] = record.attributes
             self._process.advance(record.step, events)
             if len(self._unmatched) > MOST_BEHIND:
@@ -105,6 +112,7 @@ class GhostRunner(Closable):
             self._latest,
             np.array([step.attributes for step in steps]).reshape(-1, len(self._loop.robot.attributes)),
             _path(steps),
+            self._label,
         )
 
     def close(self) -> None:
@@ -120,9 +128,10 @@ class GhostRunner(Closable):
         latched = {behavior.name for behavior in self._loop.latch.active}
         pressed = [event for event in events if event.kind in ("behavior", "default")]
         jumped = any(event.jumps for event in events)
-        if jumped or (pressed and not latched):
+        goes_on = bool(latched or self._runs_alone)
+        if jumped or (pressed and not goes_on):
             self._end()
-        if any(event.name in latched for event in pressed) or (latched and (jumped or self._turned_on)):
+        if any(event.name in latched for event in pressed) or (goes_on and (jumped or self._turned_on)):
             self._begin(self._process)
         self._turned_on = False
 
@@ -134,7 +143,7 @@ class GhostRunner(Closable):
         except PdtuiError as error:  # the drive goes on
             self._fail(f"no ghost: {error}")
         else:
-            process.start(GhostStart(loop.step, state, loop.robot.digest()))
+            process.start(GhostStart(loop.step, state, loop.robot.digest(), self._runs_alone))
             self._first = loop.step
 
     def _end(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from pdtui.core.attributes import Floats
@@ -26,11 +26,13 @@ class GhostStart:
         step: the control step before which the drive was in that state.
         state: the state, with nothing latched.
         digest: digest of the simulator's state.
+        is_other_policy: whether the ghost's policy cannot go on from the state of the drive's.
     """
 
     step: int
     state: DriveState
     digest: int
+    is_other_policy: bool = False
 
 
 class GhostStepInput(NamedTuple):
@@ -80,7 +82,11 @@ def run_ghost(
     """
     if start is not None:
         loop.step = start.step
-        loop.restore_state(start.state)
+        state = start.state
+        if start.is_other_policy:
+            loop.policy.reset()
+            state = replace(state, policy=loop.policy.snapshot())
+        loop.restore_state(state)
         if loop.robot.digest() != start.digest:
             raise RobotError(
                 f"{loop.robot.name}: expected the state in which the behavior was latched, got another"

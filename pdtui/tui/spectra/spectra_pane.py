@@ -55,7 +55,7 @@ class SpectraPane(SnapshotWidget):
         if old is not None and facts is not None and old.branches != facts.branches:
             self._connection.choose_spectra(self._choice)
 
-    def act(self, request: str) -> None:
+    def answer_key(self, request: str) -> None:
         """Open or close the pane, or go to the next attribute, or to the next of the ranked units."""
         count = 0 if self.facts is None else len(self.facts.attributes)
         if not count:

@@ -100,7 +100,7 @@ class TimelineBar(SnapshotWidget):
             self._connection.seek(self._asked)
             self.redraw()
 
-    def act(self, request: str) -> None:
+    def answer_key(self, request: str) -> None:
         """Ask for another moment than the one that is shown, or for a branch from there."""
         second = 1 if self.facts is None else max(1, round(1.0 / self.facts.dt))
         match request:
@@ -122,7 +122,7 @@ class TimelineBar(SnapshotWidget):
         past = self.snapshot is not None and self.snapshot.past is not None
         watching = self.facts is not None and self.facts.length > 0
         if (past or watching) and key in ARROW_REQUESTS:
-            self.act(ARROW_REQUESTS[key])
+            self.answer_key(ARROW_REQUESTS[key])
             return True
         return False
 

@@ -176,7 +176,9 @@ class AttributeTable(SnapshotWidget):
             wraps = self.facts.attributes[index].wraps
             value = format_number(other)
             change = f" Δ{format_signed(wrap_angle(own - other) if wraps else own - other)}"
-        line.add(_WITHOUT if self.snapshot.ghost is not None else "", STYLES.ghost, layout.name)
+        ghost = self.snapshot.ghost
+        said = "" if ghost is None else make_printable(ghost.label) or _WITHOUT
+        line.add(said, STYLES.ghost, layout.name)
         line.add(" " + value, STYLES.ghost, _VALUE, right=True)
         return line.add(change, STYLES.muted, layout.unit + layout.target)
 
