@@ -161,7 +161,7 @@ class DriveServer:
 
     def _press(self, key: str) -> None:
         """Note a key for the next control step; while the drive is paused, it changes the state at once."""
-        if self._timeline.viewed is not None or self._timeline.repeats:
+        if self._watched is not None or self._timeline.viewed is not None or self._timeline.repeats:
             self._builder.notice = "keys change the run at the present only"
             return
         self._pressed_keys.append(key)
