@@ -231,7 +231,7 @@ class DriveServer:
         if difference := watched.compare(record):
             self._finished, self.failed = difference, True
         elif watched.ended:
-            self._finished = f"identical, {watched.steps} steps"
+            self._finished = watched.verdict
 
     def _send_snapshot(self) -> None:
         snapshot = self._builder.build_snapshot(
