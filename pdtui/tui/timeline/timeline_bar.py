@@ -95,10 +95,13 @@ class TimelineBar(SnapshotWidget):
 
     def seek(self, moment: int) -> None:
         """Ask for a moment, which the bar shows at once."""
-        if self.snapshot is not None:
-            self._asked, self._waited = min(max(moment, 1), max(self.last, 1)), 0
-            self._connection.seek(self._asked)
-            self.redraw()
+        wanted = min(max(moment, 1), max(self.last, 1))
+        shown = self._asked is None and self.snapshot is not None and self.snapshot.past is None
+        if self.snapshot is None or (shown and wanted == self.moment):
+            return  # what is shown already does not pause the drive
+        self._asked, self._waited = wanted, 0
+        self._connection.seek(wanted)
+        self.redraw()
 
     def answer_key(self, request: str) -> None:
         """Ask for another moment than the one that is shown, or for a branch from there."""
@@ -118,7 +121,7 @@ class TimelineBar(SnapshotWidget):
                 self._connection.branch()
 
     def takes_key(self, key: str) -> bool:
-        """Use a key that would change the run if it could: arrows seek, and the past refuses others."""
+        """Seek by an arrow where it can move no target; return whether the key was one."""
         past = self.snapshot is not None and self.snapshot.past is not None
         watching = self.facts is not None and self.facts.length > 0
         if (past or watching) and key in ARROW_REQUESTS:
