@@ -82,12 +82,12 @@ class StatusLine(SnapshotWidget):
     def _pace(self) -> tuple[str, Style]:
         snapshot = self.snapshot
         assert snapshot is not None
-        if snapshot.finished:
-            return "■ over", STYLES.bad
-        kind = "watching " if self.watching else ""
         if snapshot.past is not None:
             sign = "⏸" if snapshot.paused else f"▶ {snapshot.speed:g}×"
             return f"{sign} {snapshot.past.present - snapshot.step} steps ago", STYLES.warn
+        if snapshot.finished:
+            return "■ over", STYLES.bad
+        kind = "watching " if self.watching else ""
         asked = f"{snapshot.speed:g}×"
         if snapshot.paused:
             return f"{kind}⏸ paused at {asked}", STYLES.warn
