@@ -72,7 +72,7 @@ class PastSteps:
     def latest_stretch(self, moment: int, most: int) -> list[StepRecord]:
         """Return at most so many control steps up to a moment, without a jump or an ending between."""
         stretch: list[StepRecord] = []
-        for number in range(moment, max(self.oldest, moment - most + 1) - 1, -1):
+        for number in range(moment, max(self.oldest, moment - most + 1, 1) - 1, -1):
             record = self.find(number).record
             if stretch and record.episode != stretch[-1].episode:
                 break

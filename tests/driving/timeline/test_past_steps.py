@@ -75,6 +75,7 @@ def test_a_stretch_does_not_reach_over_a_jump(driven: Drive) -> None:
     _, timeline, _ = driven
     assert [record.step for record in timeline.past.latest_stretch(100, 64)] == list(range(75, 100))
     assert [record.step for record in timeline.past.latest_stretch(60, 16)] == list(range(44, 60))
+    assert PastSteps().latest_stretch(0, 16) == []
 
 
 def test_a_branch_repeats_its_beginning_rewinds_included(driven: Drive) -> None:
