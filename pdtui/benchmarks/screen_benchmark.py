@@ -19,8 +19,8 @@ from pdtui.core.errors import ScreenError
 
 SIZE = (48, 160)
 """Rows and columns of the terminal."""
-_PATIENCE = 120.0
-"""Longest time to wait for the screen, s; a loaded machine may take a minute."""
+_PATIENCE = 300.0
+"""Longest time to wait for the screen, s; a loaded machine may take minutes."""
 _PRESSES = 20
 _ECHO_SIGN, _CONFIRMED_SIGN = b"pressed", b"latched"
 _FRAME_SIGN, _ROBOT_SIGN = b"behaviors", b"m/s"
