@@ -25,7 +25,7 @@ from pdtui.driving.pacer import Pacer
 from pdtui.driving.pictures.world_pictures import WorldPictures
 from pdtui.driving.replays.step_by_step_comparison import StepByStepComparison
 from pdtui.driving.snapshot_builder import SnapshotBuilder, describe_loop
-from pdtui.driving.timeline.branching import BRANCHES_OF_RECORDINGS, configure_branch, find_branch_origin
+from pdtui.driving.timeline.branch_config import BRANCHES_OF_RECORDINGS, configure_branch, find_branch_origin
 from pdtui.driving.timeline.past_snapshot import show_past_moment
 from pdtui.driving.timeline.run_timeline import RunTimeline
 from pdtui.driving.timeline.watched_marks import list_watched_marks
