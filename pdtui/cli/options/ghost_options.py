@@ -70,6 +70,7 @@ def _add_ghost(
         other = replace(
             config, stimulation_map=resolve_map_policy(map_without_behaviors(robot, policy or ""))
         )
+    other.stimulation_map.check_robot(robot)
     # The same world, whatever options the other map names.
     options = config.stimulation_map.robot_options
     other = replace(other, policy="", stimulation_map=replace(other.stimulation_map, robot_options=options))
