@@ -14,8 +14,9 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_compatibility import check_policy_fit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
+from pdtui.probing.rollout_batch import run_rollouts
 from pdtui.probing.start_states import StartState
-from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, run_rollout
+from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome
 from pdtui.robots import RobotSpec, make_robot, open_robot
 from pdtui.robots.robot import Robot
 
@@ -48,7 +49,7 @@ def _apply(work: Callable[[Robot, Policy, WorkItem], WorkResult], pair: _Pair, i
 
 def _run_chunk(pair: _Pair, chunk: _Chunk) -> list[RolloutOutcome]:
     jobs, starts, steps, measure_from = chunk
-    return [run_rollout(*pair, starts[index], plan, steps, measure_from) for plan, index in jobs]
+    return run_rollouts(*pair, starts, jobs, steps, measure_from)
 
 
 class RolloutPool(Closable):

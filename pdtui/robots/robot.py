@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -23,6 +23,9 @@ from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions, format_robot_options
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
 from pdtui.robots.task import Task, find_task
+
+if TYPE_CHECKING:
+    from pdtui.robots.lockstep.lockstep_robots import LockstepRobots
 
 ResetResult = tuple[Floats, dict[str, Any]]
 StepResult = tuple[Floats, float, bool, bool, dict[str, Any]]
@@ -146,10 +149,14 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         to start anew. Where many roll-outs are compared, it need not be the last bit.
 
         Returns:
-            Largest deviation of an attribute 100 steps after a `restore`, in the attribute's unit; 0 for a
-            robot that always restores exactly.
+            Largest deviation of an attribute 100 steps after a `restore`, in its unit; 0 if there is none.
         """
         return 0.0
+
+    def make_lockstep_robots(self, count: int) -> LockstepRobots | None:
+        """Return copies of the robot that are stepped together; None if it offers none."""
+        del count
+        return None
 
     @abstractmethod
     def digest(self) -> int:
