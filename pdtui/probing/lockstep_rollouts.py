@@ -41,7 +41,7 @@ class LockstepRollouts:
         return self._robots.world_key(state)
 
     def restore(self, starts: Sequence[RobotState]) -> Floats:
-        """Bring copies into the states in which roll-outs begin, and return their attributes, shape (n, J)."""
+        """Bring copies into the states in which roll-outs begin; return their attributes, shape (n, J)."""
         self._count = len(starts)
         for row, start in enumerate(starts):
             self._robots.restore(row, start)
@@ -61,9 +61,8 @@ class LockstepRollouts:
         Returns:
             How each episode ended; None for one that went on.
         """
-        observations, attributes = (
-            one[: self._count] for one in (self._robots.observations, self._robots.attributes)
-        )
+        observations = self._robots.observations[: self._count]
+        attributes = self._robots.attributes[: self._count]
         outcomes: list[Outcome | None] = [None] * self._count
         going = list(range(self._count))
         for step in range(steps):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -14,6 +14,7 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_compatibility import check_policy_fit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
+from pdtui.probing.lockstep_rollouts import FEWEST_TOGETHER, make_lockstep_rollouts
 from pdtui.probing.rollout_batch import run_rollouts
 from pdtui.probing.start_states import StartState
 from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome
@@ -23,6 +24,8 @@ from pdtui.robots.robot import Robot
 # Control steps that a worker is sent at once: enough to make the cost of sending them negligible, few enough
 # for progress to be reported about once per second.
 _STEPS_PER_CHUNK = 1200
+# Long roll-outs in lock step are worth a longer wait: this many together, in no fewer chunks than that.
+_LARGEST_BATCH, _LEAST_CHUNKS = 16, 4
 
 WorkItem = TypeVar("WorkItem")
 WorkResult = TypeVar("WorkResult")
@@ -112,6 +115,8 @@ class RolloutPool(Closable):
             WorkerError: a worker process died.
         """
         size = max(1, _STEPS_PER_CHUNK // steps)
+        if self._offers_lockstep:
+            size = max(size, min(_LARGEST_BATCH, len(jobs) // _LEAST_CHUNKS))
         # Roll-outs from one start follow each other, because some robots return to the last start quickly.
         order = sorted(range(len(jobs)), key=lambda number: jobs[number][1])
         numbers = [order[low : low + size] for low in range(0, len(jobs), size)]
@@ -139,6 +144,10 @@ class RolloutPool(Closable):
             WorkerError: a worker process died.
         """
         return self._pool.map(partial(_apply, function), items, progress)
+
+    @cached_property
+    def _offers_lockstep(self) -> bool:
+        return make_lockstep_rollouts(self.robot, self.policy, FEWEST_TOGETHER) is not None
 
     def count_rollouts(self, outcomes: Iterable[RolloutOutcome]) -> None:
         """Add roll-outs to `rollouts` and `control_steps`, whether they were run here or read from a file."""

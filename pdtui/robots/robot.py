@@ -136,11 +136,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
 
     @abstractmethod
     def restore(self, snapshot: RobotState) -> None:
-        """Return to a snapshot, bit-exactly.
-
-        Raises:
-            RobotError: The snapshot is of another robot or has another size.
-        """
+        """Return to a snapshot, bit-exactly; one of another robot or size is a `RobotError`."""
 
     def allow_near_restores(self) -> float:
         """Let `restore` be as fast as it can be from now on, and return how far it may be off.
@@ -165,8 +161,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     def outcome_of(self, terminated: bool, truncated: bool, info: Mapping[str, Any]) -> Outcome | None:
         """Return the outcome of the episode after a step that returned this; None while there is none.
 
-        Raises:
-            RobotError: The word in the info is no outcome.
+        A word in the info that is no outcome is a `RobotError`.
         """
         return outcome_of_step(terminated, truncated, info, self.name)
 

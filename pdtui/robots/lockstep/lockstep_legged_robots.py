@@ -39,7 +39,10 @@ class LockstepLeggedRobots:
         self.attributes = np.zeros((count, len(robot.attributes)))
 
     def world_key(self, state: RobotState) -> Hashable:
-        return state.extras[0].tobytes()  # the ground is in the model, which all copies share
+        # The ground is in the model, which all copies share; a plane is the same for all seeds.
+        terrain, seed = state.extras[0].tolist()
+        level = self._robot.starts[int(terrain) :][:1] in ((), ("plane",))
+        return None if level else (terrain, seed)
 
     def restore(self, row: int, state: RobotState) -> None:
         robot, own = self._robot, self._robot.data
