@@ -59,6 +59,7 @@ class RolloutPool(Closable):
     """Runs roll-outs of one policy on one robot, in a `WorkerPool`.
 
     The results do not depend on the number of workers, as each roll-out depends on its start and plan only.
+    Those in lock step, see `run_rollouts`, also depend on which run together, but not beyond rounding.
 
     Each worker process loads robot and policy by name. If one of the two is given as an object, all roll-outs
     run in this process. The import options say what the weights file leaves open.
@@ -115,7 +116,7 @@ class RolloutPool(Closable):
             WorkerError: a worker process died.
         """
         size = max(1, _STEPS_PER_CHUNK // steps)
-        if self._offers_lockstep:
+        if self.offers_lockstep:
             size = max(size, min(_LARGEST_BATCH, len(jobs) // _LEAST_CHUNKS))
         # Roll-outs from one start follow each other, because some robots return to the last start quickly.
         order = sorted(range(len(jobs)), key=lambda number: jobs[number][1])
@@ -146,7 +147,8 @@ class RolloutPool(Closable):
         return self._pool.map(partial(_apply, function), items, progress)
 
     @cached_property
-    def _offers_lockstep(self) -> bool:
+    def offers_lockstep(self) -> bool:
+        """Whether roll-outs that overwrite units run in lock step."""
         return make_lockstep_rollouts(self.robot, self.policy, FEWEST_TOGETHER) is not None
 
     def count_rollouts(self, outcomes: Iterable[RolloutOutcome]) -> None:

@@ -150,7 +150,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         return 0.0
 
     def make_lockstep_robots(self, count: int) -> LockstepRobots | None:
-        """Return copies of the robot that are stepped together; None if it offers none."""
+        """Return copies of the robot that are stepped together; None where that gains too little."""
         del count
         return None
 

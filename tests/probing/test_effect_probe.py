@@ -91,8 +91,7 @@ def test_the_same_start_is_rolled_out_unperturbed_once(policy_file: Path, starts
         assert pool.rollouts == 6
         second = prober.measure_plans([Stimulation((0,), (1.0,))], starts[1:], steps=10)
         assert pool.rollouts == 8
-    # Which roll-outs run together is no matter beyond rounding.
-    np.testing.assert_allclose(first.effects[:, 1:], second.effects, rtol=1e-5, atol=1e-6)
+    np.testing.assert_array_equal(first.effects[:, 1:], second.effects)
 
 
 def test_a_fall_before_the_measured_steps_leaves_no_number(

@@ -19,7 +19,7 @@ from pdtui.stimulation.stimulation_map import PidGains
 TOLERANCE = 1e-3
 
 
-@pytest.mark.parametrize("name", ["anymal", "walker"])
+@pytest.mark.parametrize("name", ["anymal", "cassie"])
 def test_outcomes_are_those_of_roll_outs_one_by_one(name: str) -> None:
     with make_robot(name) as robot:
         policy = load_policy(name, name)
@@ -27,9 +27,7 @@ def test_outcomes_are_those_of_roll_outs_one_by_one(name: str) -> None:
         target = robot.attributes[0].name
         gains = PidGains(target, 1.0, 0.0, 0.0, 2.0, 0.1)
         controlled = PidStimulationPlan(Stimulation((4,), (1.0,)), gains, 0.5, relative=True)
-            Stimulation((4,), (1.0,)), PidGains(target, 1.0, 0.0, 0.0, 2.0, 0.1), 0.5, relative=True
-        )
-        falling = Stimulation.of({unit: 5.0 for unit in range(policy.units)})
+        falling = Stimulation.of(dict.fromkeys(range(policy.units), 5.0))
         jobs: list[RolloutJob] = [
             *((Stimulation((unit,), (2.0,)), unit % 2) for unit in (0, 7, policy.units - 1)),
             (controlled, 0),

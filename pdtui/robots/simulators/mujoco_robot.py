@@ -15,8 +15,6 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError, SimulationDiverged
 from pdtui.core.robot_links_and_state import Link, RobotState
 from pdtui.robots.legged.foot_contacts import read_mujoco_contacts
-from pdtui.robots.lockstep.lockstep_mujoco_robots import LockstepMujocoRobots
-from pdtui.robots.lockstep.lockstep_robots import LockstepRobots
 from pdtui.robots.robot import Robot
 from pdtui.robots.simulators.mujoco_disturbances import find_push_directions, push_root, scale_model
 
@@ -169,11 +167,6 @@ class MujocoRobot(Robot):
         write_mujoco_state(self.model, self.data, snapshot.state, self.name)
         self._restore_arrays(snapshot.extras)
         self.np_random.bit_generator.state = snapshot.rng
-
-    def make_lockstep_robots(self, count: int) -> LockstepRobots | None:
-        # A class with snapshots of its own may have state that the copies do not know.
-        own = type(self).snapshot is MujocoRobot.snapshot and type(self).restore is MujocoRobot.restore
-        return LockstepMujocoRobots(self, count) if own else None
 
     def digest(self) -> int:
         mujoco.mj_getState(self.model, self.data, self._state_buffer, _STATE)
