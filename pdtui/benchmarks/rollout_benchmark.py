@@ -96,14 +96,20 @@ def bench_rollouts(
             for part in (_one_by_one, _together)
         )
     table = np.array(rates)
-    shares = np.median(table[:, 1:] / table[:, :1], axis=0)
+    bare, one_by_one, lockstep = np.median(table, axis=0).tolist()
+    one_by_one_share, lockstep_share = np.median(table[:, 1:] / table[:, :1], axis=0).tolist()
+    difference, same_order = compare_outcomes(alone, together)
     return RolloutBenchmark(
-        robot.name,
-        workers,
-        *np.median(table, axis=0).tolist(),
-        *shares.tolist(),
-        float(np.median(table[:, 2] / table[:, 1])),
-        *compare_outcomes(alone, together),
+        robot=robot.name,
+        workers=workers,
+        bare=bare,
+        one_by_one=one_by_one,
+        lockstep=lockstep,
+        one_by_one_share=one_by_one_share,
+        lockstep_share=lockstep_share,
+        ratio=float(np.median(table[:, 2] / table[:, 1])),
+        difference=difference,
+        same_order=same_order,
     )
 
 

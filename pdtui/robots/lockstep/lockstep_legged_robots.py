@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
-from pdtui.core.attributes import Floats
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.outcome import Outcome
 from pdtui.core.robot_links_and_state import RobotState
@@ -54,7 +54,7 @@ class LockstepLeggedRobots:
         finally:
             robot.data = own
 
-    def step(self, rows: Sequence[int], actions: Floats) -> list[Outcome | None]:
+    def step(self, rows: Sequence[int], actions: NDArray[np.float32]) -> list[Outcome | None]:
         robot, one = self._robot, self._robot.description
         chosen = np.array(rows, np.intp)
         self._last_action[chosen], self._action[chosen] = self._action[chosen], actions

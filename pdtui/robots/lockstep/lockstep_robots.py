@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pdtui.core.attributes import Floats
 from pdtui.core.outcome import Outcome
 from pdtui.core.robot_links_and_state import RobotState
@@ -33,7 +36,7 @@ class LockstepRobots(Protocol):
             RobotError: The state is of another robot or has another size.
         """
 
-    def step(self, rows: Sequence[int], actions: Floats) -> list[Outcome | None]:
+    def step(self, rows: Sequence[int], actions: NDArray[np.float32]) -> list[Outcome | None]:
         """Let some copies take one control step.
 
         Args:
