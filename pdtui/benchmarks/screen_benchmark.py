@@ -21,7 +21,7 @@ SIZE = (48, 160)
 """Rows and columns of the terminal."""
 _PATIENCE = 300.0
 """Longest time to wait for the screen, s; a loaded machine may take minutes."""
-_PRESSES = 20
+_PRESSES, _LONGEST_ANSWER = 20, 10.0  # s
 _ECHO_SIGN, _CONFIRMED_SIGN = b"pressed", b"latched"
 _FRAME_SIGN, _ROBOT_SIGN = b"behaviors", b"m/s"
 
@@ -89,7 +89,10 @@ def bench_screen(arguments: Sequence[str], seconds: float, keys: Sequence[str] =
 
 
 def _time_keys(terminal: int, key: str, clear: str) -> list[tuple[float, float]]:
-    """Press a behavior's key again and again; return the times to its echo and to the drive's answer, s."""
+    """Press a behavior's key again and again; return the times to its echo and to the drive's answer, s.
+
+    A press that is not answered is left out: it latched again what had not been cleared yet.
+    """
     times = []
     for _ in range(_PRESSES):
         os.write(terminal, clear.encode())
@@ -97,11 +100,12 @@ def _time_keys(terminal: int, key: str, clear: str) -> list[tuple[float, float]]
         start = time.monotonic()
         os.write(terminal, key.encode())
         echo, seen = 0.0, b""
-        while _CONFIRMED_SIGN not in seen and time.monotonic() - start < _PATIENCE:
+        while _CONFIRMED_SIGN not in seen and time.monotonic() - start < _LONGEST_ANSWER:
             seen += _read(terminal, 0.01)
             if not echo and (_ECHO_SIGN in seen or _CONFIRMED_SIGN in seen):
                 echo = time.monotonic() - start
-        times.append((echo, time.monotonic() - start))
+        if _CONFIRMED_SIGN in seen:
+            times.append((echo, time.monotonic() - start))
     return times
 
 
