@@ -74,6 +74,4 @@ class StepByStepComparison:
         difference = self._comparison.difference
         if difference is None:
             return f"identical, {self.steps} steps"
-        return (
-            f"bits differ from step {difference.step} on, as elsewhere they may; {self.steps} steps"
-        )
+        return f"bits differ from step {difference.step} on, as elsewhere they may; {self.steps} steps"

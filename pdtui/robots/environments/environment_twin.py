@@ -60,6 +60,13 @@ class EnvironmentTwin:
             return None
         return shrink_picture(picture.astype(np.uint8))
 
+    @property
+    def steps_behind(self) -> int:
+        """Number of actions that the twin has not followed yet; its picture is that much older."""
+        number, done = self._followed
+        actions = len(self._robot.actions_since_reset)
+        return actions - done if number == self._robot.resets else actions
+
     def close(self) -> None:
         """Close the twin."""
         self._env.close()
@@ -79,8 +86,8 @@ class EnvironmentTwin:
             self._env.reset(seed=robot.episode_seed)
             self._followed = number, 0
         until = time.monotonic() + _CATCHING_UP
-        done = self._followed[1]
-        while done < len(actions) and time.monotonic() < until:
+        first = done = self._followed[1]
+        while done < len(actions) and (done == first or time.monotonic() < until):
             taken = vector_to_action(self._env.action_space, actions[done].astype(np.float32), robot.name)
             self._env.step(taken)
             done += 1
