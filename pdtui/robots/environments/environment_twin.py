@@ -42,11 +42,15 @@ class EnvironmentTwin:
         os.environ.setdefault("SDL_AUDIODRIVER", "dummy")
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
         self._robot = robot
-        options = {**robot.environment_options, "render_mode": _DRAWING}
-        self._env = make_environment(robot.environment, options)
-        self._env.reset(seed=0)
+        self._env = self._make()
+        self.observation, _ = self._env.reset(seed=0)
+        """What the twin observed last; where it follows actions, the same as the robot unless it is behind."""
         self._followed: tuple[int, int] = (-1, 0)
         """Number of the robot's reset, and of the actions after it, that the twin has followed."""
+
+    def _make(self) -> gymnasium.Env[Any, Any]:
+        robot = self._robot
+        return make_environment(robot.environment, {**robot.environment_options, "render_mode": _DRAWING})
 
     def draw(self) -> NDArray[np.uint8] | None:
         """Return the picture of the present state, shape (rows, columns, 3); None where there is none."""
@@ -83,13 +87,15 @@ class EnvironmentTwin:
         robot = self._robot
         number, actions = robot.resets, robot.actions_since_reset
         if self._followed[0] != number or self._followed[1] > len(actions):
-            self._env.reset(seed=robot.episode_seed)
+            self._env.close()
+            self._env = self._make()  # as the robot does: a used world may not repeat itself
+            self.observation, _ = self._env.reset(seed=robot.episode_seed)
             self._followed = number, 0
         until = time.monotonic() + _CATCHING_UP
         first = done = self._followed[1]
         while done < len(actions) and (done == first or time.monotonic() < until):
             taken = vector_to_action(self._env.action_space, actions[done].astype(np.float32), robot.name)
-            self._env.step(taken)
+            self.observation = self._env.step(taken)[0]
             done += 1
         self._followed = number, done
 
