@@ -44,7 +44,7 @@ class EnvironmentTwin:
         self._robot = robot
         self._env = self._make()
         self.observation, _ = self._env.reset(seed=0)
-        """What the twin observed last; where it follows actions, the same as the robot unless it is behind."""
+        """What the twin observed last; where it follows actions, as the robot unless it is behind."""
         self._followed: tuple[int, int] = (-1, 0)
         """Number of the robot's reset, and of the actions after it, that the twin has followed."""
 
