@@ -137,7 +137,7 @@ KEY_TABLE = (
     ReservedKey(
         "branch",
         "ctrl+n",
-        "begins a new session that goes on from the step that is shown",
+        "begins a new session from the step that is shown",
         action="pane('timeline', 'branch')",
         hint="branch",
         hint_rank=15,
