@@ -11,7 +11,25 @@ from dataclasses import dataclass
 from typing import Literal
 
 EventKind = Literal[
-    "behavior", "default", "target", "factor", "takeover", "control", "hand back", "reset", "rewind"
+    "behavior",
+    "default",
+    "target",
+    "factor",
+    "takeover",
+    "control",
+    "hand back",
+    "reset",
+    "rewind",
+    "unit",
+    "free",
+    "beside",
+    "release",
+    "mute",
+    "unmute",
+    "order",
+    "kp",
+    "ki",
+    "kd",
 ]
 
 
@@ -25,6 +43,16 @@ EVENT_WORDINGS: dict[EventKind, str] = {
     "hand back": "handed back to the policy",
     "reset": "next episode started",
     "rewind": "rewound to step {value:.0f}",
+    "unit": "unit {name} held at {value:.4g}",
+    "free": "unit {name} let go",
+    "beside": "behavior '{name}' latched beside the others",
+    "release": "behavior '{name}' let go",
+    "mute": "behavior '{name}' muted",
+    "unmute": "behavior '{name}' acts again",
+    "order": "behavior '{name}' moved to place {value:.0f} of the stack",
+    "kp": "gain kp of '{name}' set to {value:.4g}",
+    "ki": "gain ki of '{name}' set to {value:.4g}",
+    "kd": "gain kd of '{name}' set to {value:.4g}",
 }
 """What each kind of event does, in words that may contain ``{name}`` and ``{value}`` of the event."""
 JUMPS = ("reset", "rewind")

@@ -22,6 +22,7 @@ from pdtui.policies.runtime.policy import Policy, PolicyStep
 from pdtui.robots.robot import Robot
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.stimulation.behavior_latch import BehaviorLatch
+from pdtui.stimulation.stack.latch_events import apply_latch_event
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 PolicyAct = Callable[[NDArray[Any], Stimulation, np.random.Generator | None], PolicyStep]
@@ -159,14 +160,8 @@ class ControlLoop:
     def _apply(self, event: DriveEvent, *, rehearsing: bool = False) -> None:
         """Apply an event; while rehearsing, only to latch, takeover and position in the rewind history."""
         match event.kind:
-            case "behavior":
-                self.latch.latch_behavior(event.name, self.attributes)
             case "default":
                 self._clear()
-            case "target":
-                self.latch.set_target(event.name, event.value)
-            case "factor":
-                self.latch.set_factor(event.name, event.value)
             case "takeover" | "control" | "hand back":
                 self.takeover.apply_event(event)
             case "reset" if rehearsing:
@@ -180,7 +175,7 @@ class ControlLoop:
             case "rewind":
                 self.restore_state(self.history.return_to(event.value, self.step))
             case _:
-                raise KeystrokeError(f"step {event.step}: unknown event '{event.kind}'")
+                apply_latch_event(self.latch, event, self.attributes)
 
     @contextmanager
     def rehearsal(self) -> Iterator[Callable[[DriveEvent], None]]:

@@ -21,7 +21,7 @@ from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts
 from pdtui.driving.ghost.ghost_runner import GhostRunner
-from pdtui.driving.keystrokes import interpret_keys
+from pdtui.driving.keystrokes import interpret_keys, note_press
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.pacer import Pacer
 from pdtui.driving.replays.step_by_step_comparison import StepByStepComparison
@@ -138,7 +138,7 @@ class DriveServer:
     def _handle(self, kind: str, value: Any) -> None:
         match kind:
             case "press":
-                self._pressed_keys.append(value)
+                note_press(self._pressed_keys, value)
             case "pace":
                 self._pacer.change_pace(value, time.monotonic())
             case "ghost":

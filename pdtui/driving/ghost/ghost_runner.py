@@ -21,6 +21,8 @@ from pdtui.stimulation.latched_behavior import LatchState
 
 MOST_BEHIND = 2000
 """Control steps by which a ghost may be behind the drive before it is given up."""
+_LATCHING = ("behavior", "beside", "release", "default", "unit", "free")
+"""Events that begin a ghost where they latch something, or end it where nothing is left."""
 _TAKEOVER = ("takeover", "control", "hand back")
 _NOTHING_LATCHED = LatchState([], {}, None)
 
@@ -28,11 +30,12 @@ _NOTHING_LATCHED = LatchState([], {}, None)
 class GhostRunner(Closable):
     """Begins and ends the ghost of a drive: the twin that runs on without the behavior.
 
-    While it is on, a ghost begins whenever a behavior is latched, in the state of that step, and follows the
-    drive step by step, with the operator's controls but with no behavior. It ends when the default key, or
-    a behavior's own key, has left nothing latched, and where the drive jumps: by a reset, a rewind or the end
-    of the episode. A period that runs out does not end it, as the aftermath is still to be seen.
-    If a behavior is latched already when the ghost is turned on, or after a rewind, it begins there.
+    While it is on, a ghost begins whenever a behavior is latched or a unit is held at another output, in the
+    state of that step, and follows the drive step by step, with the operator's controls but with no behavior
+    and no unit held. It ends when a key or an edit has left nothing latched and nothing held, and where the
+    drive jumps: by a reset, a rewind or the end of the episode. A period that runs out does not end it, as
+    the aftermath is still to be seen. If a behavior is latched already when the ghost is turned on, or after
+    a rewind, it begins there.
 
     It only reads the drive, and never waits for the ghost.
 
@@ -118,11 +121,13 @@ class GhostRunner(Closable):
         if self._process is None:
             return
         latched = {behavior.name for behavior in self._loop.latch.active}
-        pressed = [event for event in events if event.kind in ("behavior", "default")]
+        acting = bool(latched or self._loop.latch.held.outputs)
+        pressed = [event for event in events if event.kind in _LATCHING]
         jumped = any(event.jumps for event in events)
-        if jumped or (pressed and not latched):
+        if jumped or (pressed and not acting):
             self._end()
-        if any(event.name in latched for event in pressed) or (latched and (jumped or self._turned_on)):
+        begun = any(event.kind == "unit" or event.name in latched for event in pressed)
+        if acting and (begun or jumped or self._turned_on):
             self._begin(self._process)
         self._turned_on = False
 

@@ -41,6 +41,10 @@ class BoundIntervention:
 
     def __init__(self, intervention: Intervention, make: _MakeEdits, column: int, dt: float) -> None:
         self._intervention, self._make, self._column, self._dt = intervention, make, column, dt
+        self.units: tuple[int, ...] = tuple(
+            unit for edit in make(1.0, 0.0, 1.0) for unit in edit.units.tolist()
+        )
+        """Flat indices of the units that it can change."""
 
     def make_edits(
         self,
