@@ -15,6 +15,8 @@ from pdtui.core.reserved_keys import EventKind
 
 EDIT_KEY = "edit"
 """Stands for the key in the event of an edit, which counts as human involvement like a key."""
+FACTOR_STEP = 1.25
+"""Factor by which one press of a key strengthens or weakens a behavior."""
 VALUED_EDITS: tuple[EventKind, ...] = ("unit", "factor", "target", "order", "kp", "ki", "kd")
 """Kinds of events that an edit can make, with a value."""
 NAMED_EDITS: tuple[EventKind, ...] = ("free", "beside", "release", "mute", "unmute")

@@ -122,6 +122,18 @@ KEY_TABLE = (
         hint="ghost",
         hint_rank=5,
     ),
+    ReservedKey(
+        "bench",
+        "ctrl+e",
+        "opens the unit bench, to edit what acts on hidden units, or closes it",
+        action="bench('toggle')",
+        hint="bench",
+        hint_rank=5,
+    ),
+    ReservedKey(
+        "layer_before", "pageup", "shows the layers before in the strip", action="bench('layer before')"
+    ),
+    ReservedKey("next_layer", "pagedown", "shows the next layers in the strip", action="bench('next layer')"),
     ReservedKey("zoom_in", "right_square_bracket", "shows less of the path", action="zoom_path(-1)"),
     ReservedKey("zoom_out", "left_square_bracket", "shows more of the path", action="zoom_path(1)"),
     ReservedKey("help", "question_mark", "shows all keys", action="help", hint="help", hint_rank=0),

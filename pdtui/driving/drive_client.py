@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from pdtui.core.errors import PdtuiError
 from pdtui.core.processes.worker_pool import describe_exit, end_with_parent
+from pdtui.driving.bench.unit_search_snapshot import UnitSearchRequest
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
 
@@ -32,13 +33,16 @@ class DriveConnection(Protocol):
         """
 
     def press_key(self, key: str) -> None:
-        """Send a key that changes the run; it applies before the next control step."""
+        """Send a key or an edit that changes the run; it applies before the next control step."""
 
     def change_pace(self, request: PaceRequest) -> None:
         """Change the pace, which is no part of the run and is not recorded."""
 
     def toggle_ghost(self) -> None:
         """Turn the ghost on or off, which is no part of the run and is not recorded."""
+
+    def search_units(self, request: UnitSearchRequest) -> None:
+        """Search for units that change an attribute, from the present moment on; no part of the run either."""
 
     def close(self) -> str:
         """End the drive, wait until its recording is complete, and return one line on how it ended."""
@@ -114,6 +118,9 @@ class DriveClient(DriveConnection):
     def toggle_ghost(self) -> None:
         self._send("ghost", None)
 
+    def search_units(self, request: UnitSearchRequest) -> None:
+        self._send("search", request)
+
     def close(self) -> str:
         self._send("close", None)
         deadline = time.monotonic() + _PATIENCE
@@ -142,7 +149,7 @@ class DriveClient(DriveConnection):
             return PdtuiError(self._describe_death())
         return message
 
-    def _send(self, kind: str, value: str | None) -> None:
+    def _send(self, kind: str, value: str | UnitSearchRequest | None) -> None:
         try:
             self._connection.send((kind, value))
         except OSError:

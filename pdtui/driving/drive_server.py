@@ -91,6 +91,8 @@ class DriveServer:
                 recording=str(recorder.path) if recorder is not None else "",
                 recorded=recorder is not None and recorder.created,
                 manual_controls=tuple(control.name for control in loop.robot.manual_controls),
+                policy_hash=loop.policy.sha256,
+                output_bounds=loop.policy.output_bounds,
             )
         )
 

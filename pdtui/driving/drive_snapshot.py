@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from pdtui.core.robot_links_and_state import Link
     from pdtui.core.scenery import Scenery, Traffic
     from pdtui.core.step_record import ActiveBehavior
+    from pdtui.driving.bench.natural_ranges import NaturalRanges
+    from pdtui.driving.bench.unit_search_snapshot import UnitSearchSnapshot
     from pdtui.driving.ghost.ghost_snapshot import GhostSnapshot
+    from pdtui.stimulation.stack.stack_layer import StackLayer
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,8 @@ class DriveFacts:
         recording: file that the drive is recorded into, or will be; empty if it is not recorded.
         recorded: whether that file was created, which happens with the first control step.
         manual_controls: names of the controls that the operator can take over.
+        policy_hash: SHA-256 of the policy's weights.
+        output_bounds: the least and the largest output that the units of each layer can have by themselves.
     """
 
     title: str
@@ -45,6 +50,8 @@ class DriveFacts:
     recording: str = ""
     recorded: bool = False
     manual_controls: tuple[str, ...] = ()
+    policy_hash: str = ""
+    output_bounds: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -102,6 +109,10 @@ class DriveSnapshot:
         traffic: what was around the robot after the last step.
         key_presses: keys that changed the run since the last snapshot.
         ghost: the ghost; None while it is off.
+        stack: latched behaviors, muted ones too, in their order.
+        held_units: units that the operator holds, by flat index, and their outputs v.
+        natural_ranges: the ranges of what the units put out by themselves; None before the first step.
+        unit_search: the search for units; None before the first.
     """
 
     step: int
@@ -130,3 +141,7 @@ class DriveSnapshot:
     traffic: Traffic = NO_TRAFFIC
     key_presses: tuple[KeyPress, ...] = ()
     ghost: GhostSnapshot | None = None
+    stack: tuple[StackLayer, ...] = ()
+    held_units: tuple[tuple[int, float], ...] = ()
+    natural_ranges: NaturalRanges | None = None
+    unit_search: UnitSearchSnapshot | None = None

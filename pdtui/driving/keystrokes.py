@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pdtui.core.drive_edits import (
     EDIT_KEY,
+    FACTOR_STEP,
     NAMED_EDITS,
     VALUED_EDITS,
     edit_subject,
@@ -28,7 +29,6 @@ MAX_PRESSES = 200_000
 """Key presses of a file: a key in every step of an hour, at 50 Hz, is 180,000."""
 MAX_PRESSES_PER_STEP = 100
 """Key presses before one step."""
-FACTOR_STEP = 1.25  # by which a key strengthens or weakens a behavior
 REWIND_SECONDS = 3.0
 _LINE = re.compile(r"(\d{1,9})\s+(\S.*)")
 _KEY = re.compile(r"\S+")

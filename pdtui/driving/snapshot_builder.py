@@ -8,11 +8,13 @@ from pdtui.core.drive_events import describe_event
 from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.core.step_record import StepRecord
+from pdtui.driving.bench.natural_ranges import NaturalRangeTracker
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_snapshot import DriveSnapshot, KeyPress, StimulatedUnit
 from pdtui.driving.ghost.ghost_runner import GhostRunner
 from pdtui.sessions.episode_statistics import EpisodeStatisticsCounter
 
+_LATCHING = ("behavior", "beside")
 _ROWS_KEPT = 4000  # control steps between two snapshots that a stopped screen does not lose
 
 
@@ -37,6 +39,7 @@ class SnapshotBuilder:
         self._statistics = EpisodeStatisticsCounter(loop.info)
         self._scenery: Scenery = NO_SCENERY
         self._last: StepRecord | None = None
+        self._natural = NaturalRangeTracker()
         self.notice = ""
 
     def add_step(self, record: StepRecord) -> None:
@@ -50,7 +53,7 @@ class SnapshotBuilder:
         if len(record.poses):
             self._path.append((float(record.poses[0, 0]), float(record.poses[0, 1]), float(row)))
         self._key_presses += [
-            KeyPress(event.step, event.key, self._rows[event.name] if event.kind == "behavior" else -1)
+            KeyPress(event.step, event.key, self._rows.get(event.name, -1) if event.kind in _LATCHING else -1)
             for event in record.events
             if event.key
         ]
@@ -70,6 +73,7 @@ class SnapshotBuilder:
                 self.notice = describe_event(event)
         if record.outcome is not None:
             self.notice = record.ended or f"{record.outcome}; the episode goes on"
+        self._natural.add(record)
         self._last = record
         if self._ghost is not None:
             self._ghost.add_step(record)
@@ -117,6 +121,9 @@ class SnapshotBuilder:
             traffic=loop.robot.read_traffic() if last is None else last.traffic,
             key_presses=tuple(self._key_presses),
             ghost=ghost,
+            stack=loop.latch.stack,
+            held_units=tuple(loop.latch.held.outputs.items()),
+            natural_ranges=self._natural.ranges,
         )
         self._history, self._path, self._key_presses = [], [], []
         self._restarted, self.notice = False, ""

@@ -23,10 +23,12 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import displayed_key_name
 from pdtui.tui.help_screen import HelpScreen
 from pdtui.tui.snapshot_widget import SnapshotWidget
+from pdtui.tui.strip.unit_picking import UnitPicked
 from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
 from pdtui.tui.terminal_driver import TerminalDriver
 from pdtui.tui.terminal_size_notice import LEAST_SIZE, TerminalSizeNotice
 from pdtui.tui.theme import THEME
+from pdtui.tui.unit_bench.bench_pane import BenchPane, BenchRequest
 from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
 from pdtui.tui.widgets.attribute_table import AttributeTable
 from pdtui.tui.widgets.behavior_list import BehaviorList
@@ -103,6 +105,8 @@ class DriveApp(App[str], inherit_bindings=False):
                     yield bound(PathView(self.map, id="path"))
                     yield bound(UnitTable(self.map, id="units"))
             with Container(id="right"):
+                bench = BenchPane(self.map, self.action_run_key, self.connection.search_units, self.say)
+                yield bench.data_bind(DriveApp.facts, DriveApp.snapshot)
                 yield bound(BehaviorList(self.map, id="behaviors"))
                 yield bound(AttributeTable(self.map, id="attributes"))
         yield bound(ActivationHeatmap(self.map, id="heat"))
@@ -184,7 +188,9 @@ class DriveApp(App[str], inherit_bindings=False):
 
     def on_key(self, event: events.Key) -> None:
         """Give the map's keys precedence over all bindings, and name a key that is not bound."""
-        if event.key in self._map_keys:
+        if self.query_one(BenchPane).takes_key(event.key):
+            event.prevent_default()
+        elif event.key in self._map_keys:
             event.prevent_default()
             self.action_run_key(event.key)
         elif not self.screen.is_modal and event.key not in self.screen.active_bindings:
@@ -211,6 +217,13 @@ class DriveApp(App[str], inherit_bindings=False):
             self.say("the policy is still loading")
         else:
             self.connection.toggle_ghost()
+
+    def action_bench(self, request: BenchRequest) -> None:
+        """Open or close the unit bench, or show other layers."""
+        self.query_one(BenchPane).act(request)
+
+    def on_unit_picked(self, event: UnitPicked) -> None:
+        self.query_one(BenchPane).pick(event.unit)
 
     def action_zoom_path(self, change: int) -> None:
         """Show more of the path for 1, less for −1."""

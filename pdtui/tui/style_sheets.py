@@ -41,6 +41,24 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 .-tall #attributes { height: 18; }
 .-tall #heat { height: 6; }
 
+#bench {
+    display: none;
+    height: 1fr;
+    border: round $primary;
+    border-title-color: $primary;
+    border-subtitle-color: $foreground 45%;
+}
+#bench-entry {
+    display: none;
+    height: 1;
+    border: none;
+    padding: 0;
+    background: $surface;
+}
+.-bench #bench { display: block; }
+.-bench #behaviors { display: none; }
+.-tall.-bench #behaviors { display: block; }
+
 /* Without a robot to draw, the attributes take its room. */
 .-bodiless #left { display: none; }
 .-bodiless #right { width: 1fr; }

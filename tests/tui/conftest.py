@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import PdtuiError
+from pdtui.driving.bench.unit_search_snapshot import UnitSearchRequest
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -26,6 +27,7 @@ class ScriptedConnection:
         self.pressed: list[str] = []
         self.paced: list[PaceRequest] = []
         self.toggled = 0
+        self.searched: list[UnitSearchRequest] = []
 
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:
         if not self.messages:
@@ -43,6 +45,9 @@ class ScriptedConnection:
 
     def toggle_ghost(self) -> None:
         self.toggled += 1
+
+    def search_units(self, request: UnitSearchRequest) -> None:
+        self.searched.append(request)
 
     def close(self) -> str:
         return "stopped: 0 steps"
