@@ -42,7 +42,7 @@ class DriveConnection(Protocol):
         """Turn the ghost on or off, which is no part of the run and is not recorded."""
 
     def search_units(self, request: UnitSearchRequest) -> None:
-        """Search for units that change an attribute, from the present moment on; no part of the run either."""
+        """Search for units that change an attribute from now on, which is no part of the run either."""
 
     def close(self) -> str:
         """End the drive, wait until its recording is complete, and return one line on how it ended."""

@@ -17,6 +17,7 @@ from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import PdtuiError, SessionError, format_error_in_one_line
 from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
+from pdtui.driving.bench.unit_searcher import UnitSearcher
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts
@@ -50,7 +51,8 @@ class DriveServer:
         self._connection, self._send, self._config = connection, send, config
         self._loop: ControlLoop = build_control_loop(config)
         self._ghost = GhostRunner(config, self._loop)
-        self._builder = SnapshotBuilder(self._loop, self._ghost)
+        self._searcher = UnitSearcher(config, self._loop)
+        self._builder = SnapshotBuilder(self._loop, self._ghost, self._searcher)
         self._recorder: SessionRecorder | None = None
         if config.recording:
             path, viewer = Path(config.recording), config.viewer
@@ -65,13 +67,10 @@ class DriveServer:
                 existing=config.existing,
                 sync=config.sync,
             )
-        self._place = ""
+        self._place, self._snapshot_requested = "", False
         self._pacer = Pacer(self._loop.robot.control_dt, time.monotonic())
         self._pressed_keys: list[str] = []
-        self._snapshot_requested = False
-        self._closing = ""
-        self._finished = ""
-        self.failed = False
+        self._closing, self._finished, self.failed = "", "", False
         self._watched = (
             None if config.watched is None else StepByStepComparison(config.watched, self._loop.info)
         )
@@ -109,6 +108,7 @@ class DriveServer:
             raise
         finally:
             self._ghost.close()
+            self._searcher.close()
             self._close_recording()
 
     def stop(self, reason: str) -> None:
@@ -145,6 +145,8 @@ class DriveServer:
                 self._pacer.change_pace(value, time.monotonic())
             case "ghost":
                 self._ghost.toggle()
+            case "search":
+                self._builder.notice = self._searcher.begin(value, self._builder.natural.ranges)
             case "frame":
                 self._snapshot_requested = True
             case "close":

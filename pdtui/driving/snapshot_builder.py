@@ -9,6 +9,7 @@ from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.bench.natural_ranges import NaturalRangeTracker
+from pdtui.driving.bench.unit_searcher import UnitSearcher
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_snapshot import DriveSnapshot, KeyPress, StimulatedUnit
 from pdtui.driving.ghost.ghost_runner import GhostRunner
@@ -24,10 +25,13 @@ class SnapshotBuilder:
     Args:
         loop: the drive.
         ghost: its ghost, if it can have one.
+        searcher: its search for units, if it can have one.
     """
 
-    def __init__(self, loop: ControlLoop, ghost: GhostRunner | None = None) -> None:
-        self._loop, self._ghost = loop, ghost
+    def __init__(
+        self, loop: ControlLoop, ghost: GhostRunner | None = None, searcher: UnitSearcher | None = None
+    ) -> None:
+        self._loop, self._ghost, self._searcher = loop, ghost, searcher
         self._rows = {name: row for row, name in enumerate(loop.map.behaviors)}
         self._history: list[np.ndarray] = []
         self._path: list[tuple[float, float, float]] = []
@@ -39,7 +43,7 @@ class SnapshotBuilder:
         self._statistics = EpisodeStatisticsCounter(loop.info)
         self._scenery: Scenery = NO_SCENERY
         self._last: StepRecord | None = None
-        self._natural = NaturalRangeTracker()
+        self.natural = NaturalRangeTracker()
         self.notice = ""
 
     def add_step(self, record: StepRecord) -> None:
@@ -73,7 +77,7 @@ class SnapshotBuilder:
                 self.notice = describe_event(event)
         if record.outcome is not None:
             self.notice = record.ended or f"{record.outcome}; the episode goes on"
-        self._natural.add(record)
+        self.natural.add(record)
         self._last = record
         if self._ghost is not None:
             self._ghost.add_step(record)
@@ -123,7 +127,8 @@ class SnapshotBuilder:
             ghost=ghost,
             stack=loop.latch.stack,
             held_units=tuple(loop.latch.held.outputs.items()),
-            natural_ranges=self._natural.ranges,
+            natural_ranges=self.natural.ranges,
+            unit_search=None if self._searcher is None else self._searcher.state,
         )
         self._history, self._path, self._key_presses = [], [], []
         self._restarted, self.notice = False, ""

@@ -102,6 +102,7 @@ class MetaDrive(Robot):
         Attribute("gap ahead", "m", 1.0 / LIDAR_RANGE),
         Attribute("route", ""),
     )
+    repeats_actions = True
     links = (
         Link("body", 0, "box", (2.25, 0.93, 0.35), (0.0, 0.0, 0.0), _UPRIGHT),
         Link("cabin", 0, "box", (1.1, 0.8, 0.3), (-0.3, 0.0, 0.65), _UPRIGHT),

@@ -75,6 +75,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
             long as the world does, and another replaces it when that changes, as in `reset` and `restore`.
         outcomes: How its episodes can end by themselves. Tables say so even if none ended that way.
         state_arrays: Names of the Python attributes, all of them arrays, that belong to a robot's state.
+        repeats_actions: Whether `restore` repeats the actions since the reset, which takes time.
         build_options: Options with which `make_robot` built it; those that it does not name have defaults.
     """
 
@@ -95,6 +96,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     scenery: Scenery = NO_SCENERY
     outcomes: tuple[Outcome, ...] = (Outcome.FELL,)
     state_arrays: tuple[str, ...] = ()
+    repeats_actions: bool = False
     build_options: RobotOptions = NO_ROBOT_OPTIONS
 
     @property

@@ -70,6 +70,14 @@ def answer_when_loaded(loop: ControlLoop) -> None:
     del loop
 
 
+def restore_ghost_start(loop: ControlLoop, start: GhostStart) -> None:
+    """Bring a loop into the state of a start; a `RobotError` says that it is not the same to the last bit."""
+    loop.step = start.step
+    loop.restore_state(start.state)
+    if loop.robot.digest() != start.digest:
+        raise RobotError(f"{loop.robot.name}: expected the drive's own state to begin with, got another")
+
+
 def run_ghost(
     loop: ControlLoop, start: GhostStart | None, tasks: Sequence[GhostStepInput]
 ) -> list[GhostStepResult]:
@@ -79,12 +87,7 @@ def run_ghost(
         RobotError: the robot could not be brought into the state of the start, to the last bit.
     """
     if start is not None:
-        loop.step = start.step
-        loop.restore_state(start.state)
-        if loop.robot.digest() != start.digest:
-            raise RobotError(
-                f"{loop.robot.name}: expected the state in which the behavior was latched, got another"
-            )
+        restore_ghost_start(loop, start)
     steps: list[GhostStepResult] = []
     for task in tasks:
         record = loop.advance(task.events)

@@ -15,10 +15,9 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import ScreenRow, format_signed
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
+from pdtui.tui.unit_bench.bench_entry import Answer
 from pdtui.tui.unit_bench.ghost_differences import GhostDifferences
 
-Answer = Callable[[str], str]
-"""Takes what was typed, and returns why it cannot be used; an empty text if it can."""
 _BIG = 5  # presses that a press with shift counts for
 
 

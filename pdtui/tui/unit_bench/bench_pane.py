@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import ClassVar, Literal
@@ -12,7 +11,6 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 from textual.reactive import reactive
-from textual.widgets import Input
 
 from pdtui.core.drive_edits import write_edit
 from pdtui.core.errors import PdtuiError
@@ -20,7 +18,8 @@ from pdtui.core.units import format_unit
 from pdtui.driving.bench.unit_search_snapshot import UnitSearchRequest
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.stimulation.stimulation_map import StimulationMap
-from pdtui.tui.unit_bench.bench_page import Answer, BenchPage
+from pdtui.tui.unit_bench.bench_entry import Answer, BenchEntry
+from pdtui.tui.unit_bench.bench_page import BenchPage
 from pdtui.tui.unit_bench.bench_saving import (
     build_bench_behavior,
     check_behavior_key,
@@ -71,7 +70,7 @@ class BenchPane(Vertical):
         self.differences = GhostDifferences()
         self.pages = [page(stimulation_map, self, id=f"bench-{page.TAB}") for page in _PAGES]
         self._page = 0
-        self._answer: Answer = lambda _: ""
+        self._entry = BenchEntry(say, self._focus_page)
         self._saved_keys: dict[str, tuple[str, ...]] = {}
 
     @property
@@ -82,7 +81,7 @@ class BenchPane(Vertical):
     def compose(self) -> ComposeResult:
         for page in self.pages:
             yield page.data_bind(BenchPane.facts, BenchPane.snapshot)
-        yield Input(id="bench-entry")
+        yield self._entry
 
     def on_mount(self) -> None:
         self._show_page()
@@ -105,14 +104,13 @@ class BenchPane(Vertical):
     def open(self) -> None:
         """Show the pane and give it the keys."""
         self.screen.add_class("-bench")
-        self.pages[self._page].focus()
+        self._focus_page()
         self.pages[self._page].row_was_marked()
 
     def action_close(self) -> None:
         """Leave the entry, or close the pane."""
         if self._entry.display:
-            self._leave_entry()
-            return
+            self._entry.action_leave()
         self.screen.remove_class("-bench")
         self.screen.set_focus(None)
         self.point_to(-1)
@@ -151,37 +149,12 @@ class BenchPane(Vertical):
         self.screen.query_one(ActivationHeatmap).point_to(unit)
 
     def ask(self, what: str, before: str, answer: Answer) -> None:
-        """Let the user type something; `answer` is called with it, and says what is wrong, if anything."""
-        entry, self._answer = self._entry, answer
-        entry.placeholder, entry.value = what, before
-        entry.border_title = what
-        entry.display = True
-        entry.focus()
-        entry.cursor_position = len(before)
+        """Let the user type something, as `BenchEntry.ask` does."""
+        self._entry.ask(what, before, answer)
 
     def ask_number(self, what: str, before: str, take: Callable[[float], None]) -> None:
-        """Let the user type a number."""
-
-        def answer(text: str) -> str:
-            try:
-                value = float(text.replace("−", "-"))
-            except ValueError:
-                value = math.nan
-            if not math.isfinite(value):
-                return f"{what}: expected a number, found '{text}'"
-            take(value)
-            return ""
-
-        self.ask(what, before, answer)
-
-    def on_input_submitted(self, event: Input.Submitted) -> None:
-        event.stop()
-        asked = self._answer
-        wrong = asked(event.value.strip())
-        if wrong:
-            self.say(wrong)
-        elif self._answer is asked:  # the answer has asked nothing further
-            self._leave_entry()
+        """Let the user type a number, as `BenchEntry.ask_number` does."""
+        self._entry.ask_number(what, before, take)
 
     def action_save(self) -> None:
         """Ask for a name and a key, and save the units that are held as a behavior of the map."""
@@ -221,12 +194,7 @@ class BenchPane(Vertical):
         assert isinstance(page, UnitPage)
         return page.units.held()
 
-    @property
-    def _entry(self) -> Input:
-        return self.query_one("#bench-entry", Input)
-
-    def _leave_entry(self) -> None:
-        self._entry.display = False
+    def _focus_page(self) -> None:
         self.pages[self._page].focus()
 
     def _show_page(self) -> None:

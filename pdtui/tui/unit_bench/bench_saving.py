@@ -37,7 +37,7 @@ class MeasuredDifferences:
 
 
 def describe_measurement(facts: DriveFacts, differences: GhostDifferences) -> MeasuredDifferences:
-    """Return what the drive's ghost showed of the units that are held: one run, and no confidence interval."""
+    """Return what the ghost showed of the units that are held: one run, so no confidence interval."""
     found = f"Found on the unit bench: {facts.title}, seed {facts.seed}."
     means, ranked = differences.means(), differences.ranked()
     if means is None or not ranked:
