@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     "--keys",
     type=FILE_PATH,
     metavar="FILE",
-    help="Keystroke file to drive from with --headless; each line is 'STEP KEY'.",
+    help="Keystroke file to drive from with --headless; each line is 'STEP KEY' or 'STEP EDIT'.",
 )
 @integer_option("--steps", default=1000, help="Number of control steps to drive with --headless.")
 def drive_command(

@@ -9,6 +9,7 @@ from textual.strip import Strip
 from pdtui.core.drive_edits import FACTOR_STEP, write_edit
 from pdtui.core.printable_text import make_printable
 from pdtui.core.units import MAX_LISTED, format_unit
+from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.stimulation.stack.stack_layer import StackLayer, find_conflicts
 from pdtui.tui.cell_text import ScreenRow, displayed_key_name, format_number
 from pdtui.tui.theme import STYLES
@@ -19,7 +20,19 @@ class LayerPage(BenchPage):
     """The latched behaviors, that which decides last on top, and below them those that could be latched."""
 
     TAB: ClassVar[str] = "layers"
-    KEYS: ClassVar[str] = "←→ factor  ↵ mute/add  ⇧↑⇧↓ order  Del drop"
+    KEYS: ClassVar[str] = "←→ ×  ↵ mute/add  ⇧↑↓ order  Del end"
+    _name = ""  # of the marked behavior, which stays marked where the stack changes
+
+    def remember(self, snapshot: DriveSnapshot) -> None:
+        names = [*(layer.name for layer in reversed(snapshot.stack)), *self._others_of(snapshot)]
+        if self._name in names:
+            self.marked = names.index(self._name)
+
+    def row_was_marked(self) -> None:
+        layer, others = self._marked_layer(), self._others()
+        row = self.marked - len(self._stack())
+        self._name = layer.name if layer is not None else others[row] if 0 <= row < len(others) else ""
+        self.bench.point_to(-1)
 
     def count_rows(self) -> int:
         return len(self._stack()) + len(self._others())
@@ -47,13 +60,14 @@ class LayerPage(BenchPage):
             more = f" +{len(conflicts) - MAX_LISTED}" if len(conflicts) > MAX_LISTED else ""
             line.add(f"shares {' '.join(shown)}{more}", STYLES.warn)
         else:
-            line.add(f"{len(layer.units)} units", STYLES.muted)
+            line.add("1 unit" if len(layer.units) == 1 else f"{len(layer.units)} units", STYLES.muted)
 
     def draw_head(self, width: int) -> list[Strip]:
         held = () if self.snapshot is None else self.snapshot.held_units
         if not held:
             return []
-        return [ScreenRow(width).add(f" ● the bench: {len(held)} units, above all", STYLES.accent).strip()]
+        said = "one unit" if len(held) == 1 else f"{len(held)} units"
+        return [ScreenRow(width).add(f" ● {said} held on the bench, above all", STYLES.accent).strip()]
 
     def change(self, presses: int) -> None:
         if (layer := self._marked_layer()) is not None:
@@ -77,7 +91,6 @@ class LayerPage(BenchPage):
         place = len(self._stack()) - 1 - self.marked + direction
         if 0 <= place < len(self._stack()):
             self.bench.send(write_edit("order", layer.name, place))
-            self.mark(self.marked - direction)
 
     def type_value(self, begun: str) -> None:
         if (layer := self._marked_layer()) is not None:
@@ -91,7 +104,10 @@ class LayerPage(BenchPage):
         return [] if self.snapshot is None else list(reversed(self.snapshot.stack))
 
     def _others(self) -> list[str]:
-        latched = {layer.name for layer in self._stack()}
+        return self._others_of(self.snapshot)
+
+    def _others_of(self, snapshot: DriveSnapshot | None) -> list[str]:
+        latched = set() if snapshot is None else {layer.name for layer in snapshot.stack}
         return [name for name in self.map.behaviors if name not in latched]
 
     def _marked_layer(self) -> StackLayer | None:

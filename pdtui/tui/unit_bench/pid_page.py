@@ -19,7 +19,7 @@ from pdtui.tui.theme import STYLES
 from pdtui.tui.unit_bench.bench_page import BenchPage
 from pdtui.tui.widgets import sparklines
 
-_GAINS: tuple[EventKind, ...] = ("kp", "ki", "kd")
+_ROWS: tuple[EventKind, ...] = ("kp", "ki", "kd", "target")
 _GAIN_STEP = 1.1
 _LEAST_GAIN = 0.01  # to which a key raises a gain of 0
 _SECONDS = 12.0
@@ -41,7 +41,7 @@ class PidPage(BenchPage):
     """
 
     TAB: ClassVar[str] = "pid"
-    KEYS: ClassVar[str] = "←→ gain  = type  ↑↓ arrows off: target"
+    KEYS: ClassVar[str] = "←→ change  = type"
 
     def on_mount(self) -> None:
         self._samples: deque[_Sample] = deque(maxlen=1000)
@@ -59,7 +59,7 @@ class PidPage(BenchPage):
             self._samples.append(_Sample(snapshot.step, *(float(one or 0.0) for one in numbers)))
 
     def count_rows(self) -> int:
-        return len(_GAINS) if self._gains() is not None else 0
+        return len(_ROWS) if self._gains() is not None else 0
 
     def draw_head(self, width: int) -> list[Strip]:
         if self.facts is None or self._gains() is None:
@@ -77,26 +77,32 @@ class PidPage(BenchPage):
         return [title.strip(), *self._draw_charts(width)]
 
     def draw_row(self, row: int, line: ScreenRow, *, marked: bool) -> None:
-        gains = self._gains()
+        gains, pid = self._gains(), self.map.behaviors[self._name].pid
         assert gains is not None
-        line.add(f"{_GAINS[row]} ", STYLES.title if marked else STYLES.muted, 4)
-        line.add(f"{gains[row]:.4g}", STYLES.title, 10)
-        behavior = self.map.behaviors[self._name]
-        if behavior.pid is not None and (own := float(getattr(behavior.pid, _GAINS[row]))) != gains[row]:
+        assert pid is not None
+        now = gains[row] if row < len(gains) else self._samples[-1].target
+        line.add(f"{_ROWS[row]} ", STYLES.title if marked else STYLES.muted, _LABEL)
+        line.add(f"{now:.4g}", STYLES.title, 10)
+        if row < len(gains) and (own := float(getattr(pid, _ROWS[row]))) != now:
             line.add(f"  in the map {own:.4g}", STYLES.faint)
 
     def change(self, presses: int) -> None:
-        if (gains := self._gains()) is not None:
+        gains = self._gains()
+        if gains is None:
+            return
+        if self.marked < len(gains):
             now = gains[self.marked] or (_LEAST_GAIN if presses > 0 else 0.0)
             self._set(self.marked, float(f"{now * _GAIN_STEP**presses:.4g}"))
+        elif (pid := self.map.behaviors[self._name].pid) is not None:
+            self._set(self.marked, self._samples[-1].target + presses * pid.step)
 
     def type_value(self, begun: str) -> None:
         if self._gains() is not None:
-            what = f"{_GAINS[self.marked]} of {self._name}"
+            what = f"{_ROWS[self.marked]} of {self._name}"
             self.bench.ask_number(what, begun, partial(self._set, self.marked))
 
     def _set(self, row: int, value: float) -> None:
-        self.bench.send(write_edit(_GAINS[row], self._name, value))
+        self.bench.send(write_edit(_ROWS[row], self._name, value))
 
     def _gains(self) -> PidTuning | None:
         stack = () if self.snapshot is None or not self._samples else self.snapshot.stack
