@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Protocol
 
 from pdtui.core.errors import PdtuiError
 from pdtui.core.processes.worker_pool import describe_exit, end_with_parent
-from pdtui.driving.bench.unit_search_snapshot import UnitSearchRequest
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
+from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchRequest
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig

@@ -17,7 +17,6 @@ from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import PdtuiError, SessionError, format_error_in_one_line
 from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
-from pdtui.driving.bench.unit_searcher import UnitSearcher
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts
@@ -27,6 +26,7 @@ from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.pacer import Pacer
 from pdtui.driving.replays.step_by_step_comparison import StepByStepComparison
 from pdtui.driving.snapshot_builder import SnapshotBuilder
+from pdtui.driving.unit_bench.unit_searcher import UnitSearcher
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 _IDLE = 0.05  # longest wait for a request while the drive is paused or over, s

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from pdtui.core.robot_links_and_state import Link
     from pdtui.core.scenery import Scenery, Traffic
     from pdtui.core.step_record import ActiveBehavior
-    from pdtui.driving.bench.natural_ranges import NaturalRanges
-    from pdtui.driving.bench.unit_search_snapshot import UnitSearchSnapshot
     from pdtui.driving.ghost.ghost_snapshot import GhostSnapshot
+    from pdtui.driving.unit_bench.natural_ranges import NaturalRanges
+    from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchSnapshot
     from pdtui.stimulation.stack.stack_layer import StackLayer
 
 

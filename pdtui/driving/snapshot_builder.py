@@ -8,11 +8,11 @@ from pdtui.core.drive_events import describe_event
 from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.core.step_record import StepRecord
-from pdtui.driving.bench.natural_ranges import NaturalRangeTracker
-from pdtui.driving.bench.unit_searcher import UnitSearcher
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_snapshot import DriveSnapshot, KeyPress, StimulatedUnit
 from pdtui.driving.ghost.ghost_runner import GhostRunner
+from pdtui.driving.unit_bench.natural_ranges import NaturalRangeTracker
+from pdtui.driving.unit_bench.unit_searcher import UnitSearcher
 from pdtui.sessions.episode_statistics import EpisodeStatisticsCounter
 
 _LATCHING = ("behavior", "beside")

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import PdtuiError
-from pdtui.driving.bench.unit_search_snapshot import UnitSearchRequest
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
+from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.drive_app import DriveApp
 from tests.tui.recorded_snapshots import drive_map, load

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.units import parse_unit
-from pdtui.driving.bench.unit_search_snapshot import FoundUnit, UnitSearchRequest, UnitSearchSnapshot
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUnit
+from pdtui.driving.unit_bench.unit_search_snapshot import FoundUnit, UnitSearchRequest, UnitSearchSnapshot
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stack.stack_layer import PidTuning, StackLayer
 from pdtui.tui.unit_bench.bench_entry import BenchEntry

@@ -33,6 +33,11 @@ class StackLayer(NamedTuple):
     gains: PidTuning | None = None
 
 
+def is_muted(name: str, stack: Sequence[StackLayer]) -> bool:
+    """Return whether a behavior is latched but does not act."""
+    return any(layer.muted for layer in stack if layer.name == name)
+
+
 def find_conflicts(stack: Sequence[StackLayer], held: Sequence[int] = ()) -> frozenset[int]:
     """Return the units that more than one layer that acts can change; held units are a layer of their own.
 

@@ -10,7 +10,7 @@ from textual import events
 from textual.binding import Binding
 from textual.strip import Strip
 
-from pdtui.driving.bench.unit_search_snapshot import UnitSearchRequest
+from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import ScreenRow, format_signed
 from pdtui.tui.snapshot_widget import SnapshotWidget

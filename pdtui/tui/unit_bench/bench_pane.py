@@ -15,8 +15,8 @@ from textual.reactive import reactive
 from pdtui.core.drive_edits import write_edit
 from pdtui.core.errors import PdtuiError
 from pdtui.core.units import format_unit
-from pdtui.driving.bench.unit_search_snapshot import UnitSearchRequest
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.unit_bench.bench_entry import Answer, BenchEntry
 from pdtui.tui.unit_bench.bench_page import BenchPage

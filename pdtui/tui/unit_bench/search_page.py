@@ -9,7 +9,7 @@ from textual.strip import Strip
 from pdtui.core.drive_edits import write_edit
 from pdtui.core.printable_text import make_printable
 from pdtui.core.units import format_unit
-from pdtui.driving.bench.unit_search_snapshot import FoundUnit, UnitSearchRequest
+from pdtui.driving.unit_bench.unit_search_snapshot import FoundUnit, UnitSearchRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import ScreenRow, format_number, format_signed
 from pdtui.tui.theme import STYLES

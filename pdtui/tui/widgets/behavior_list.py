@@ -9,6 +9,7 @@ from rich.style import Style
 from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
+from pdtui.stimulation.stack.stack_layer import is_muted
 from pdtui.tui.cell_text import ScreenRow, displayed_key_name, fit_cells, format_number, format_signed
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
@@ -63,6 +64,8 @@ class BehaviorList(SnapshotWidget):
         if active is None:
             self._add_cap(line, behavior.key, STYLES.key)
             line.add("  " + make_printable(behavior.name), color, name_width + 2).add("  ", STYLES.text)
+            if self.snapshot is not None and is_muted(behavior.name, self.snapshot.stack):
+                line.add("muted  ", STYLES.warn)
             line.add(self._kind(behavior) if roomy else says, STYLES.muted)
             lines = [line.strip()]
         else:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pdtui.core.closable import Closable
 from pdtui.core.errors import PdtuiError, RobotError
-from pdtui.driving.bench.natural_ranges import NaturalRanges
-from pdtui.driving.bench.unit_search_process import UnitSearchProcess
-from pdtui.driving.bench.unit_search_snapshot import UnitSearchRequest, UnitSearchSnapshot
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.ghost.ghost_simulation import GhostStart
+from pdtui.driving.unit_bench.natural_ranges import NaturalRanges
+from pdtui.driving.unit_bench.unit_search_process import UnitSearchProcess
+from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchRequest, UnitSearchSnapshot
 
 
 class UnitSearcher(Closable):

@@ -10,10 +10,10 @@ from pdtui.core.attributes import Floats, wrap_angle
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.outcome import is_failure
 from pdtui.core.units import Stimulation, format_unit
-from pdtui.driving.bench.natural_ranges import NaturalRanges
-from pdtui.driving.bench.unit_search_snapshot import FoundUnit
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.ghost.ghost_simulation import GhostStart, restore_ghost_start
+from pdtui.driving.unit_bench.natural_ranges import NaturalRanges
+from pdtui.driving.unit_bench.unit_search_snapshot import FoundUnit
 
 SECONDS = 2.0
 """Simulated time of a roll-out, s; its second half is measured."""

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import pytest
 
-from pdtui.driving.bench.unit_search_process import choose_best
-from pdtui.driving.bench.unit_search_rollouts import rank_candidates, run_search_rollout
-from pdtui.driving.bench.unit_search_snapshot import FoundUnit, UnitSearchRequest, UnitSearchSnapshot
-from pdtui.driving.bench.unit_searcher import UnitSearcher
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.ghost.ghost_simulation import GhostStart
 from pdtui.driving.headless_drive import events_of_pressed_keys
 from pdtui.driving.loop_builder import build_control_loop
+from pdtui.driving.unit_bench.unit_search_process import choose_best
+from pdtui.driving.unit_bench.unit_search_rollouts import rank_candidates, run_search_rollout
+from pdtui.driving.unit_bench.unit_search_snapshot import FoundUnit, UnitSearchRequest, UnitSearchSnapshot
+from pdtui.driving.unit_bench.unit_searcher import UnitSearcher
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 PATIENCE = 240.0

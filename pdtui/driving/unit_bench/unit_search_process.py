@@ -10,11 +10,11 @@ from dataclasses import replace
 from pdtui.core.closable import Closable
 from pdtui.core.errors import PdtuiError, format_error_in_one_line
 from pdtui.core.processes.worker_pool import WorkerProcess
-from pdtui.driving.bench.natural_ranges import NaturalRanges
-from pdtui.driving.bench.unit_search_rollouts import judge_rollout, rank_candidates, run_search_rollout
-from pdtui.driving.bench.unit_search_snapshot import FoundUnit, UnitSearchRequest, UnitSearchSnapshot
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.ghost.ghost_simulation import GhostStart, answer_when_loaded, build_ghost_loop
+from pdtui.driving.unit_bench.natural_ranges import NaturalRanges
+from pdtui.driving.unit_bench.unit_search_rollouts import judge_rollout, rank_candidates, run_search_rollout
+from pdtui.driving.unit_bench.unit_search_snapshot import FoundUnit, UnitSearchRequest, UnitSearchSnapshot
 
 OFFERED = 3
 """Units that a search offers."""
