@@ -125,7 +125,7 @@ KEY_TABLE = (
     ReservedKey(
         "bench",
         "ctrl+e",
-        "opens the unit bench, to edit what acts on hidden units, or closes it",
+        "opens or closes the unit bench, to edit hidden units",
         action="bench('toggle')",
         hint="bench",
         hint_rank=5,

@@ -136,7 +136,7 @@ class BehaviorLatch:
         """
         own = self._find_latched(name)
         others = [one for one in self._latched if one is not own and not one.fading]
-        others.insert(max(0, min(int(place), len(others))), own)
+        others.insert(int(min(len(others), max(0.0, place))), own)
         self._latched = [one for one in self._latched if one.fading] + others
 
     def controller_of(self, name: str) -> PidMagnitude:

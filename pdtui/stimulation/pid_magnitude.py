@@ -49,8 +49,9 @@ class PidMagnitude:
 
     def set_gain(self, name: GainName, value: float) -> None:
         """Set a gain from now on; what the integral has summed up stays."""
-        self.gains = replace(self.gains, **{name: value})
-        self._pid.tunings = self.gains.kp, self.gains.ki, self.gains.kd
+        kp, ki, kd = (value if one == name else getattr(self.gains, one) for one in ("kp", "ki", "kd"))
+        self.gains = replace(self.gains, kp=kp, ki=ki, kd=kd)
+        self._pid.tunings = kp, ki, kd
 
     def update(self, value: float) -> float:
         """Return the magnitude c for the attribute's present value; call it once per control step."""

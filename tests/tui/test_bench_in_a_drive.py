@@ -17,7 +17,7 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.drive_app import DriveApp
 from tests.tui.screens import shown
 
-PATIENCE = 120.0
+PATIENCE = 300.0
 
 
 async def until(pilot: Pilot[str], wanted: Callable[[], bool], what: str) -> None:

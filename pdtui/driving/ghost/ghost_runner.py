@@ -126,7 +126,7 @@ class GhostRunner(Closable):
         jumped = any(event.jumps for event in events)
         if jumped or (pressed and not acting):
             self._end()
-        begun = any(event.kind == "unit" or event.name in latched for event in pressed)
+        begun = any(event.kind in ("unit", "free") or event.name in latched for event in pressed)
         if acting and (begun or jumped or self._turned_on):
             self._begin(self._process)
         self._turned_on = False

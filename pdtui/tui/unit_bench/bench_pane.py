@@ -64,7 +64,7 @@ class BenchPane(Vertical):
         find_units: Callable[[UnitSearchRequest], None],
         say: Callable[[str], None],
     ) -> None:
-        super().__init__(id="bench")
+        super().__init__(id="bench", disabled=True)  # so that none of it gets the keys while it is closed
         self.map = self._target = stimulation_map
         self.send, self.find_units, self.say = send, find_units, say
         self.differences = GhostDifferences()
@@ -103,6 +103,7 @@ class BenchPane(Vertical):
 
     def open(self) -> None:
         """Show the pane and give it the keys."""
+        self.disabled = False
         self.screen.add_class("-bench")
         self._focus_page()
         self.pages[self._page].row_was_marked()
@@ -113,6 +114,7 @@ class BenchPane(Vertical):
             self._entry.action_leave()
         self.screen.remove_class("-bench")
         self.screen.set_focus(None)
+        self.disabled = True
         self.point_to(-1)
 
     def action_turn(self, direction: int) -> None:

@@ -43,8 +43,9 @@ class GhostDifferences:
         angles = np.array([one.wraps for one in attributes])
         for step, other in enumerate(ghost.history, ghost.latest.step - len(ghost.history)):
             if step in own:
-                change = own[step] - other
-                change[angles] = wrap_angles(change[angles])
+                with np.errstate(invalid="ignore"):
+                    change = own[step] - other
+                    change[angles] = wrap_angles(change[angles])
                 self._sum = change if self._sum is None else self._sum + change
                 self.steps += 1
 
