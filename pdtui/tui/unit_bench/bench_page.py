@@ -98,7 +98,7 @@ class BenchPage(SnapshotWidget, can_focus=True):
     def choose(self) -> None:
         """Take the marked row, or let it go."""
 
-    def remove(self) -> None:
+    def take_off(self) -> None:
         """Remove the marked row."""
 
     def reorder(self, direction: int) -> None:
@@ -122,7 +122,7 @@ class BenchPage(SnapshotWidget, can_focus=True):
         self.redraw()
 
     def action_remove(self) -> None:
-        self.remove()
+        self.take_off()
         self.redraw()
 
     def action_reorder(self, direction: int) -> None:

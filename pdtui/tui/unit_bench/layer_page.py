@@ -21,17 +21,17 @@ class LayerPage(BenchPage):
 
     TAB: ClassVar[str] = "layers"
     KEYS: ClassVar[str] = "←→ ×  ↵ mute/add  ⇧↑↓ order  Del end"
-    _name = ""  # of the marked behavior, which stays marked where the stack changes
+    _behavior = ""  # of the marked behavior, which stays marked where the stack changes
 
     def remember(self, snapshot: DriveSnapshot) -> None:
         names = [*(layer.name for layer in reversed(snapshot.stack)), *self._others_of(snapshot)]
-        if self._name in names:
-            self.marked = names.index(self._name)
+        if self._behavior in names:
+            self.marked = names.index(self._behavior)
 
     def row_was_marked(self) -> None:
         layer, others = self._marked_layer(), self._others()
         row = self.marked - len(self._stack())
-        self._name = layer.name if layer is not None else others[row] if 0 <= row < len(others) else ""
+        self._behavior = layer.name if layer is not None else others[row] if 0 <= row < len(others) else ""
         self.bench.point_to(-1)
 
     def count_rows(self) -> int:
@@ -80,7 +80,7 @@ class LayerPage(BenchPage):
         elif others := self._others():
             self.bench.send(write_edit("beside", others[self.marked - len(self._stack())]))
 
-    def remove(self) -> None:
+    def take_off(self) -> None:
         if (layer := self._marked_layer()) is not None:
             self.bench.send(write_edit("release", layer.name))
 

@@ -45,14 +45,14 @@ class PidPage(BenchPage):
 
     def on_mount(self) -> None:
         self._samples: deque[_Sample] = deque(maxlen=1000)
-        self._name = ""
+        self._behavior = ""
 
     def remember(self, snapshot: DriveSnapshot) -> None:
         held = [view for view in snapshot.active_behaviors if view.target is not None]
         name = held[-1].name if held else ""
-        if name != self._name or (self._samples and snapshot.step < self._samples[-1].step):
+        if name != self._behavior or (self._samples and snapshot.step < self._samples[-1].step):
             self._samples.clear()
-            self._name = name
+            self._behavior = name
         if held and (not self._samples or snapshot.step > self._samples[-1].step):
             view = held[-1]
             numbers = (view.target, view.value, view.error, view.magnitude)
@@ -65,11 +65,11 @@ class PidPage(BenchPage):
         if self.facts is None or self._gains() is None:
             said = "no behavior of mode pid is latched"
             return [ScreenRow(width).add(said, STYLES.faint).strip()]
-        behavior = self.map.behaviors[self._name]
+        behavior = self.map.behaviors[self._behavior]
         assert behavior.pid is not None
         unit = {one.name: one.unit for one in self.facts.attributes}.get(behavior.pid.attribute, "")
-        style, last = STYLES.behavior(self.row_of(self._name)), self._samples[-1]
-        title = ScreenRow(width).add(f"{make_printable(self._name)} ", style)
+        style, last = STYLES.behavior(self.row_of(self._behavior)), self._samples[-1]
+        title = ScreenRow(width).add(f"{make_printable(self._behavior)} ", style)
         title.add(
             f"{format_number(last.value)} → {format_number(last.target)} {make_printable(unit)}", STYLES.text
         )
@@ -77,7 +77,7 @@ class PidPage(BenchPage):
         return [title.strip(), *self._draw_charts(width)]
 
     def draw_row(self, row: int, line: ScreenRow, *, marked: bool) -> None:
-        gains, pid = self._gains(), self.map.behaviors[self._name].pid
+        gains, pid = self._gains(), self.map.behaviors[self._behavior].pid
         assert gains is not None
         assert pid is not None
         now = gains[row] if row < len(gains) else self._samples[-1].target
@@ -93,20 +93,20 @@ class PidPage(BenchPage):
         if self.marked < len(gains):
             now = gains[self.marked] or (_LEAST_GAIN if presses > 0 else 0.0)
             self._set(self.marked, float(f"{now * _GAIN_STEP**presses:.4g}"))
-        elif (pid := self.map.behaviors[self._name].pid) is not None:
+        elif (pid := self.map.behaviors[self._behavior].pid) is not None:
             self._set(self.marked, self._samples[-1].target + presses * pid.step)
 
     def type_value(self, begun: str) -> None:
         if self._gains() is not None:
-            what = f"{_ROWS[self.marked]} of {self._name}"
+            what = f"{_ROWS[self.marked]} of {self._behavior}"
             self.bench.ask_number(what, begun, partial(self._set, self.marked))
 
     def _set(self, row: int, value: float) -> None:
-        self.bench.send(write_edit(_ROWS[row], self._name, value))
+        self.bench.send(write_edit(_ROWS[row], self._behavior, value))
 
     def _gains(self) -> PidTuning | None:
         stack = () if self.snapshot is None or not self._samples else self.snapshot.stack
-        return next((layer.gains for layer in stack if layer.name == self._name), None)
+        return next((layer.gains for layer in stack if layer.name == self._behavior), None)
 
     def _draw_charts(self, width: int) -> list[Strip]:
         """Return two lines each for value and target, and for the output."""
@@ -127,7 +127,7 @@ class PidPage(BenchPage):
         everything = np.concatenate([own, target])
         low, high = (np.nan_to_num(find(everything, axis=0)) for find in (np.nanmin, np.nanmax))
         scales = sparklines.fit_scales(everything, low, high)
-        styles = [STYLES.behavior(self.row_of(self._name)), STYLES.primary]
+        styles = [STYLES.behavior(self.row_of(self._behavior)), STYLES.primary]
         plots = sparklines.draw_line_plots(own, target, scales, styles)
         strips = []
         for number, plot in enumerate(plots):

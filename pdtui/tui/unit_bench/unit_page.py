@@ -106,7 +106,7 @@ class UnitPage(BenchPage):
         else:
             self._hold(self.marked, one.value)
 
-    def remove(self) -> None:
+    def take_off(self) -> None:
         if self.marked < len(self.units.rows):
             if self.units.rows[self.marked].held:
                 self.choose()
