@@ -57,7 +57,6 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 }
 .-bench #bench { display: block; }
 .-bench #behaviors { display: none; }
-.-tall.-bench #behaviors { display: block; }
 
 /* Without a robot to draw, the attributes take its room. */
 .-bodiless #left { display: none; }

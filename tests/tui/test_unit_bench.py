@@ -112,7 +112,7 @@ async def test_the_stack_is_edited_by_its_page(make_app: MakeApp, drive: Drive) 
         assert "×1.50" in lines[0]
         assert "shares 1:7" in lines[0]
         assert "forward" in lines[1]
-        await pilot.press("right", "enter", "shift+down", "delete", "down", "enter")
+        await pilot.press("right", "enter", "shift+down", "down", "delete", "down", "enter")
         assert connection.pressed == [
             "factor crouch 1.875",
             "mute crouch",

@@ -7,7 +7,7 @@ from time import monotonic
 
 from pdtui.driving.drive_snapshot import DriveSnapshot
 
-_SECONDS_AHEAD = 0.7
+_SECONDS_AHEAD = 1.5
 """Time in which the drive may not know yet what was edited here."""
 
 
