@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
-from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUnit
 from pdtui.tui.map_picker import MapPickerApp
 from tests.tui.conftest import MakeApp, ScriptedConnection
 from tests.tui.ghost_snapshots import with_ghost
@@ -52,6 +52,23 @@ def test_ghost(
     facts, snapshots = drive
     app, connection = make_app([facts, *with_ghost(snapshots[:64], 40)])
     assert snap_compare(app, terminal_size=size, run_before=after(connection))
+
+
+@pytest.mark.parametrize("size", [SMALL, (120, 40)], ids=["small", "medium"])
+def test_unit_bench(
+    snap_compare: Compare,
+    make_app: MakeApp,
+    drive: tuple[DriveFacts, list[DriveSnapshot]],
+    size: tuple[int, int],
+) -> None:
+    facts, snapshots = drive
+    held = StimulatedUnit(12, 0.25, 2.5)
+    last = [
+        replace(one, held_units=((12, 2.5),), stimulated_units=(held,), active_behaviors=())
+        for one in with_ghost(snapshots[:64], 40)
+    ]
+    app, connection = make_app([replace(facts, output_bounds=((-1.0, 1.0),) * 2), *last])
+    assert snap_compare(app, terminal_size=size, run_before=after(connection, "ctrl+e"))
 
 
 def test_from_above(snap_compare: Compare, make_app: MakeApp) -> None:
