@@ -6,10 +6,13 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from pdtui.core.step_record import ActiveBehavior
 from pdtui.core.units import parse_unit
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUnit
+from pdtui.driving.unit_bench.natural_ranges import NaturalRanges
 from pdtui.driving.unit_bench.unit_search_snapshot import FoundUnit, UnitSearchRequest, UnitSearchSnapshot
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stack.stack_layer import PidTuning, StackLayer
@@ -233,3 +236,33 @@ async def test_an_overwritten_cell_is_marked_in_place_and_an_unnatural_output_as
         assert strip.count("◆") == 2
         assert "0:12 0.25→16.60! (−1.00…1.00)" in strip
         assert "0:40 0.10→0.50 " in strip
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
+async def test_odd_numbers_and_tiny_terminals_do_no_harm(
+    make_app: MakeApp, drive: Drive, value: float
+) -> None:
+    facts, snapshots = drive
+    first = snapshots[0]
+    arrays = {
+        name: np.full_like(getattr(first, name), value) for name in ("activations", "attributes", "history")
+    }
+    odd = ActiveBehavior("heading", None, 1.0, value, value, value, value)
+    shot = replace(
+        first,
+        **arrays,
+        active_behaviors=(odd,),
+        stack=(StackLayer("heading", value, False, (5,), PidTuning(value, value, value)),),
+        held_units=((5, value),),
+        natural_ranges=NaturalRanges(arrays["activations"], arrays["activations"], 1000),
+        unit_search=UnitSearchSnapshot("done", best=(FoundUnit(5, value, value, True),)),
+    )
+    app, connection = make_app([facts, *(replace(shot, step=step) for step in range(1, 6))])
+    async with app.run_test(size=(80, 24)) as pilot:
+        await played(pilot, connection)
+        for size in ((80, 24), (81, 25), (200, 60), (3, 17), (1, 1), (80, 24)):
+            await pilot.resize_terminal(*size)
+            for _ in range(4):
+                await pilot.press(*(["ctrl+e"] if not app.query_one("#bench").display else []), "tab")
+                await pilot.press("up", "right", "down", "left", "enter", "pagedown", "shift+up", "delete")
+        assert app.is_running

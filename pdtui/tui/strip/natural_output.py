@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from pdtui.core.errors import PolicyError
@@ -25,9 +26,10 @@ class NaturalOutputs:
     def range_of(self, unit: int) -> tuple[float, float] | None:
         """Return the range of a unit in this drive, or before that is known, its bounds, if it has both."""
         if self._ranges is not None and unit < len(self._ranges.low):
-            return float(self._ranges.low[unit]), float(self._ranges.high[unit])
+            found = float(self._ranges.low[unit]), float(self._ranges.high[unit])
+            return found if math.isfinite(found[0]) and math.isfinite(found[1]) else None
         low, high = self._bounds_of(unit)
-        return (low, high) if low > -1e9 and high < 1e9 else None
+        return (low, high) if math.isfinite(low) and math.isfinite(high) else None
 
     def has(self, unit: int, value: float) -> bool:
         """Return whether the unit can have an output by itself, as far as is known."""
@@ -44,4 +46,4 @@ class NaturalOutputs:
             layer = split_flat_index(unit, self._layers)[0]
         except PolicyError:
             layer = len(self._bounds)
-        return self._bounds[layer] if layer < len(self._bounds) else (float("-inf"), float("inf"))
+        return self._bounds[layer] if layer < len(self._bounds) else (-math.inf, math.inf)

@@ -125,7 +125,7 @@ class PidPage(BenchPage):
             _fill_gaps(own[:, column])
         _fill_gaps(target[:, 0])
         everything = np.concatenate([own, target])
-        low, high = (np.nan_to_num(find(everything, axis=0)) for find in (np.nanmin, np.nanmax))
+        low, high = (np.nan_to_num(find.reduce(everything)) for find in (np.fmin, np.fmax))
         scales = sparklines.fit_scales(everything, low, high)
         styles = [STYLES.behavior(self.row_of(self._behavior)), STYLES.primary]
         plots = sparklines.draw_line_plots(own, target, scales, styles)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from rich.style import Style
@@ -29,6 +30,8 @@ class SliderScale(NamedTuple):
 
     def cell_of(self, value: float, cells: int) -> int:
         """Return the cell of a value; one beyond an end is in the last cell there."""
+        if math.isnan(value):
+            return 0
         share = (value - self.low) / (self.high - self.low)
         return round(min(max(share, 0.0), 1.0) * (cells - 1))
 
@@ -45,6 +48,7 @@ def fit_slider(natural: tuple[float, float] | None, value: float) -> SliderScale
         middle = (low + high) / 2
         low, high = middle - _LEAST_SPAN / 2, middle + _LEAST_SPAN / 2
     beside = _BESIDE * (high - low)
+    value = value if math.isfinite(value) else low
     return SliderScale(min(low - beside, value), max(high + beside, value), low, high)
 
 
