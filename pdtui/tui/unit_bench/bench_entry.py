@@ -38,7 +38,7 @@ class BenchEntry(Input):
         """
         self._answer, self.placeholder, self.value = answer, what, before
         self.display = True
-        self.focus()
+        self.screen.set_focus(self)  # at once, as further keys may be on their way
         self.cursor_position = len(before)
 
     def ask_number(self, what: str, before: str, take: Callable[[float], None]) -> None:

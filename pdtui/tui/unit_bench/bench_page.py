@@ -32,6 +32,9 @@ class Bench(Protocol):
     def ask(self, what: str, before: str, answer: Answer) -> None:
         """Let the user type something."""
 
+    def continue_typing(self, character: str | None) -> bool:
+        """Add a character to the line in which something is typed, and return whether that was possible."""
+
     def ask_number(self, what: str, before: str, take: Callable[[float], None]) -> None:
         """Let the user type a number."""
 
@@ -139,7 +142,14 @@ class BenchPage(SnapshotWidget, can_focus=True):
         self.redraw()
 
     def on_key(self, event: events.Key) -> None:
-        """Let a digit begin a value, unless it is the key of a behavior."""
+        """Let a digit begin a value, unless it is the key of a behavior.
+
+        What is typed fast may arrive here after the line has been opened for it.
+        """
+        if self.bench.continue_typing(event.character if event.is_printable else None):
+            event.stop()
+            event.prevent_default()
+            return
         digit = (event.character or "") in tuple("0123456789.")
         if digit and self.map.behavior_of_key(event.key) is None and event.key != self.map.default_key:
             event.stop()

@@ -154,6 +154,13 @@ class BenchPane(Vertical):
         """Let the user type something, as `BenchEntry.ask` does."""
         self._entry.ask(what, before, answer)
 
+    def continue_typing(self, character: str | None) -> bool:
+        """Add a character to the line in which something is typed, if there is one and there is a line."""
+        if character is None or not self._entry.display:
+            return False
+        self._entry.insert_text_at_cursor(character)
+        return True
+
     def ask_number(self, what: str, before: str, take: Callable[[float], None]) -> None:
         """Let the user type a number, as `BenchEntry.ask_number` does."""
         self._entry.ask_number(what, before, take)
