@@ -142,7 +142,7 @@ class BenchPage(SnapshotWidget, can_focus=True):
         self.redraw()
 
     def on_key(self, event: events.Key) -> None:
-        """Let a digit begin a value, unless it is the key of a behavior.
+        """Let = or a digit begin a value, unless it is the key of a behavior.
 
         What is typed fast may arrive here after the line has been opened for it.
         """
@@ -150,11 +150,11 @@ class BenchPage(SnapshotWidget, can_focus=True):
             event.stop()
             event.prevent_default()
             return
-        digit = (event.character or "") in tuple("0123456789.")
-        if digit and self.map.behavior_of_key(event.key) is None and event.key != self.map.default_key:
+        begins = (event.character or "") in tuple("=0123456789.")
+        if begins and self.map.behavior_of_key(event.key) is None and event.key != self.map.default_key:
             event.stop()
             event.prevent_default()
-            self.type_value(event.character or "")
+            self.type_value((event.character or "").replace("=", ""))
 
     def on_click(self, event: events.Click) -> None:
         """Mark the row under the mouse; a second click takes it."""
