@@ -18,6 +18,7 @@ COMMANDS = {
     "maps": "List the maps.",
     "replay": "Repeat a session and compare every step.",
     "guide": "Read the guide.",
+    "config": "Print the settings, and what they do.",
     "sessions": "List, inspect, verify, repair and export sessions.",
     "evaluate": "Measure what the behaviors of a map do.",
     "dissect": "Find the units that steer a robot; write a map.",
@@ -29,11 +30,14 @@ COMMANDS = {
     "bench": "Measure speed and memory.",
 }
 """The summary of each command in `pdtui --help`; `pdtui.cli.NAME_command` has the command."""
+ABOUT_PROGRAM = ("robots", "maps", "guide", "config")
+"""Commands that are in the package `pdtui.cli.program` instead."""
 
 
 @click.group(
     cls=LazyCommandGroup,
     summaries=COMMANDS,
+    packages=dict.fromkeys(ABOUT_PROGRAM, "program"),
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -26,11 +26,14 @@ class LazyCommandGroup(click.Group):
     """Imports a command's module when the command is used, and prints expected errors as one line.
 
     `summaries` gives the summary of each command NAME, which is `NAME_command` in `pdtui.cli.NAME_command`.
+    `packages` gives the package of `pdtui.cli` that has the module instead.
     """
 
-    def __init__(self, *, summaries: Mapping[str, str], **arguments: Any) -> None:
+    def __init__(
+        self, *, summaries: Mapping[str, str], packages: Mapping[str, str], **arguments: Any
+    ) -> None:
         super().__init__(**arguments)
-        self._summaries = summaries
+        self._summaries, self._packages = summaries, packages
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         return list(self._summaries)
@@ -38,7 +41,8 @@ class LazyCommandGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         if cmd_name not in self._summaries:
             return None
-        command = resolve_name(f"pdtui.cli.{cmd_name}_command:{cmd_name}_command")
+        package = f"pdtui.cli.{self._packages[cmd_name]}" if cmd_name in self._packages else "pdtui.cli"
+        command = resolve_name(f"{package}.{cmd_name}_command:{cmd_name}_command")
         assert isinstance(command, click.Command)
         return command
 

@@ -21,6 +21,7 @@ from pdtui.cli.options.shared_options import (
     workers_option,
 )
 from pdtui.cli.output.command_output import print_result, progress_bar
+from pdtui.core.settings.settings_file import own_folder
 
 
 @click.command()
@@ -109,7 +110,7 @@ def dissect_command(
     name = str(robot or env)
     trust_module(name)
     world = RobotSpec(name, parse_robot_options(require_robot_name(name), robot_options))
-    output = output or Path("maps") / f"{robot_file_stem(name)}-dissected.toml"
+    output = output or own_folder("maps") / f"{robot_file_stem(name)}-dissected.toml"
     outputs = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite)
     if not null:
         outputs.check()

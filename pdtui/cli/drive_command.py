@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pdtui.cli.options.robot_option_flag import robot_option_flag
+from pdtui.cli.options.screen_options import screen_options
 from pdtui.cli.options.shared_options import (
     FILE_PATH,
     build_drive_config,
@@ -22,14 +22,17 @@ from pdtui.cli.options.shared_options import (
     record_activations_option,
     start_option,
 )
-from pdtui.core.errors import KeystrokeError, ScreenError, SessionError
+from pdtui.cli.screen.show_drive import require_terminal, show_drive
+from pdtui.core.errors import KeystrokeError, SessionError
 from pdtui.core.outcome import describe_outcomes
 from pdtui.core.printable_text import make_printable
+from pdtui.core.settings.settings_file import own_folder
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.sessions.viewer.viewer_address import LOCAL, PORT, ViewerAddress
 from pdtui.sessions.writer.session_file import SYNC_MODES
 
 if TYPE_CHECKING:
+    from pdtui.core.settings.user_settings import UserSettings
     from pdtui.driving.drive_config import DriveConfig
 
 
@@ -66,7 +69,7 @@ if TYPE_CHECKING:
     metavar="[PORT|HOST[:PORT]]",
     help=f"Also show the drive in a Rerun viewer that listens at this address; default: {LOCAL}:{PORT}.",
 )
-@integer_option("--fps", most=60, default=12, help="Number of frames per second on the screen.")
+@screen_options
 @click.option("--headless", is_flag=True, help="Drive without a screen, as fast as possible.")
 @click.option(
     "--keys",
@@ -84,7 +87,7 @@ def drive_command(
     overwrite: bool,
     no_record: bool,
     viewer: str | None,
-    fps: int,
+    settings: UserSettings,
     headless: bool,
     keys: Path | None,
     steps: int,
@@ -111,7 +114,7 @@ def drive_command(
     if headless:
         _drive_headless(config, keys, steps)
     else:
-        show_drive(config, fps=fps)
+        show_drive(config, settings)
 
 
 def _record_into_new_session(config: DriveConfig) -> DriveConfig:
@@ -119,7 +122,7 @@ def _record_into_new_session(config: DriveConfig) -> DriveConfig:
     from pdtui.robots import robot_file_stem
 
     name = f"{robot_file_stem(config.robot)}-{datetime.now():%Y%m%d-%H%M%S}-seed{config.seed}.rrd"
-    return replace(config, recording=str(Path("sessions") / name), existing="number")
+    return replace(config, recording=str(own_folder("sessions") / name), existing="number")
 
 
 def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
@@ -154,28 +157,6 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
         click.echo(make_printable(f"recorded in {recorder.path}"))
 
 
-def show_drive(config: DriveConfig, *, fps: int = 12, watching: bool = False) -> None:
-    """Start the simulation's process, then show it on the screen."""
-    require_terminal()
-    from pdtui.driving.drive_client import DriveClient
-
-    connection = DriveClient(config)
-    try:
-        from pdtui.tui.drive_app import DriveApp
-
-        if not watching:
-            click.echo(make_printable(f"starting {config.robot} …"), err=True)
-        connection.wait_until_started()
-        app = DriveApp(connection, config.stimulation_map, fps=fps, watching=watching)
-        message = app.run()
-    finally:
-        last_words = connection.close()
-    if app.return_code or connection.failed:
-        said = message or last_words
-        raise ScreenError(said if connection.recording in said else f"{said}; {last_words}")
-    click.echo(make_printable(last_words))
-
-
 def pick_and_drive() -> None:
     """Let the user choose a map, then drive with it."""
     require_terminal()
@@ -185,9 +166,3 @@ def pick_and_drive() -> None:
     chosen = MapPickerApp(map_picker_rows(list_maps())).run()
     if chosen is not None:
         show_drive(_record_into_new_session(build_drive_config(str(chosen), None, "")))
-
-
-def require_terminal() -> None:
-    """Raise a `ScreenError` unless standard input and output are a terminal."""
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise ScreenError("the screen needs a terminal; use --headless to drive without one")

@@ -20,6 +20,7 @@ from pdtui.cli.options.shared_options import (
     workers_option,
 )
 from pdtui.cli.output.command_output import print_result, progress_bar
+from pdtui.core.settings.settings_file import own_folder
 
 
 @click.command()
@@ -73,7 +74,7 @@ def pursue_command(
             world,
             task,
             policy or robot,
-            output or Path("maps") / f"{robot_file_stem(robot)}-dissected.toml",
+            output or own_folder("maps") / f"{robot_file_stem(robot)}-dissected.toml",
             settings=settings if units is None else replace(settings, screen_units=units),
             progress=advance,
             **search,

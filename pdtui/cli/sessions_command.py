@@ -15,6 +15,7 @@ from pdtui.cli.replay_command import replay_options
 from pdtui.cli.sessions.export_subcommand import export_command
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.printable_text import make_printable, to_json
+from pdtui.core.settings.settings_file import own_folder
 
 BROKEN, DIFFERS = 1, 3
 """Exit codes."""
@@ -31,7 +32,7 @@ sessions_command.add_command(export_command)
 
 
 @sessions_command.command("list")
-@click.argument("folder", type=FILE_PATH, default="sessions")
+@click.argument("folder", type=FILE_PATH, default=lambda: str(own_folder("sessions")))
 @json_option
 def list_command(folder: Path, as_json: bool) -> None:
     """List the sessions under FOLDER, and say what is wrong with broken ones."""

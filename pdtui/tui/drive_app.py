@@ -9,7 +9,7 @@ from time import monotonic
 from typing import cast
 
 from textual import events
-from textual.app import App, ComposeResult
+from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Container
 from textual.reactive import reactive
@@ -24,9 +24,9 @@ from pdtui.tui.cell_text import displayed_key_name
 from pdtui.tui.help_screen import HelpScreen
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
-from pdtui.tui.terminal_driver import TerminalDriver
 from pdtui.tui.terminal_size_notice import LEAST_SIZE, TerminalSizeNotice
 from pdtui.tui.theme import THEME
+from pdtui.tui.themes.themed_app import ThemedApp
 from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
 from pdtui.tui.widgets.attribute_table import AttributeTable
 from pdtui.tui.widgets.behavior_list import BehaviorList
@@ -36,6 +36,7 @@ from pdtui.tui.widgets.status_lines import KeyLine, NoticeLine, StatusLine
 from pdtui.tui.widgets.unit_table import UnitTable
 
 NOTICE_SECONDS = 4.0
+NO_KEYMAP: Mapping[str, str] = {}
 _ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 # A key that changes the run goes to the drive under its original name, whatever key the user gave it.
 # Each binding has an id, so that users can remap it.
@@ -47,7 +48,7 @@ _HINTS = {row.id: row.hint for row in sorted(KEY_TABLE, key=lambda row: row.hint
 """Words of the key line by the bindings' ids, the most useful first."""
 
 
-class DriveApp(App[str], inherit_bindings=False):
+class DriveApp(ThemedApp[str], inherit_bindings=False):
     """Shows the newest snapshot of a drive and passes keys on to it.
 
     Textual's own keys are left out: with its ctrl+q, which resumes output on many terminals, it would quit.
@@ -60,6 +61,8 @@ class DriveApp(App[str], inherit_bindings=False):
         stimulation_map: the behaviors that the drive was started with.
         fps: polls of the connection per second.
         watching: whether the drive follows a recording, so that keys that would change it are refused.
+        theme: name of the theme.
+        keymap: the user's keys, by the bindings' ids.
     """
 
     CSS = DRIVE
@@ -80,16 +83,18 @@ class DriveApp(App[str], inherit_bindings=False):
         *,
         fps: int = 12,
         watching: bool = False,
+        theme: str = THEME.name,
+        keymap: Mapping[str, str] = NO_KEYMAP,
     ) -> None:
-        super().__init__(driver_class=TerminalDriver)
+        super().__init__(theme)
         self.connection, self.map, self.fps, self.watching = connection, stimulation_map, fps, watching
         # The map's keys come before the application's own.
         behaviors = stimulation_map.behaviors.values()
         self._map_keys = {stimulation_map.default_key, *(behavior.key for behavior in behaviors)}
         self._notice_until = 0.0
         self._help: HelpScreen | None = None
-        self.register_theme(THEME)
-        self.theme = THEME.name
+        if keymap:
+            self.set_keymap(keymap)
 
     def compose(self) -> ComposeResult:
         def bound(panel: SnapshotWidget) -> SnapshotWidget:

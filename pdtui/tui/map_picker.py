@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 from rich.style import Style
 from rich.text import Text
-from textual.app import App, ComposeResult
+from textual.app import ComposeResult
 from textual.binding import Binding
 
 from pdtui.core.printable_text import make_printable
 from pdtui.tui.cell_text import fit_cells
 from pdtui.tui.choice_list import ChoiceList, ListChoice, has_all_words
-from pdtui.tui.terminal_driver import TerminalDriver
 from pdtui.tui.theme import STYLES, THEME
+from pdtui.tui.themes.themed_app import ThemedApp
 
 if TYPE_CHECKING:
     from pdtui.stimulation.map_library import ListedMap
@@ -60,7 +60,7 @@ def map_picker_rows(maps: Sequence[ListedMap]) -> list[MapPickerRow]:
     return rows
 
 
-class MapPickerApp(App[MapPickerRow]):
+class MapPickerApp(ThemedApp[MapPickerRow]):
     """Lets the user choose a map by arrow keys and a filter; `run` returns the chosen row or None."""
 
     CSS = """
@@ -71,11 +71,9 @@ class MapPickerApp(App[MapPickerRow]):
     ENABLE_COMMAND_PALETTE = False
     BINDINGS: ClassVar = [Binding("ctrl+c", "quit", "quits without choosing", id="pick_quit", priority=True)]
 
-    def __init__(self, rows: Sequence[MapPickerRow]) -> None:
-        super().__init__(driver_class=TerminalDriver)
+    def __init__(self, rows: Sequence[MapPickerRow], theme: str = THEME.name) -> None:
+        super().__init__(theme)
         self.rows = tuple(rows)
-        self.register_theme(THEME)
-        self.theme = THEME.name
 
     def compose(self) -> ComposeResult:
         yield ChoiceList(

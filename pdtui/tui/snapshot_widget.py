@@ -16,6 +16,7 @@ from textual.widget import Widget
 
 if TYPE_CHECKING:
     from textual import events
+    from textual.theme import Theme
 
     from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
     from pdtui.stimulation.stimulation_map import StimulationMap
@@ -55,6 +56,13 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
     def remember(self, snapshot: DriveSnapshot) -> None:
         """Keep what later frames need of a snapshot; called once per snapshot."""
         del snapshot
+
+    def on_mount(self) -> None:
+        self.app.theme_changed_signal.subscribe(self, self._adopt_theme)
+
+    def _adopt_theme(self, _theme: Theme) -> None:
+        self._painted_size = Size(0, 0)
+        self.redraw()
 
     def watch_facts(self) -> None:
         self.redraw()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import atan2, ceil, log2, pi
 
 import numpy as np
+from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
@@ -25,7 +26,6 @@ STRETCHES: tuple[float | None, ...] = (5.0, 10.0, 20.0, 40.0, 80.0, None)
 _USUAL = STRETCHES.index(20.0)
 _WITH_GHOST = 20.0  # seconds of path from which the ghost has to be in the picture
 _PAST, _NONE, _MARK, _LABEL, _GHOST, _FIRST_BEHAVIOR = range(6)
-_INKS = (STYLES.faint, STYLES.text, STYLES.accent, STYLES.muted, STYLES.ghost, *STYLES.behaviors)
 
 
 class PathView(SnapshotWidget):
@@ -100,7 +100,7 @@ class PathView(SnapshotWidget):
             self._mark(canvas, place(ghost[-1]), "◌", _GHOST)
         self._mark(canvas, place(self._here), _ARROWS[round(self._heading / (pi / 4)) % 8], _MARK)
         self._draw_scale(canvas, zoom)
-        return canvas.render_strips(_INKS)
+        return canvas.render_strips(_inks())
 
     def _frame(self, canvas: BrailleCanvas, points: Floats) -> tuple[Floats, float]:
         """Return the middle of the picture in m and the number of dots per m.
@@ -124,3 +124,7 @@ class PathView(SnapshotWidget):
         cells = max(2, round(length * zoom / 2))
         label = format_number(length).removesuffix(".00") + " m"
         canvas.draw_text(0, canvas.rows - 1, "├" + "─" * (cells - 2) + "┤ " + label, _LABEL)
+
+
+def _inks() -> tuple[Style, ...]:
+    return (STYLES.faint, STYLES.text, STYLES.accent, STYLES.muted, STYLES.ghost, *STYLES.behaviors)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
@@ -32,11 +33,6 @@ View = Literal["side", "above"]
 _SIDE_ELEVATION = 14.0  # of the camera at the side, degrees
 _GROUND, _AXIS, _SHADOW, _ROBOT, _LABEL, _OBSTACLE = range(6)
 _LANE, _EDGE, _ROUTE, _VEHICLE, _GHOST, _FIRST_SHADE = range(6, 12)
-_INKS = (
-    *(STYLES.faint, STYLES.muted, STYLES.faint, STYLES.accent, STYLES.muted, STYLES.obstacle),
-    *(STYLES.muted, STYLES.text, STYLES.primary, STYLES.warn, STYLES.ghost),
-    *STYLES.depth,
-)
 _LINE_INKS: dict[LineKind, int] = {
     "solid lane line": _LANE,
     "broken lane line": _LANE,
@@ -91,7 +87,7 @@ class RobotView(SnapshotWidget):
         ends = capsule_ends(self.facts.links, placed)
         if not np.isfinite(ends).all():
             canvas.draw_text(1, height // 2, "the robot's pose is not finite", _LABEL)
-            return canvas.render_strips(_INKS)
+            return canvas.render_strips(_inks())
         root = self.snapshot.poses[root_body_row(self.facts.links)]
         camera = self._camera(canvas, root, ends)
         if self._shows_road:
@@ -110,7 +106,7 @@ class RobotView(SnapshotWidget):
         x, y, z = (format_number(float(value)) for value in root[:3])
         place = f"x {x}  y {y}  z {z} m"
         canvas.draw_text(width - len(place), height - 1, place, _LABEL)
-        return canvas.render_strips(_INKS)
+        return canvas.render_strips(_inks())
 
     @property
     def _shows_road(self) -> bool:
@@ -239,3 +235,11 @@ class RobotView(SnapshotWidget):
                 else:
                     thick = link.size[0] * camera.zoom
                     canvas.draw_capsule(dots[row, 0], dots[row, 1], thick, _ROBOT, halo=halo)
+
+
+def _inks() -> tuple[Style, ...]:
+    return (
+        *(STYLES.faint, STYLES.muted, STYLES.faint, STYLES.accent, STYLES.muted, STYLES.obstacle),
+        *(STYLES.muted, STYLES.text, STYLES.primary, STYLES.warn, STYLES.ghost),
+        *STYLES.depth,
+    )
