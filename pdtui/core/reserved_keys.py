@@ -96,6 +96,14 @@ KEY_TABLE = (
     ),
     ReservedKey("zoom_in", "right_square_bracket", "shows less of the path", action="zoom_path(-1)"),
     ReservedKey("zoom_out", "left_square_bracket", "shows more of the path", action="zoom_path(1)"),
+    ReservedKey(
+        "palette",
+        "ctrl+p",
+        "finds behaviors, keys and themes by name",
+        action="command_palette",
+        hint="commands",
+        hint_rank=13,
+    ),
     ReservedKey("help", "question_mark", "shows all keys", action="help", hint="help", hint_rank=0),
     ReservedKey("quit", "q", "ends the drive and quits", action="leave", hint="quit", hint_rank=1),
 )

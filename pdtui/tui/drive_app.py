@@ -10,23 +10,21 @@ from typing import cast
 
 from textual import events
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Container
 from textual.reactive import reactive
 
 from pdtui.core.errors import PdtuiError
-from pdtui.core.reserved_keys import KEY_TABLE
 from pdtui.driving.drive_client import DriveConnection
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import displayed_key_name
+from pdtui.tui.commands.key_bound_app import HINTS, NO_KEYMAP, KeyBoundApp
 from pdtui.tui.help_screen import HelpScreen
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
 from pdtui.tui.terminal_size_notice import LEAST_SIZE, TerminalSizeNotice
 from pdtui.tui.theme import THEME
-from pdtui.tui.themes.themed_app import ThemedApp
 from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
 from pdtui.tui.widgets.attribute_table import AttributeTable
 from pdtui.tui.widgets.behavior_list import BehaviorList
@@ -36,22 +34,11 @@ from pdtui.tui.widgets.status_lines import KeyLine, NoticeLine, StatusLine
 from pdtui.tui.widgets.unit_table import UnitTable
 
 NOTICE_SECONDS = 4.0
-NO_KEYMAP: Mapping[str, str] = {}
 _ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
-# A key that changes the run goes to the drive under its original name, whatever key the user gave it.
-# Each binding has an id, so that users can remap it.
-BINDINGS: list[Binding] = [
-    *(Binding(row.key, row.action or f"run_key('{row.key}')", row.says, id=row.id) for row in KEY_TABLE),
-    Binding("ctrl+c", "leave", "ends the drive and quits, always", id="quit_always", priority=True),
-]
-_HINTS = {row.id: row.hint for row in sorted(KEY_TABLE, key=lambda row: row.hint_rank) if row.hint}
-"""Words of the key line by the bindings' ids, the most useful first."""
 
 
-class DriveApp(ThemedApp[str], inherit_bindings=False):
+class DriveApp(KeyBoundApp):
     """Shows the newest snapshot of a drive and passes keys on to it.
-
-    Textual's own keys are left out: with its ctrl+q, which resumes output on many terminals, it would quit.
 
     The caller closes the connection afterwards. `run` returns None when the user quits; where the drive's
     process fails, it returns the failure's message and `return_code` is 1.
@@ -67,8 +54,6 @@ class DriveApp(ThemedApp[str], inherit_bindings=False):
 
     CSS = DRIVE
     TITLE = "pdtui"
-    BINDINGS = BINDINGS  # type: ignore[assignment]  # Textual's own type is an invariant list of a union
-    ENABLE_COMMAND_PALETTE = False
     HORIZONTAL_BREAKPOINTS = WIDTHS
     VERTICAL_BREAKPOINTS = HEIGHTS
 
@@ -86,15 +71,13 @@ class DriveApp(ThemedApp[str], inherit_bindings=False):
         theme: str = THEME.name,
         keymap: Mapping[str, str] = NO_KEYMAP,
     ) -> None:
-        super().__init__(theme)
-        self.connection, self.map, self.fps, self.watching = connection, stimulation_map, fps, watching
-        # The map's keys come before the application's own.
         behaviors = stimulation_map.behaviors.values()
-        self._map_keys = {stimulation_map.default_key, *(behavior.key for behavior in behaviors)}
+        map_keys = {stimulation_map.default_key, *(behavior.key for behavior in behaviors)}
+        super().__init__(map_keys, theme, keymap)
+        self.connection, self.map, self.fps, self.watching = connection, stimulation_map, fps, watching
+        self._keymap_at_first = keymap
         self._notice_until = 0.0
         self._help: HelpScreen | None = None
-        if keymap:
-            self.set_keymap(keymap)
 
     def compose(self) -> ComposeResult:
         def bound(panel: SnapshotWidget) -> SnapshotWidget:
@@ -119,6 +102,7 @@ class DriveApp(ThemedApp[str], inherit_bindings=False):
         self.query_one(StatusLine).watching = self.watching
         self._show_keys()
         self.set_interval(1.0 / self.fps, self._poll)
+        self.say(self.describe_hidden_keys(self._keymap_at_first))
         # By default, these signals would leave the terminal raw and the recording unfinished. The event loop
         # removes the handlers when it is closed.
         loop = asyncio.get_running_loop()
@@ -142,27 +126,24 @@ class DriveApp(ThemedApp[str], inherit_bindings=False):
         super().set_keymap(dict(keymap))
         if self.is_running:
             self._show_keys()
-            if self._help is not None and self._help is not self.screen:
-                self.uninstall_screen("help")
-                self._help = None
+            self._forget_help()
 
-    @property
-    def keys_now(self) -> dict[str, tuple[str, str]]:
-        """Key and description of each binding by id, as remapped, unless map or robot leave it out."""
-        found: dict[str, tuple[str, str]] = {}
-        for key, active in self.screen_stack[0].active_bindings.items():
-            binding = active.binding
-            if active.node is self and binding.id and (binding.priority or key not in self._map_keys):
-                found.setdefault(binding.id, (key, binding.description))
-        if self.facts is None or not self.facts.manual_controls:
-            found.pop("takeover", None)
-        return {name: found[name] for binding in BINDINGS if (name := binding.id) in found}
+    def watch_theme(self, name: str) -> None:
+        super().watch_theme(name)
+        if self.is_running:
+            self._forget_help()
+
+    def _forget_help(self) -> None:
+        if self._help is not None and self._help is not self.screen:
+            self.uninstall_screen("help")
+            self._help = None
+
+    def has_binding(self, name: str) -> bool:
+        return name != "takeover" or (self.facts is not None and bool(self.facts.manual_controls))
 
     def _show_keys(self) -> None:
         now = self.keys_now
-        shown = tuple(
-            (displayed_key_name(now[name][0]), says) for name, says in _HINTS.items() if name in now
-        )
+        shown = tuple((now[name][0], says) for name, says in HINTS.items() if name in now)
         self.screen_stack[0].query_one(KeyLine).keys = shown
         leave = now.get("quit", now["quit_always"])[0]
         self.screen_stack[0].query_one(NoticeLine).hints = f"{displayed_key_name(leave)} quits"
@@ -189,7 +170,9 @@ class DriveApp(ThemedApp[str], inherit_bindings=False):
 
     def on_key(self, event: events.Key) -> None:
         """Give the map's keys precedence over all bindings, and name a key that is not bound."""
-        if event.key in self._map_keys:
+        if self.choosing_command:
+            return
+        if event.key in self.map_keys:
             event.prevent_default()
             self.action_run_key(event.key)
         elif not self.screen.is_modal and event.key not in self.screen.active_bindings:
@@ -220,6 +203,11 @@ class DriveApp(ThemedApp[str], inherit_bindings=False):
     def action_zoom_path(self, change: int) -> None:
         """Show more of the path for 1, less for −1."""
         self.query_one(PathView).zoom(change)
+
+    def on_click(self, event: events.Click) -> None:
+        """Look at the robot from the other side where it was clicked."""
+        if isinstance(event.widget, RobotView):
+            self.action_toggle_view()
 
     def action_toggle_view(self) -> None:
         """Switch between side view and top view."""

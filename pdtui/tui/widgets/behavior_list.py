@@ -10,10 +10,13 @@ from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
 from pdtui.tui.cell_text import ScreenRow, displayed_key_name, fit_cells, format_number, format_signed
+from pdtui.tui.commands.key_clicked import KeyClicked
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
 if TYPE_CHECKING:
+    from textual import events
+
     from pdtui.core.step_record import ActiveBehavior
     from pdtui.stimulation.stimulation_map import Behavior
 
@@ -25,6 +28,13 @@ class BehaviorList(SnapshotWidget):
     """Shows two lines per behavior if there is room, else one; latched behaviors are never hidden."""
 
     BORDER_TITLE = "behaviors"
+    _line_keys: tuple[str, ...] = ()
+
+    def on_click(self, event: events.Click) -> None:
+        """Latch the behavior that was clicked."""
+        place = event.get_content_offset(self)
+        if place is not None and place.y < len(self._line_keys) and self._line_keys[place.y]:
+            self.post_message(KeyClicked(self._line_keys[place.y]))
 
     def paint(self, width: int, height: int) -> list[Strip]:
         active = (
@@ -47,7 +57,9 @@ class BehaviorList(SnapshotWidget):
         ]
         gap = [Strip.blank(width)] if roomy else []
         latched = [behavior.name in active for behavior in behaviors]
-        shown = self._crop(entries, latched, width, height - 1 - len(gap))
+        shown, rows = self._crop(entries, latched, width, height - 1 - len(gap))
+        self._line_keys = (*(behaviors[row].key for row in rows), *("" for _ in shown[len(rows) :]))
+        self._line_keys += (*("" for _ in gap), self.map.default_key)
         default = ScreenRow(width)
         self._add_cap(default, self.map.default_key, STYLES.key)
         default.add("  clears all stimulation", STYLES.good if active else STYLES.muted)
@@ -126,10 +138,17 @@ class BehaviorList(SnapshotWidget):
         named = {attribute.name: attribute.unit for attribute in self.facts.attributes}
         return make_printable(named.get(behavior.pid.attribute, ""))
 
-    def _crop(self, entries: list[list[Strip]], latched: list[bool], width: int, height: int) -> list[Strip]:
-        """Return as many entries as fit, in the order of the map; latched ones are kept first."""
+    def _crop(
+        self, entries: list[list[Strip]], latched: list[bool], width: int, height: int
+    ) -> tuple[list[Strip], list[int]]:
+        """Return as many entries as fit, in the order of the map, and the number of the entry in each line.
+
+        Latched ones are kept first; the last line then says how many are hidden.
+        """
+        everything = range(len(entries))
         if sum(map(len, entries)) <= height:
-            return [strip for entry in entries for strip in entry]
+            strips = [strip for entry in entries for strip in entry]
+            return strips, [index for index in everything for _ in entries[index]]
         room = height - 1
         chosen = []
         for index in sorted(range(len(entries)), key=lambda index: (not latched[index], index)):
@@ -139,7 +158,7 @@ class BehaviorList(SnapshotWidget):
         strips = [strip for index in sorted(chosen) for strip in entries[index]]
         hidden = len(entries) - len(chosen)
         more = ScreenRow(width).add(f"+{hidden} more: ? lists all", STYLES.muted)
-        return [*strips, more.strip()]
+        return [*strips, more.strip()], [index for index in sorted(chosen) for _ in entries[index]]
 
 
 def _bar(share: float, cells: int) -> str:

@@ -44,6 +44,14 @@ class PathView(SnapshotWidget):
         self._heading = 0.0
         self._here = np.zeros(2)
 
+    def on_mouse_scroll_up(self) -> None:
+        """Show less of the path."""
+        self.zoom(-1)
+
+    def on_mouse_scroll_down(self) -> None:
+        """Show more of the path."""
+        self.zoom(1)
+
     def zoom(self, change: int) -> None:
         """Show more of the path for 1, less for −1."""
         self.stretch = min(max(self.stretch + change, 0), len(STRETCHES) - 1)

@@ -7,12 +7,14 @@ from pathlib import PurePath
 from rich import filesize
 from rich.cells import cell_len
 from rich.style import Style
+from textual import events
 from textual.reactive import reactive
 from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
 from pdtui.sessions.episode_statistics import NO_STATISTICS
-from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number
+from pdtui.tui.cell_text import ScreenRow, displayed_key_name, fit_cells, format_number
+from pdtui.tui.commands.key_clicked import KeyClicked
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
@@ -159,9 +161,19 @@ class NoticeLine(SnapshotWidget):
 
 
 class KeyLine(SnapshotWidget):
-    """Shows as many of the application's keys as fit."""
+    """Shows as many of the application's keys as fit; a click on one is a press of it.
+
+    `keys` has Textual's name of each key, and what it does in a word.
+    """
 
     keys: reactive[tuple[tuple[str, str], ...]] = reactive((), init=False, repaint=False)
+    _ends: tuple[int, ...] = ()  # columns at which the keys shown end
+
+    def on_click(self, event: events.Click) -> None:
+        """Press the key that was clicked."""
+        number = sum(end <= event.x for end in self._ends)
+        if number < len(self._ends):
+            self.post_message(KeyClicked(self.keys[number][0]))
 
     def watch_keys(self) -> None:
         self.redraw()
@@ -169,10 +181,14 @@ class KeyLine(SnapshotWidget):
     def paint(self, width: int, height: int) -> list[Strip]:
         del height
         row = ScreenRow(width).add(" ", STYLES.text)
+        ends = []
         for key, says in self.keys:
-            if cell_len(key) + cell_len(says) + 3 > row.left:
+            cap = displayed_key_name(key)
+            if cell_len(cap) + cell_len(says) + 3 > row.left:
                 break
-            row.add(key, STYLES.accent).add(f" {says}  ", STYLES.muted)
+            row.add(cap, STYLES.accent).add(f" {says}  ", STYLES.muted)
+            ends.append(width - row.left)
+        self._ends = tuple(ends)
         return [row.strip()]
 
 
