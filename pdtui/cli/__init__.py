@@ -46,11 +46,11 @@ ABOUT_PROGRAM = ("robots", "maps", "guide", "config")
 def main(ctx: click.Context) -> None:
     """Drive a trained neural controller by stimulating its hidden units.
 
-    Without a command, choose a robot and a map and drive.
+    Without a command, the home screen lists robots, maps, recent sessions and reports.
     """
     # A policy computes with one thread; PyTorch, which is not loaded yet, then need not switch in every step.
     os.environ.setdefault("MKL_NUM_THREADS", "1")
     if ctx.invoked_subcommand is None:
-        from pdtui.cli.drive_command import pick_and_drive
+        from pdtui.cli.screen.home import show_home
 
-        pick_and_drive()
+        show_home()

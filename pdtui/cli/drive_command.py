@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,11 +21,11 @@ from pdtui.cli.options.shared_options import (
     record_activations_option,
     start_option,
 )
-from pdtui.cli.screen.show_drive import require_terminal, show_drive
+from pdtui.cli.screen.new_session import record_into_new_session
+from pdtui.cli.screen.show_drive import show_drive
 from pdtui.core.errors import KeystrokeError, SessionError
 from pdtui.core.outcome import describe_outcomes
 from pdtui.core.printable_text import make_printable
-from pdtui.core.settings.settings_file import own_folder
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.sessions.viewer.viewer_address import LOCAL, PORT, ViewerAddress
 from pdtui.sessions.writer.session_file import SYNC_MODES
@@ -104,7 +103,7 @@ def drive_command(
     if record is not None:
         config = replace(config, recording=str(record), existing="replace" if overwrite else "refuse")
     elif not no_record:
-        config = _record_into_new_session(config)
+        config = record_into_new_session(config)
     if keys is not None and not headless:
         raise KeystrokeError("--keys needs --headless; on the screen, keys are pressed by hand")
     if viewer is not None:
@@ -115,14 +114,6 @@ def drive_command(
         _drive_headless(config, keys, steps)
     else:
         show_drive(config, settings)
-
-
-def _record_into_new_session(config: DriveConfig) -> DriveConfig:
-    """Return the drive with a name for its session, to which a number is appended if it is taken."""
-    from pdtui.robots import robot_file_stem
-
-    name = f"{robot_file_stem(config.robot)}-{datetime.now():%Y%m%d-%H%M%S}-seed{config.seed}.rrd"
-    return replace(config, recording=str(own_folder("sessions") / name), existing="number")
 
 
 def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
@@ -155,14 +146,3 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
         if recorder.notice:
             click.echo(make_printable(recorder.notice), err=True)
         click.echo(make_printable(f"recorded in {recorder.path}"))
-
-
-def pick_and_drive() -> None:
-    """Let the user choose a map, then drive with it."""
-    require_terminal()
-    from pdtui.stimulation.map_library import list_maps
-    from pdtui.tui.map_picker import MapPickerApp, map_picker_rows
-
-    chosen = MapPickerApp(map_picker_rows(list_maps())).run()
-    if chosen is not None:
-        show_drive(_record_into_new_session(build_drive_config(str(chosen), None, "")))

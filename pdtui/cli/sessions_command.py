@@ -197,11 +197,7 @@ def compare_command(a: Path, b: Path, as_json: bool) -> None:
 def open_command(file: Path, web: bool) -> None:
     """Open FILE in the Rerun viewer, which listens on 127.0.0.1 only."""
     from pdtui.sessions.session_header import read_session_header
-    from pdtui.sessions.viewer.viewer_address import viewer_command_line
-    from pdtui.sessions.viewer.viewer_process import CANNOT_START, run_viewer
+    from pdtui.sessions.viewer.viewer_window import show_in_viewer
 
     read_session_header(file)  # for a file that is no session, the viewer would show an empty window
-    code = run_viewer(viewer_command_line(file, web=web))
-    if code:
-        how = "cannot be started" if code == CANNOT_START else f"ended with code {code}"
-        raise SessionError(f"{file}: the viewer {how}")
+    show_in_viewer(file, web=web)

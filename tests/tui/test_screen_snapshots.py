@@ -10,11 +10,11 @@ import pytest
 from textual.pilot import Pilot
 
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
-from pdtui.tui.map_picker import MapPickerApp
+from pdtui.tui.home.home_app import HomeApp
 from tests.tui.conftest import MakeApp, ScriptedConnection
 from tests.tui.ghost_snapshots import with_ghost
+from tests.tui.home.test_home_app import CONTENTS
 from tests.tui.screens import played
-from tests.tui.test_map_picker import ROWS
 
 Compare = Callable[..., bool]
 SMALL, LARGE = (80, 24), (160, 48)
@@ -78,5 +78,5 @@ def test_too_small(snap_compare: Compare, make_app: MakeApp) -> None:
     assert snap_compare(app, terminal_size=(70, 20), run_before=after(connection))
 
 
-def test_picker(snap_compare: Compare) -> None:
-    assert snap_compare(MapPickerApp(ROWS), terminal_size=SMALL)
+def test_home(snap_compare: Compare) -> None:
+    assert snap_compare(HomeApp(CONTENTS), terminal_size=SMALL)

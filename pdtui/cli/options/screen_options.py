@@ -27,8 +27,8 @@ def screen_options(command: Callable[..., Any]) -> Callable[..., Any]:
     )
     @wraps(command)
     def with_settings(*args: Any, fps: int | None, theme: str | None, **others: Any) -> Any:
-        given = {"fps": fps, "theme": theme}
-        settings = replace(read_settings(), **{name: value for name, value in given.items() if value})
+        settings = read_settings()
+        settings = replace(settings, fps=fps or settings.fps, theme=theme or settings.theme)
         return command(*args, settings=settings, **others)
 
     return with_settings

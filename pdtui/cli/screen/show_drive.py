@@ -21,10 +21,15 @@ BROWSER_VARIABLE = "TEXTUAL_DRIVER"
 
 
 def show_drive(config: DriveConfig, settings: UserSettings | None = None, *, watching: bool = False) -> None:
-    """Start the simulation's process, then show it on the screen."""
+    """Drive on the screen, then print one line on how the drive ended."""
     require_terminal()
     settings = read_settings() if settings is None else settings
     require_settled_theme(settings)
+    click.echo(make_printable(run_drive_screen(config, settings, watching=watching)))
+
+
+def run_drive_screen(config: DriveConfig, settings: UserSettings, *, watching: bool = False) -> str:
+    """Start the simulation's process, show it on the screen, and return one line on how the drive ended."""
     from pdtui.driving.drive_client import DriveClient
 
     connection = DriveClient(config)
@@ -48,7 +53,7 @@ def show_drive(config: DriveConfig, settings: UserSettings | None = None, *, wat
     if app.return_code or connection.failed:
         said = message or last_words
         raise ScreenError(said if connection.recording in said else f"{said}; {last_words}")
-    click.echo(make_printable(last_words))
+    return last_words
 
 
 def require_terminal() -> None:

@@ -76,7 +76,7 @@ class KeyBoundApp(ThemedApp[str], inherit_bindings=False):
     @property
     def choosing_command(self) -> bool:
         """Whether the command palette is open, so that keys belong to it."""
-        return CommandPalette.is_open(self)
+        return isinstance(self.screen, CommandPalette)
 
     def on_key_clicked(self, message: KeyClicked) -> None:
         """Do what the key does."""
