@@ -11,6 +11,7 @@ import click
 
 from pdtui import __version__
 from pdtui.cli.command_group import LazyCommandGroup
+from pdtui.cli.completion import shell_scripts as _shell_scripts  # noqa: F401 - completes Bash by it
 
 COMMANDS = {
     "drive": "Drive a robot with the keys of its map.",
@@ -19,6 +20,7 @@ COMMANDS = {
     "replay": "Repeat a session and compare every step.",
     "guide": "Read the guide.",
     "config": "Print the settings, and what they do.",
+    "completion": "Print a script for completion in the shell.",
     "sessions": "List, inspect, verify, repair and export sessions.",
     "evaluate": "Measure what the behaviors of a map do.",
     "dissect": "Find the units that steer a robot; write a map.",
@@ -30,7 +32,7 @@ COMMANDS = {
     "bench": "Measure speed and memory.",
 }
 """The summary of each command in `pdtui --help`; `pdtui.cli.NAME_command` has the command."""
-ABOUT_PROGRAM = ("robots", "maps", "guide", "config")
+ABOUT_PROGRAM = ("robots", "maps", "guide", "config", "completion")
 """Commands that are in the package `pdtui.cli.program` instead."""
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_robots
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.options.shared_options import (
     build_drive_config,
@@ -29,7 +30,7 @@ def bench_command() -> None:
 
 
 @bench_command.command("loop")
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @map_option
 @integer_option("--steps", least=100, default=5000, help="Number of control steps per round.")
@@ -48,7 +49,7 @@ def bench_loop_command(
 
 
 @bench_command.command("dissect")
-@click.argument("robot", default="ant")
+@click.argument("robot", default="ant", shell_complete=complete_robots)
 @robot_option_flag
 @own_policy_option
 @integer_option("--episodes", most=100, default=5, help="Number of episodes to record.")
@@ -76,7 +77,7 @@ def bench_dissect_command(
 
 
 @bench_command.command("record")
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @map_option
 @integer_option("--steps", least=100, default=6000, help="Number of control steps per drive.")
@@ -95,7 +96,7 @@ def bench_record_command(
 
 
 @bench_command.command("memory")
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @map_option
 @integer_option(
@@ -125,7 +126,7 @@ def bench_memory_command(
 
 
 @bench_command.command("screen")
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @map_option
 @click.option(

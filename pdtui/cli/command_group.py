@@ -9,6 +9,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from pdtui.core.errors import PdtuiError
 from pdtui.core.printable_text import make_printable
@@ -45,6 +46,15 @@ class LazyCommandGroup(click.Group):
         command = resolve_name(f"{package}.{cmd_name}_command:{cmd_name}_command")
         assert isinstance(command, click.Command)
         return command
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[Any]]:
+        """Complete names without importing the commands."""
+        found = [
+            CompletionItem(name, help=summary)
+            for name, summary in self._summaries.items()
+            if name.startswith(incomplete)
+        ]
+        return found + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List names and summaries without importing the commands."""

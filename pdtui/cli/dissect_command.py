@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_maps, complete_robots
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.options.shared_options import (
     FILE_PATH,
@@ -25,7 +26,7 @@ from pdtui.core.settings.settings_file import own_folder
 
 
 @click.command()
-@click.argument("robot", required=False)
+@click.argument("robot", required=False, shell_complete=complete_robots)
 @click.option(
     "--env",
     metavar="ID",
@@ -75,6 +76,7 @@ from pdtui.core.settings.settings_file import own_folder
 @click.option(
     "--start-from",
     metavar="MAP",
+    shell_complete=complete_maps,
     help="Also begin the searches from the behaviors of this map, given by name or file.",
 )
 @minutes_option("--budget", note=" Every unit is screened even if that takes longer.")

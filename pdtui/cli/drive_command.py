@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_robots
 from pdtui.cli.options.robot_option_flag import robot_option_flag
 from pdtui.cli.options.screen_options import screen_options
 from pdtui.cli.options.shared_options import (
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @map_option
 @map_policy_option

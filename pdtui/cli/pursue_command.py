@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_robots, complete_tasks
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.options.shared_options import (
     FILE_PATH,
@@ -24,8 +25,8 @@ from pdtui.core.settings.settings_file import own_folder
 
 
 @click.command()
-@click.argument("robot")
-@click.argument("task")
+@click.argument("robot", shell_complete=complete_robots)
+@click.argument("task", shell_complete=complete_tasks)
 @robot_option_flag
 @own_policy_option
 @import_option_flags

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_sessions
 from pdtui.cli.options.screen_options import screen_options
 from pdtui.cli.options.shared_options import FILE_PATH, policy_option
 from pdtui.cli.output.command_output import progress_bar
@@ -42,7 +43,7 @@ def replay_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @click.command()
-@click.argument("session", type=FILE_PATH)
+@click.argument("session", type=FILE_PATH, shell_complete=complete_sessions)
 @click.option("--watch", is_flag=True, help="Show the replay on the screen, at the pace of the drive.")
 @screen_options
 @replay_options

@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_sessions
 from pdtui.cli.options.shared_options import FILE_PATH, json_option
 from pdtui.cli.output.command_output import print_result, progress_bar
 from pdtui.cli.replay_command import replay_options
@@ -20,7 +21,7 @@ from pdtui.core.settings.settings_file import own_folder
 BROKEN, DIFFERS = 1, 3
 """Exit codes."""
 _SHOWN = ("robot", "policy", "seed", "stochastic", "start", "layers", "activations")
-_file_argument = click.argument("file", type=FILE_PATH)
+_file_argument = click.argument("file", type=FILE_PATH, shell_complete=complete_sessions)
 
 
 @click.group()
@@ -96,7 +97,7 @@ def show_command(file: Path, as_json: bool) -> None:
 
 
 @sessions_command.command()
-@click.argument("files", type=FILE_PATH, nargs=-1, required=True)
+@click.argument("files", type=FILE_PATH, nargs=-1, required=True, shell_complete=complete_sessions)
 @click.option("--no-replay", is_flag=True, help="Only compare the checksums, which needs no policy.")
 @replay_options
 @json_option
@@ -173,8 +174,8 @@ def repair_command(file: Path, output: Path | None, in_place: bool) -> None:
 
 
 @sessions_command.command()
-@click.argument("a", type=FILE_PATH)
-@click.argument("b", type=FILE_PATH)
+@click.argument("a", type=FILE_PATH, shell_complete=complete_sessions)
+@click.argument("b", type=FILE_PATH, shell_complete=complete_sessions)
 @json_option
 def compare_command(a: Path, b: Path, as_json: bool) -> None:
     """Compare sessions A and B step by step, in every stream.

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_robots
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.options.shared_options import FILE_PATH, integer_option
 from pdtui.cli.output.command_output import progress_bar
@@ -22,7 +23,7 @@ def _parse_layers(text: str | None) -> tuple[int, ...] | None:
 
 
 @click.command()
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @integer_option("--seed", least=0, most=2**31 - 1, default=0, help="Seed of every random choice.")
 @integer_option(

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_behaviors, complete_maps
 from pdtui.cli.options.robot_option_flag import robot_option_flag
 from pdtui.cli.options.shared_options import (
     SeedList,
@@ -25,8 +26,8 @@ from pdtui.policies.weights.import_options import ImportOptions
 
 
 @click.command()
-@click.argument("map_name", metavar="MAP")
-@click.argument("behaviors", nargs=-1, metavar="[BEHAVIOR]...")
+@click.argument("map_name", metavar="MAP", shell_complete=complete_maps)
+@click.argument("behaviors", nargs=-1, metavar="[BEHAVIOR]...", shell_complete=complete_behaviors)
 @click.option("--all", "every", is_flag=True, help="Tune every behavior of mode pid.")
 @robot_option_flag
 @map_policy_option

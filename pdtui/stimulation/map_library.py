@@ -40,8 +40,13 @@ def find_map(name: str) -> Path:
     for folder in search_folders("maps"):
         if is_file(folder / f"{name}.toml"):
             return folder / f"{name}.toml"
-    known = ", ".join(sorted({path.stem for path in _all_paths()})) or "none"
+    known = ", ".join(list_map_names()) or "none"
     raise MapError(f"no map '{name}'; available: {known}")
+
+
+def list_map_names() -> list[str]:
+    """Return the names of all maps, without reading them."""
+    return sorted({path.stem for path in _all_paths()})
 
 
 def user_map_path(path: Path) -> Path:

@@ -6,9 +6,11 @@ import sys
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_topics
+
 
 @click.command()
-@click.argument("topic", default="index")
+@click.argument("topic", default="index", shell_complete=complete_topics)
 @click.option("--list", "list_topics", is_flag=True, help="List the topics and exit.")
 def guide_command(topic: str, list_topics: bool) -> None:
     """Read the guide, starting with TOPIC.

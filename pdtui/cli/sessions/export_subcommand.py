@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_sessions
 from pdtui.cli.options.shared_options import FILE_PATH, overwrite_option, policy_option
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import SessionError
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @click.command("export")
-@click.argument("file", type=FILE_PATH)
+@click.argument("file", type=FILE_PATH, shell_complete=complete_sessions)
 @click.option(
     "--stream",
     metavar="NAME",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from pdtui.core.settings.settings_file import own_folder
 from pdtui.robots.robot_registry import ListedRobot, list_robots
+from pdtui.sessions.session_folders import list_session_files
 from pdtui.stimulation.map_library import ListedMap, list_maps, search_folders
 
 MOST_SESSIONS = 12
@@ -47,13 +47,7 @@ def read_home_contents() -> HomeContents:
     found = [one.stimulation_map.robot for one in maps if one.stimulation_map is not None]
     # Environments of Gymnasium have no entry of their own, but a map makes one worth listing.
     others = [ListedRobot(name) for name in dict.fromkeys(found) if name not in named]
-    sessions = sorted(own_folder("sessions").rglob("*.rrd"), key=_changed, reverse=True)
     reports = [path for folder in search_folders("maps") for path in sorted(folder.glob("*.rrd"))]
-    return HomeContents((*listed, *others), tuple(maps), tuple(sessions[:MOST_SESSIONS]), tuple(reports))
-
-
-def _changed(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except OSError:
-        return 0.0  # it was removed in the meantime
+    return HomeContents(
+        (*listed, *others), tuple(maps), tuple(list_session_files(MOST_SESSIONS)), tuple(reports)
+    )
