@@ -19,6 +19,7 @@ COMMANDS = {
     "maps": "List the maps.",
     "replay": "Repeat a session and compare every step.",
     "guide": "Read the guide.",
+    "serve": "Show the screen in a browser.",
     "config": "Print the settings, and what they do.",
     "completion": "Print a script for completion in the shell.",
     "sessions": "List, inspect, verify, repair and export sessions.",
@@ -32,7 +33,7 @@ COMMANDS = {
     "bench": "Measure speed and memory.",
 }
 """The summary of each command in `pdtui --help`; `pdtui.cli.NAME_command` has the command."""
-ABOUT_PROGRAM = ("robots", "maps", "guide", "config", "completion")
+ABOUT_PROGRAM = ("robots", "maps", "guide", "serve", "config", "completion")
 """Commands that are in the package `pdtui.cli.program` instead."""
 
 

@@ -17,6 +17,9 @@ SHELLS = ("bash", "zsh", "fish")
 class QuotingBashComplete(BashComplete):
     """Bash takes completions as they are, so that a name of two words would become two arguments."""
 
+    # Without -r, Bash would take the quoting away again.
+    source_template = BashComplete.source_template.replace("read type value", "read -r type value")
+
     def format_completion(self, item: CompletionItem[Any]) -> str:
         value = item.value if item.type != "plain" else re.sub(r"([^\w@%+=:,./-])", r"\\\1", item.value)
         return f"{item.type},{value}"

@@ -10,6 +10,7 @@ from textual.app import App
 from textual.theme import BUILTIN_THEMES, Theme
 
 from pdtui.core.errors import SettingsError
+from pdtui.tui.browser.browser_driver import BrowserDriver
 from pdtui.tui.terminal_driver import TerminalDriver
 from pdtui.tui.theme import STYLES, THEME
 
@@ -41,8 +42,8 @@ class ThemedApp(App[Result]):
     """
 
     def __init__(self, theme: str = THEME.name) -> None:
-        # The environment names another driver where the screen is a page in a browser.
-        super().__init__(driver_class=None if constants.DRIVER else TerminalDriver)
+        # The environment names a driver where the screen is a page in a browser.
+        super().__init__(driver_class=BrowserDriver if constants.DRIVER else TerminalDriver)
         self.register_theme(THEME)
         self.theme = require_theme(theme, "theme")
         STYLES.adopt(list_themes()[theme])
