@@ -17,7 +17,8 @@ from pdtui.cli.options.shared_options import (
     own_policy_option,
     record_activations_option,
 )
-from pdtui.cli.output.command_output import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.sessions.session_schema import ActivationsKept
 
 

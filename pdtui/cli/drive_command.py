@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,7 @@ from pdtui.cli.options.shared_options import (
 )
 from pdtui.cli.screen.new_session import record_into_new_session
 from pdtui.cli.screen.show_drive import show_drive
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.errors import KeystrokeError, SessionError
 from pdtui.core.outcome import describe_outcomes
 from pdtui.core.printable_text import make_printable
@@ -78,6 +80,12 @@ if TYPE_CHECKING:
     help="Keystroke file to drive from with --headless; each line is 'STEP KEY'.",
 )
 @integer_option("--steps", default=1000, help="Number of control steps to drive with --headless.")
+@click.option(
+    "--minutes",
+    type=click.FloatRange(0, min_open=True),
+    metavar="MINUTES",
+    help="End a drive with --headless after this time, with the steps done so far.",
+)
 def drive_command(
     robot: str,
     map_name: str | None,
@@ -91,6 +99,7 @@ def drive_command(
     headless: bool,
     keys: Path | None,
     steps: int,
+    minutes: float | None,
     **options: Any,
 ) -> None:
     """Drive ROBOT with the keys of its map. ROBOT may also be a map file."""
@@ -112,12 +121,12 @@ def drive_command(
             raise SessionError("--viewer shows the recording, so it cannot be used with --no-record")
         config = replace(config, viewer=ViewerAddress.parse(viewer))
     if headless:
-        _drive_headless(config, keys, steps)
+        _drive_headless(config, keys, steps, minutes)
     else:
         show_drive(config, settings)
 
 
-def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
+def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, minutes: float | None) -> None:
     from pdtui.driving.headless_drive import catch_ending_signals, drive_headless
     from pdtui.driving.keystrokes import read_keystrokes
     from pdtui.driving.loop_builder import build_control_loop
@@ -133,8 +142,8 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
     if config.recording:
         path, existing = Path(config.recording), config.existing
         recorder = SessionRecorder(path, info, viewer=viewer, existing=existing, sync=config.sync)
-    with catch_ending_signals() as ended:
-        summary = drive_headless(loop, presses, steps, recorder, ended)
+    with catch_ending_signals() as ended, progress_bar("driving", quiet=not sys.stderr.isatty()) as advance:
+        summary = drive_headless(loop, presses, steps, recorder, ended, progress=advance, minutes=minutes)
     takeover = " or a takeover" if loop.robot.manual_controls else ""
     cost = f"cost {summary.cost:g}, " if summary.cost else ""
     click.echo(

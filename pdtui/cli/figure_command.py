@@ -17,7 +17,7 @@ from pdtui.cli.options.shared_options import (
     own_policy_option,
     preset_option,
 )
-from pdtui.cli.output.command_output import progress_bar
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.printable_text import make_printable
 
 

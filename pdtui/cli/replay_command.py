@@ -13,8 +13,8 @@ import click
 from pdtui.cli.completion.completed_names import complete_sessions
 from pdtui.cli.options.screen_options import screen_options
 from pdtui.cli.options.shared_options import FILE_PATH, policy_option
-from pdtui.cli.output.command_output import progress_bar
 from pdtui.cli.screen.show_drive import show_drive
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.errors import SessionError
 from pdtui.core.printable_text import make_printable
 from pdtui.core.settings.user_settings import UserSettings

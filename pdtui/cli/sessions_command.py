@@ -11,9 +11,10 @@ import click
 
 from pdtui.cli.completion.completed_names import complete_sessions
 from pdtui.cli.options.shared_options import FILE_PATH, json_option
-from pdtui.cli.output.command_output import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result
 from pdtui.cli.replay_command import replay_options
 from pdtui.cli.sessions.export_subcommand import export_command
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.printable_text import make_printable, to_json
 from pdtui.core.settings.settings_file import own_folder

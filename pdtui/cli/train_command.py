@@ -10,7 +10,7 @@ import click
 from pdtui.cli.completion.completed_names import complete_robots
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.options.shared_options import FILE_PATH, integer_option
-from pdtui.cli.output.command_output import progress_bar
+from pdtui.core.console.progress_bar import progress_bar
 
 
 def _parse_layers(text: str | None) -> tuple[int, ...] | None:

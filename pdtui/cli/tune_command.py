@@ -19,7 +19,8 @@ from pdtui.cli.options.shared_options import (
     minutes_option,
     workers_option,
 )
-from pdtui.cli.output.command_output import describe_map_copy, print_result, progress_bar
+from pdtui.cli.output.command_output import describe_map_copy, print_result
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.errors import MapError
 from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions

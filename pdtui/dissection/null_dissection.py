@@ -131,7 +131,7 @@ def count_false_confirmations(config: DissectionConfig, draws: int = 400) -> Nul
         with open_robot(config.robot) as world:
             policy = policy_from_network(config.policy, world.observation_space, world.action_space)
             return count_false_confirmations(replace(config, robot=world, policy=policy), draws)
-    seed, settings, report = config.seed, config.settings, config.progress
+    seed, settings, report = config.seed, config.settings, config.report
     preset = find_matching_preset(config.preset, config.preset_changes)
     with RolloutPool(config.robot, config.policy, config.workers, config.import_options) as pool:
         robot, network, prober = pool.robot, pool.policy, EffectProbe(pool)

@@ -74,10 +74,10 @@ def test_the_page_asks_nothing_of_other_sites(address: str) -> None:
 def test_a_drive_in_a_browser(address: str, folder: Path) -> None:
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright, which drives Chromium")
     with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        browser = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
         try:
             page = browser.new_page(viewport={"width": 1200, "height": 800})
-            page.goto(address)
+            page.goto(address, wait_until="commit", timeout=PATIENCE)
             page.wait_for_selector("body.-first-byte", timeout=PATIENCE)
             page.click(".xterm-screen")
             _wait_for_size(page, folder / "drive.rrd")

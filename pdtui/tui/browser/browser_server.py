@@ -32,6 +32,9 @@ class BrowserServer(Server):
         port: port on `LOCAL`; 0 for any that is free.
     """
 
+    port: int
+    public_url: str
+
     def __init__(self, arguments: Sequence[str], port: int) -> None:
         command = shlex.join([sys.executable, "-m", "pdtui", *arguments])
         super().__init__(command, host=LOCAL, port=port, title="pdtui")
