@@ -61,7 +61,7 @@ def _draw_curve(curve: Curve, top: float, width: float) -> list[str]:
     finite = curve.values[np.isfinite(curve.values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     x, y = _thin_out(curve.values)
-    scale = (y - low) / (high - low) if high > low else np.full(len(y), 0.5)
+    scale = (y - low) / (high - low) if high > low else np.where(np.isfinite(y), 0.5, np.nan)
     points = " ".join(
         f"{_LEFT + width * across:.1f},{top + _HEIGHT * (1.0 - up):.1f}"
         for across, up in zip(x, scale, strict=True)

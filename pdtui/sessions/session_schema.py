@@ -49,6 +49,9 @@ ExportFormat = Literal["parquet", "csv", "mcap"]
 
 EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
 
+LEROBOT = "lerobot"
+"""Format of a whole session as a dataset, in a folder."""
+
 ActivationsKept = Literal["all", "half", "off"]
 """How activations are recorded: as float32, as float16, or not at all."""
 
