@@ -32,6 +32,7 @@ UNITS = "/view/units"
 TARGETS = "/view/targets"
 MAGNITUDES = "/view/magnitudes"
 HEAT_MAP = "/view/activations"
+TABLE = "/view/table"
 
 INFO, VERSIONS, OUTCOME, REPAIR = "drive", "versions", "outcome", "repair"
 
