@@ -66,7 +66,14 @@ from pdtui.core.settings.settings_file import own_folder
     metavar="FILE.rrd",
     help="File of the report for the Rerun viewer; default: the map's name with .rrd.",
 )
-@click.option("--figures", type=FILE_PATH, metavar="FOLDER", help="Also draw figures as PNG files.")
+@click.option("--figures", type=FILE_PATH, metavar="FOLDER", help="Also draw figures into this folder.")
+@click.option(
+    "--figure-format",
+    type=click.Choice(["png", "pdf", "svg"]),
+    default="png",
+    show_default=True,
+    help="Format of these figures.",
+)
 @click.option(
     "--null",
     is_flag=True,
@@ -92,6 +99,7 @@ def dissect_command(
     quick: bool,
     report: Path | None,
     figures: Path | None,
+    figure_format: str,
     null: bool,
     overwrite: bool,
     budget: float | None,
@@ -114,7 +122,7 @@ def dissect_command(
     trust_module(name)
     world = RobotSpec(name, parse_robot_options(require_robot_name(name), robot_options))
     output = output or own_folder("maps") / f"{robot_file_stem(name)}-dissected.toml"
-    outputs = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite)
+    outputs = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite, figure_format)
     if not null:
         outputs.check()
     with progress_bar("dissecting", quiet=as_json) as advance:
