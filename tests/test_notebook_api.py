@@ -12,6 +12,7 @@ from torch import nn
 import pdtui
 from pdtui.core.errors import MapError
 from pdtui.dissection.dissection_result import Dissection
+from tests.small_dissection import SMALL
 
 
 class WantsBatch(nn.Module):
@@ -96,7 +97,5 @@ def test_a_dissection_shows_its_progress(capsys: pytest.CaptureFixture[str]) -> 
     last = nn.Linear(4, 8)
     nn.init.constant_(last.weight, 0.01)
     network = nn.Sequential(nn.Linear(27, 4), nn.Tanh(), last)
-    pdtui.dissect(
-        "ant", network, episodes=1, settings=pdtui.QUICK_DISSECTION, budget_minutes=0.0, progress=True
-    )
+    pdtui.dissect("ant", network, episodes=1, settings=SMALL, budget_minutes=0.0, progress=True)
     assert "dissecting" in capsys.readouterr().err
