@@ -125,9 +125,8 @@ def dissect(config: DissectionConfig) -> Dissection:
     """Find out which hidden units move what: monitor, match, probe, and search for behaviors.
 
     The arguments are the fields of `pdtui.dissection.dissection_config.DissectionConfig`. `workers` processes
-    load a robot and a policy given by name; an object stays in this process, with the same result. With
-    ``progress=True``, a bar on standard error shows how far it is, as on the command line. In a notebook, the
-    result is a table that can be sorted; `Dissection.to_pandas` gives it as a data frame.
+    load a robot and a policy given by name; an object stays in this process, with the same result. A notebook
+    shows the result as a table that can be sorted; `Dissection.to_pandas` gives a data frame.
 
     >>> import pdtui
     >>> from torch import nn
@@ -143,13 +142,11 @@ def dissect(config: DissectionConfig) -> Dissection:
     Raises:
         PdtuiError: What is wrong with the robot, the policy, or the map to start from.
     """
-    if config.progress is not True:
+    with progress_bar("dissecting", quiet=config.progress is not True) as advance:
+        if advance is not None:
+            bar = advance
+            config = replace(config, progress=lambda stage, done, total: bar(done, total, stage))
         return run_dissection(config)
-    with progress_bar("dissecting") as advance:
-        assert advance is not None
-        return run_dissection(
-            replace(config, progress=lambda stage, done, total: advance(done, total, stage))
-        )
 
 
 def drive(
@@ -171,8 +168,7 @@ def drive(
 ) -> DriveArrays:
     """Drive without a screen, as fast as the machine allows.
 
-    In a notebook, the result is a picture of its attributes; `DriveArrays.to_pandas` gives a data frame.
-
+    A notebook shows the result as curves; `DriveArrays.to_pandas` gives a data frame.
     >>> import pdtui
     >>> drive = pdtui.drive("ant", keys={50: "x"}, steps=150)
     >>> drive

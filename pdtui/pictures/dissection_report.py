@@ -83,7 +83,7 @@ def _layout(dissection: Dissection) -> rrb.Tabs:
         ),
         *(_attribute_tab(dissection, column) for column in range(len(dissection.attributes))),
         rrb.TextDocumentView(origin=SUMMARY, name="Summary and tables"),
-        active_tab="Overview",
+        active_tab=0,
     )
 
 

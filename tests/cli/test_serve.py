@@ -77,15 +77,16 @@ def test_a_drive_in_a_browser(address: str, folder: Path) -> None:
         browser = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
         try:
             page = browser.new_page(viewport={"width": 1200, "height": 800})
-            page.goto(address, wait_until="commit", timeout=PATIENCE)
-            page.wait_for_selector("body.-first-byte", timeout=PATIENCE)
-            page.click(".xterm-screen")
+            page.set_default_timeout(PATIENCE)
+            page.goto(address, wait_until="commit")
+            page.wait_for_selector("body.-first-byte")
+            page.focus(".xterm-helper-textarea")  # where xterm.js listens to keys
             _wait_for_size(page, folder / "drive.rrd")
             page.keyboard.press("a")
             page.wait_for_timeout(3000)
             picture = page.screenshot()
             page.keyboard.press("q")
-            page.wait_for_selector("body.-closed", timeout=PATIENCE)
+            page.wait_for_selector("body.-closed")
         finally:
             browser.close()
     assert picture[:8] == b"\x89PNG\r\n\x1a\n"
