@@ -12,6 +12,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -23,6 +24,8 @@ pytest.importorskip("textual_serve", reason="needs pdtui[serve]")
 ROOT = Path(__file__).parents[2]
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 PATIENCE = 120_000.0  # ms
+EMPTY_PAGE = 20_000
+"""More bytes than a picture of an empty page has, which are 11,000."""
 
 
 @pytest.fixture(scope="module")
@@ -83,25 +86,35 @@ def test_a_drive_in_a_browser(address: str, folder: Path) -> None:
             page.focus(".xterm-helper-textarea")  # where xterm.js listens to keys
             _wait_for_size(page, folder / "drive.rrd")
             page.keyboard.press("a")
-            page.wait_for_timeout(3000)
-            picture = page.screenshot()
+            picture = _picture_of_drive(page)
             page.keyboard.press("q")
             page.wait_for_selector("body.-closed")
         finally:
             browser.close()
     assert picture[:8] == b"\x89PNG\r\n\x1a\n"
-    assert len(picture) > 40_000  # an empty page has 10,000 bytes
+    assert len(picture) > EMPTY_PAGE
     header = read_session_header(folder / "drive.rrd")
     assert [event.key for event in header.events] == ["a"]
     assert header.outcome
 
 
-def _wait_for_size(page: object, path: Path) -> None:
+def _picture_of_drive(page: Any) -> bytes:
+    """Take pictures until the browser has drawn the screen."""
+    picture = b""
+    for _ in range(60):
+        page.wait_for_timeout(2000)
+        picture = page.screenshot()
+        if len(picture) > EMPTY_PAGE:
+            break
+    return picture
+
+
+def _wait_for_size(page: Any, path: Path) -> None:
     """Wait until the drive has recorded something, so that it takes keys."""
     for _ in range(600):
         if path.exists() and path.stat().st_size > 0:
             return
-        page.wait_for_timeout(200)  # type: ignore[attr-defined]
+        page.wait_for_timeout(200)
     raise AssertionError(f"{path}: nothing was recorded")
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-
 import click
 
 from pdtui.cli.completion.completed_names import complete_topics
+from pdtui.cli.screen.show_drive import has_screen, require_settled_theme
+from pdtui.core.settings.settings_file import read_settings
 
 
 @click.command()
@@ -26,9 +26,11 @@ def guide_command(topic: str, list_topics: bool) -> None:
             click.echo(f"{name:<{width}}  {page.title}")
         return
     page = find_guide_page(pages, topic)
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+    if not has_screen():
         click.echo(page.text, nl=False)
         return
     from pdtui.tui.guide.guide_app import GuideApp
 
-    GuideApp(pages, topic).run()
+    settings = read_settings()
+    require_settled_theme(settings)
+    GuideApp(pages, topic, settings.theme).run()

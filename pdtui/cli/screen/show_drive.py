@@ -58,8 +58,18 @@ def run_drive_screen(config: DriveConfig, settings: UserSettings, *, watching: b
 
 def require_terminal() -> None:
     """Raise a `ScreenError` unless standard input and output are a terminal, or a browser is behind them."""
-    if BROWSER_VARIABLE not in os.environ and not (sys.stdin.isatty() and sys.stdout.isatty()):
+    if not has_screen():
         raise ScreenError("the screen needs a terminal; use --headless to drive without one")
+
+
+def has_screen() -> bool:
+    """Return whether there is a terminal, or a browser, whose output is then kept free of what is printed."""
+    if BROWSER_VARIABLE in os.environ:
+        from pdtui.tui.browser.browser_driver import BrowserDriver
+
+        BrowserDriver.claim_output()
+        return True
+    return sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def require_settled_theme(settings: UserSettings) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import atexit
+import os
+from functools import partial
 from typing import Any, ClassVar
 
 from textual.app import App
@@ -19,12 +21,24 @@ class BrowserDriver(WebDriver):
     """
 
     _begun: ClassVar[bool] = False
+    _output: ClassVar[int] = -1
     _latest_size: ClassVar[tuple[int, int] | None] = None
 
     def __init__(self, app: App[Any], *, debug: bool = False, mouse: bool = True, size: Any = None) -> None:
         super().__init__(app, debug=debug, mouse=mouse, size=size or BrowserDriver._latest_size)
-        self._write_bytes = self._write
+        self.claim_output()
+        self._write_bytes = partial(os.write, BrowserDriver._output)
         self._write = self._write_after_prelude  # type: ignore[assignment]
+
+    @classmethod
+    def claim_output(cls) -> None:
+        """Keep standard output for the browser; whatever is printed goes to standard error from now on.
+
+        A printed line among the packets would be taken for one of them. Call it before children are started.
+        """
+        if cls._output < 0:
+            cls._output = os.dup(1)
+            os.dup2(2, 1)
 
     def _write_after_prelude(self, data: bytes) -> int:
         if data == _PRELUDE:
