@@ -55,7 +55,13 @@ def _parse_layers(text: str | None) -> tuple[int, ...] | None:
 @click.option(
     "--initial-policy",
     metavar="FILE",
-    help="Weights file or shipped policy that PPO starts from. One with other layers is imitated first.",
+    help="Weights file or shipped policy that the run starts from. PPO imitates one with other layers first, "
+    "and SAC imitates any.",
+)
+@integer_option(
+    "--imitation-rounds",
+    most=1000,
+    help="Rounds of imitation at the start, of 500 control steps of every world; default: 3.",
 )
 @click.option(
     "--forward",
