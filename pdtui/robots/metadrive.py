@@ -86,6 +86,7 @@ class MetaDrive(Robot):
             "chunk": 20,
             "steps_per_update": 1,
             "batch": 256,
+            "evaluate_every": 30_000,
             "random_steps": 24_000,
             "average_rate": 0.002,
         },
