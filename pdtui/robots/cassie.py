@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -19,6 +18,7 @@ from pdtui.robots.legged.legged_robot_description import (
     LeggedRewardWeights,
     LeggedRobotDescription,
 )
+from pdtui.robots.legged.legged_robot_state import LeggedRobotState
 from pdtui.robots.robot import TrainingRecipe
 
 SIDES = ("left", "right")
@@ -122,9 +122,13 @@ class Cassie(LeggedRobot):
         return tuple(f"{side} {joint}" for side in SIDES for joint in _JOINTS)
 
     def read_attributes(self) -> Floats:
-        motion = self.read_state()
-        x, _, z = motion.up[0].tolist()
-        # Unlike the Euler angle, it goes on beyond a right angle, so that it shows a flip.
-        pitch = math.atan2(-x, z)
-        feet = motion.feet_height[0], motion.touching[0].astype(np.float64)
-        return np.concatenate([super().read_attributes(), [pitch], *feet])
+        return np.concatenate([super().read_attributes(), self._own_attributes(self.read_state())[0]])
+
+    def compute_attributes(self, motion: LeggedRobotState, commands: Floats) -> Floats:
+        shared = super().compute_attributes(motion, commands)
+        return np.concatenate([shared, self._own_attributes(motion)], axis=1)
+
+    def _own_attributes(self, motion: LeggedRobotState) -> Floats:
+        # Unlike the Euler angle, this pitch goes on beyond a right angle, so that it shows a flip.
+        pitch = np.arctan2(-motion.up[:, 0], motion.up[:, 2])
+        return np.concatenate([pitch[:, None], motion.feet_height, motion.touching], axis=1)
