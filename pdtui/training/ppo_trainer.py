@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -45,11 +46,14 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
             self.batches = [RemoteRobotBatch(self.robot, self.robot_options, share, seed) for seed in seeds]
         else:
             self.batches = [RobotBatch(self.make, share, seed) for seed in seeds]
+        initial = self.config.initial_policy or recipe.initial_policy
+        if not (initial or self.config.imitates):  # there is nothing that an untrained critic could spoil
+            self.config = replace(self.config, critic_iterations=0)
         self.learner = PpoLearner(self.config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self._threads = ThreadPoolExecutor(THREADS)
         if not self.checkpoint.exists():
-            self._begin(self.config.initial_policy or recipe.initial_policy)
+            self._begin(initial)
 
     def advance(self) -> int:
         on_host: PpoState = jax.tree.map(np.asarray, self.state)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -58,7 +58,7 @@ class LeggedRobot(MujocoRobot):
         RobotError: There is no such terrain, or the model lacks something that the description names.
     """
 
-    description: ClassVar[LeggedRobotDescription]
+    description: LeggedRobotDescription
     _action: Floats
     _last_action: Floats
     _foot_times: Floats
@@ -71,7 +71,7 @@ class LeggedRobot(MujocoRobot):
             raise RobotError(f"{self.name}: no terrain '{terrain}'; available: {', '.join(terrains)}")
         self._random_commands, self.terrain, self.roughness = random_commands, terrain, roughness
         self._rough = draw_rough_ground(np.random.default_rng(0), roughness) if self.starts else None
-        self.model = load_legged_model(one.model, self._rough)
+        self.model = self.load_model()
         self.data = mujoco.MjData(self.model)
         self.links = read_model_links(self.model)
         self.frame_skip = one.substeps
@@ -103,6 +103,10 @@ class LeggedRobot(MujocoRobot):
             *torque_attributes(self.joint_names(), limits.tolist()),
         )
 
+    def load_model(self) -> mujoco.MjModel:
+        """Return the model, with its grounds."""
+        return load_legged_model(self.description.model, self._rough)
+
     def joint_names(self) -> tuple[str, ...]:
         """Return the joints' names in attributes; by default those of the model."""
         return tuple(self.model.joint(index).name for index in range(1, self.model.njnt))
@@ -130,7 +134,7 @@ class LeggedRobot(MujocoRobot):
         start = self.check_start(str((options or {}).get("start", ""))) or self.terrain
         rng, one = self.np_random, self.description
         if self.starts:
-            self._lay_ground(self.starts.index(start), int(rng.integers(2**31)))
+            self.lay_ground(self.starts.index(start), int(rng.integers(2**31)))
         mujoco.mj_resetData(self.model, self.data)
         silence_warnings(self.data)
         yaw = rng.uniform(-_START_NOISE, _START_NOISE)
@@ -182,7 +186,7 @@ class LeggedRobot(MujocoRobot):
     def _stand_still(self) -> None:
         joints, feet = len(self.description.default_angles), len(self.description.feet)
         self._action, self._last_action = np.zeros(joints), np.zeros(joints)
-        self._foot_times = np.zeros((1, feet))
+        self._foot_times = np.zeros((1, 2, feet))
 
     def read_state(self) -> LeggedRobotState:
         """Return what observations and rewards are computed from, as the state of one robot."""
@@ -191,9 +195,9 @@ class LeggedRobot(MujocoRobot):
         motion = (data.qpos[None], data.qvel[None], actions, self._command[None])
         return self._reader.read(*motion, data.actuator_force[None], data.sensordata[None], ground)
 
-    def _lay_ground(self, terrain: int, seed: int) -> None:
+    def lay_ground(self, terrain: int, seed: int) -> None:
         """Lay the ground of a terrain, by its number, and of a seed."""
-        if self.starts[terrain] == "plane":
+        if self.starts[terrain] != "rough":
             self.ground = None
         else:
             self.ground = draw_rough_ground(np.random.default_rng(seed), self.roughness)
@@ -204,7 +208,7 @@ class LeggedRobot(MujocoRobot):
         self._check_snapshot(snapshot)
         if self.starts:
             terrain, seed = snapshot.extras[0].tolist()
-            self._lay_ground(int(terrain), int(seed))
+            self.lay_ground(int(terrain), int(seed))
         super().restore(snapshot)
 
     def _copy_arrays(self) -> tuple[Floats, ...]:
