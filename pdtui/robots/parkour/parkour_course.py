@@ -29,7 +29,7 @@ OPENING_WIDTH = 1.3
 _ASIDE = (0.95, 1.35)
 # Place of the first obstacle, distance to the next one, and how far each may be shifted, m.
 _FIRST, _SPACING, _SHIFT = 4.0, 5.0, 1.0
-_COUNT = 7
+COUNT = 7
 # Thickness of walls and doors, and their height, m; thickness of a bar, m.
 _WALL, _WALL_HEIGHT, _BAR = 0.1, 1.3, 0.06
 # Distance beyond an obstacle at which it counts as passed: the robot's legs are behind its trunk, m.
@@ -77,7 +77,7 @@ class ParkourObstacle:
 def draw_parkour_course(rng: np.random.Generator) -> tuple[ParkourObstacle, ...]:
     """Draw seven obstacles, in their order along the lane: every kind, and no kind twice in a row but gates."""
     kinds = _draw_kinds(rng)
-    places = _FIRST + _SPACING * np.arange(_COUNT) + rng.uniform(0.0, _SHIFT, _COUNT)
+    places = _FIRST + _SPACING * np.arange(COUNT) + rng.uniform(0.0, _SHIFT, COUNT)
     side = 1.0 if rng.random() < 0.5 else -1.0
     course = []
     for kind, place in zip(kinds, places.tolist(), strict=True):
@@ -98,7 +98,7 @@ def _draw_kinds(rng: np.random.Generator) -> list[ObstacleKind]:
     rng.shuffle(more)
     if more[0] == first[-1]:
         more.reverse()
-    return [*first, *more][:_COUNT]
+    return [*first, *more][:COUNT]
 
 
 def _build_gate(place: float, opening: float) -> ParkourObstacle:

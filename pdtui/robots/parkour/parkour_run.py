@@ -57,6 +57,16 @@ class ParkourRun:
         return self.course[self.passed] if self.passed < len(self.course) else None
 
     @property
+    def attempts(self) -> int:
+        """Number of attempts so far."""
+        return int(self.progress[1])
+
+    @property
+    def blocks_the_way(self) -> bool:
+        """Whether the next obstacle is in the way, which an open door is not."""
+        return self.passed < len(self.course) and self._is_closed(self.passed)
+
+    @property
     def waited(self) -> float:
         """Time since the robot passed the sensor of the next obstacle, s; negative if it has not."""
         return float(self.progress[2]) * self._dt

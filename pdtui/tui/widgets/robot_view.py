@@ -45,6 +45,9 @@ _LINE_INKS: dict[LineKind, int] = {
 }
 _BOX_INKS: dict[BoxKind, int] = {"vehicle": _VEHICLE, "obstacle": _OBSTACLE}
 _FARTHEST = 0.55  # least magnification of the ground grid that is drawn
+_REACH, _REACH_AHEAD, _FORWARD = 2.15, 4.2, 0.28
+"""Width of the picture from the side, usually and among boxes, in extents of the robot; how far its middle is
+ahead of the robot then, as a share of the width."""
 _ARROW = 0.5
 """Least size of the heading arrow, in extents of the camera."""
 
@@ -77,7 +80,7 @@ class RobotView(SnapshotWidget):
             self._road_lines = RoadLineDrawing(self._scenery.lines, _LINE_INKS)
             if (len(self._scenery.cylinders) or self._scenery.lines) and not self._looked:
                 self._looked, self.view = True, "above"
-        if self.facts is not None and len(self._scenery.cylinders) and len(snapshot.poses):
+        if self.facts is not None and self._looks_ahead(snapshot) and len(snapshot.poses):
             root = snapshot.poses[root_body_row(self.facts.links)]
             self._view_ahead.follow(root, restarted=snapshot.restarted)
 
@@ -117,6 +120,10 @@ class RobotView(SnapshotWidget):
         """Whether the picture is the one of a road from above, which is as simple as a map."""
         return self.view == "above" and bool(self._scenery.lines)
 
+    def _looks_ahead(self, snapshot: DriveSnapshot) -> bool:
+        """Return whether there are obstacles but no road, so that the view from above looks ahead."""
+        return bool(len(self._scenery.cylinders) or (snapshot.traffic.kinds and not self._scenery.lines))
+
     def _loading(self, width: int, height: int) -> list[Strip]:
         lines = (("loading the policy…", STYLES.title), ("this takes a few seconds", STYLES.muted))
         blank = [Strip.blank(width)] * max(0, height // 2 - 1)
@@ -132,7 +139,8 @@ class RobotView(SnapshotWidget):
         extent, centre = self._extent, (canvas.width / 2, canvas.height / 2)
         if self._shows_road:
             return frame_road(root, canvas.width, canvas.height)
-        if self.view == "above" and len(self._scenery.cylinders):
+        assert self.snapshot is not None
+        if self.view == "above" and self._looks_ahead(self.snapshot):
             area = self._view_ahead.frame(root[:2], extent, canvas.width, canvas.height)
             x, y = area.middle.tolist()
             return PerspectiveCamera((x, y, 0.0), 90.0, AHEAD / 2 * extent, area.zoom, centre)
@@ -140,8 +148,9 @@ class RobotView(SnapshotWidget):
             zoom = min(canvas.width, canvas.height) / (2.5 * extent)
             middle = (float(root[0]), float(root[1]), 0.0)
             return PerspectiveCamera(middle, 90.0, extent, zoom, centre)
-        zoom = min(canvas.width / (2.15 * extent), canvas.height / (1.5 * extent))
-        middle = (float(root[0]), float(root[1]), 0.45 * extent)
+        reach, forward = (_REACH_AHEAD, _FORWARD) if self.snapshot.traffic.kinds else (_REACH, 0.0)
+        zoom = min(canvas.width / (reach * extent), canvas.height / (1.5 * extent))
+        middle = (float(root[0]) + forward * canvas.width / zoom, float(root[1]), 0.45 * extent)
         centre = canvas.width / 2, canvas.height * 0.47
         return PerspectiveCamera(middle, _SIDE_ELEVATION, extent, zoom, centre)
 

@@ -133,11 +133,13 @@ class NoticeLine(SnapshotWidget):
         return "with a key or a takeover" if controls else "with a key"
 
     def _counters(self) -> str:
-        """Return distance, collisions and involvement of the episode, for a robot that has them."""
+        """Return distance, collisions, obstacles passed and involvement of an episode that has any of them."""
         statistics = self.snapshot.statistics if self.snapshot is not None else NO_STATISTICS
         shown = [] if statistics.distance is None else [f"{format_number(statistics.distance)} m"]
         if statistics.collisions is not None:
             shown.append(f"{statistics.collisions:g} collision{'' if statistics.collisions == 1.0 else 's'}")
+        if statistics.passed:  # none yet, or there is no course
+            shown.append(f"{statistics.passed:g} passed")
         if not shown:
             return ""
         steps = "1 step" if statistics.involvement == 1 else f"{statistics.involvement} steps"
