@@ -37,11 +37,5 @@ EXPERIMENT = Experiment(
     "forest",
     "crossing the forest",
     run_forest_experiment,
-    (
-        STEPS_OPTION,
-        REPEATS_OPTION,
-        CONDITION_OPTION,
-        SESSION_OPTION,
-        RECORD_OPTION,
-    ),
+    (STEPS_OPTION, REPEATS_OPTION, CONDITION_OPTION, SESSION_OPTION, RECORD_OPTION),
 )

@@ -36,10 +36,5 @@ EXPERIMENT = Experiment(
     "parkour",
     "crossing courses",
     run_parkour_experiment,
-    (
-        STEPS_OPTION,
-        CONDITION_OPTION,
-        SESSION_OPTION,
-        RECORD_OPTION,
-    ),
+    (STEPS_OPTION, CONDITION_OPTION, SESSION_OPTION, RECORD_OPTION),
 )

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.robot_links_and_state import CommandRange, Foot, RobotState
 from pdtui.core.scenery import NO_TRAFFIC, Traffic
+from pdtui.robots.cassie_tasks import CASSIE_TASKS
 from pdtui.robots.legged.legged_robot import LeggedRobot
 from pdtui.robots.legged.legged_robot_description import (
     FallRule,
@@ -96,6 +97,7 @@ class Cassie(LeggedRobot):
     description = CASSIE_DESCRIPTION
     feet = tuple(Foot(f"{side} foot", f"{side}_toe_capsule") for side in SIDES)
     starts = ("plane", "rough", "parkour")
+    tasks = CASSIE_TASKS
     state_arrays = (*LeggedRobot.state_arrays, "_progress")
     parkour: ParkourRun | None = None
     training_recipe = TrainingRecipe(

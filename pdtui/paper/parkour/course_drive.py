@@ -1,4 +1,4 @@
-"""A drive along one parkour course and its score, whoever presses the keys: nobody, a program, or a person."""
+"""A drive along one parkour course and its score, whoever drives: nobody, a program, or a person."""
 
 from __future__ import annotations
 
@@ -85,11 +85,13 @@ def drive_course(
     run = require_parkour_run(loop)
     events: list[DriveEvent] = []
     outcomes: list[Outcome] = []
-    for done in range(1, steps + 1):
+    done = 0
+    while done < steps:
         key = operator.choose_key(look_at_course(loop)) if operator is not None else ""
         record = loop.advance(events_of_pressed_keys([key] if key else [], loop))
         if recorder is not None:
             recorder.write(record)
+        done += 1
         events += record.events
         outcomes += [record.outcome] if record.outcome is not None else []
         if run.crossed or until(run):

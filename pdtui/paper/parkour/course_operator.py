@@ -1,4 +1,4 @@
-"""A program that operates Cassie's keys on a parkour course: it sees late, and presses no faster than a person."""
+"""A program that operates the keys on a parkour course: it sees late, and presses no faster than a person."""
 
 from __future__ import annotations
 
@@ -78,7 +78,9 @@ class CourseOperator:
         settings: CourseOperatorSettings = CourseOperatorSettings(),
     ) -> None:
         behaviors = find_operator_behaviors(stimulation_map, NEEDED_BEHAVIORS)
-        self._keys = {DEFAULT: stimulation_map.default_key} | {name: one.key for name, one in behaviors.items()}
+        self._keys = {DEFAULT: stimulation_map.default_key} | {
+            name: one.key for name, one in behaviors.items()
+        }
         self._dt, self._settings = dt, settings
         self._delay, self._second = math.ceil(REACTION_TIME / dt - 1e-9), math.ceil(1.0 / dt - 1e-9)
         self._views: list[CourseView] = []

@@ -75,7 +75,7 @@ class ParkourObstacle:
 
 
 def draw_parkour_course(rng: np.random.Generator) -> tuple[ParkourObstacle, ...]:
-    """Draw seven obstacles, in their order along the lane: every kind, and no kind twice in a row but gates."""
+    """Draw seven obstacles, in their order along the lane: of every kind, and none twice in a row."""
     kinds = _draw_kinds(rng)
     places = _FIRST + _SPACING * np.arange(COUNT) + rng.uniform(0.0, _SHIFT, COUNT)
     side = 1.0 if rng.random() < 0.5 else -1.0

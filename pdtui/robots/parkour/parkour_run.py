@@ -9,12 +9,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import NO_TRAFFIC, Traffic
-from pdtui.robots.parkour.parkour_course import (
-    HALF_WIDTH,
-    LENGTH,
-    ParkourObstacle,
-    draw_parkour_course,
-)
+from pdtui.robots.parkour.parkour_course import HALF_WIDTH, LENGTH, ParkourObstacle, draw_parkour_course
 
 _RAISED = 1.6
 """How high an open door is lifted where it is drawn, m."""

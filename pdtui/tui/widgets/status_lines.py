@@ -133,7 +133,7 @@ class NoticeLine(SnapshotWidget):
         return "with a key or a takeover" if controls else "with a key"
 
     def _counters(self) -> str:
-        """Return distance, collisions, obstacles passed and involvement of an episode that has any of them."""
+        """Return distance, collisions, obstacles passed and involvement of an episode with any of them."""
         statistics = self.snapshot.statistics if self.snapshot is not None else NO_STATISTICS
         shown = [] if statistics.distance is None else [f"{format_number(statistics.distance)} m"]
         if statistics.collisions is not None:

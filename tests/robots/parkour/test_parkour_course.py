@@ -1,6 +1,8 @@
-"""Courses: a function of the seed, with every kind of obstacle, none of which leaves the straight way open."""
+"""Courses are functions of the seed, have every kind of obstacle, and none leaves the straight way open."""
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,7 +31,7 @@ def test_a_course_has_every_kind_of_obstacle_with_room_between_them(seed: int) -
     assert (np.diff(places) >= 4.0).all()
     assert places[0] >= 4.0
     assert course[-1].end < LENGTH
-    for one, following in zip(course, course[1:], strict=False):
+    for one, following in pairwise(course):
         assert one.end <= following.sensor
 
 

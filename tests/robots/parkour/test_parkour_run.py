@@ -1,4 +1,4 @@
-"""Cassie on a course: its obstacles are solid, attempts begin behind the last one passed, snapshots hold it all."""
+"""Cassie on a course: obstacles are solid, attempts begin behind the last one, snapshots hold it all."""
 
 from __future__ import annotations
 
