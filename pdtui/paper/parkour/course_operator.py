@@ -14,10 +14,10 @@ REACTION_TIME = 0.3
 PRESSES_PER_SECOND = 3
 """Largest number of key presses in any second."""
 DEFAULT = "default"
-NEEDED_BEHAVIORS = ("stop", "hurry", "sidestep left", "sidestep right", "stand lower")
+NEEDED_BEHAVIORS = ("stop", "hurry", "sidestep left", "sidestep right", "duck")
 _STEPS_PER_DECISION = 5
-_STEPS_OBSERVED = 10
-"""Control steps over which it estimates the robot's velocity: a swaying gait has no clear one in fewer."""
+_STEPS_OBSERVED = 24
+"""Control steps over which it estimates the robot's velocity: about a cycle of the gait, in which it sways."""
 
 
 @dataclass(frozen=True)
@@ -25,18 +25,26 @@ class CourseOperatorSettings:
     """When it presses keys; tuned on courses of seeds from 1000 on.
 
     Attributes:
-        duck_distance: distance to a bar at which it makes the robot stand lower, m.
+        duck_distance: distance to a bar at which it makes the robot duck, m.
+        clear_of_bar: distance behind a bar at which it lets the robot stand up, m.
         hurry_distance: distance to the sensor of a door that closes at which it makes the robot hurry, m.
         stop_distance: distance to a closed door at which it stops the robot, m.
         begin_sidestep, end_sidestep: distance aside from the middle of a gate's opening at which it begins
             and ends a sidestep, m.
+        glide: time for which the robot goes on aside as it did once it is let go, s.
+        farthest_aside: distance from the middle of the lane from which it brings the robot back, m, as long
+            as the next obstacle is farther away than `clear_distance`, m.
     """
 
-    duck_distance: float = 1.6
+    duck_distance: float = 0.95
+    clear_of_bar: float = 0.25
     hurry_distance: float = 1.0
     stop_distance: float = 1.3
-    begin_sidestep: float = 0.3
-    end_sidestep: float = 0.12
+    begin_sidestep: float = 0.35
+    end_sidestep: float = 0.15
+    glide: float = 0.7
+    farthest_aside: float = 1.2
+    clear_distance: float = 2.5
 
 
 @dataclass(frozen=True)
@@ -81,6 +89,9 @@ class CourseOperator:
         self._keys = {DEFAULT: stimulation_map.default_key} | {
             name: one.key for name, one in behaviors.items()
         }
+        self._periods = {
+            name: round(one.period / dt) for name, one in behaviors.items() if one.period is not None
+        }
         self._dt, self._settings = dt, settings
         self._delay, self._second = math.ceil(REACTION_TIME / dt - 1e-9), math.ceil(1.0 / dt - 1e-9)
         self._views: list[CourseView] = []
@@ -93,6 +104,8 @@ class CourseOperator:
             self._latched = DEFAULT  # a new attempt begins without behaviors
         self._views.append(view)
         step = len(self._views) - 1
+        if self._latched in self._periods and step - self._pressed[-1] >= self._periods[self._latched]:
+            self._latched = DEFAULT
         old = step - self._delay
         lately = self._pressed[-PRESSES_PER_SECOND:]
         rests = len(lately) == PRESSES_PER_SECOND and step - lately[0] < self._second
@@ -110,26 +123,33 @@ class CourseOperator:
 
     def _decide(self, seen: CourseView, earlier: CourseView) -> str:
         """Return the behavior to latch, where the robot will be if it moves on as it did."""
-        ahead = self._delay / _STEPS_OBSERVED
-        x, y = seen.x + ahead * (seen.x - earlier.x), seen.y + ahead * (seen.y - earlier.y)
         obstacle, settings = seen.obstacle, self._settings
-        if obstacle is None:
-            return DEFAULT
-        distance = obstacle.place - x
+        seconds = _STEPS_OBSERVED * self._dt
+        vx, vy = (seen.x - earlier.x) / seconds, (seen.y - earlier.y) / seconds
+        x, y = seen.x + REACTION_TIME * vx, seen.y + (REACTION_TIME + settings.glide) * vy
+        distance = math.inf if obstacle is None else obstacle.place - x
+        far = abs(y) > settings.farthest_aside or self._steps_aside
+        if obstacle is None or (obstacle.kind != "gate" and far and distance > settings.clear_distance):
+            return self._go_aside(-y) if far else DEFAULT
         match obstacle.kind:
             case "gate":
-                return self._aim_at_gate(obstacle.opening - y)
+                return self._go_aside(obstacle.opening - y)
             case "bar":
-                return "stand lower" if distance < settings.duck_distance else DEFAULT
+                under = -settings.clear_of_bar < distance < settings.duck_distance
+                return "duck" if under else DEFAULT
             case "closing door":
                 return "hurry" if distance - SENSOR_DISTANCE < settings.hurry_distance else DEFAULT
             case "opening door":
                 return "stop" if seen.closed and distance < settings.stop_distance else DEFAULT
 
-    def _aim_at_gate(self, aside: float) -> str:
-        """Return the sidestep to the middle of the opening, so far to the left, m, or none."""
+    @property
+    def _steps_aside(self) -> bool:
+        return self._latched in ("sidestep left", "sidestep right")
+
+    def _go_aside(self, aside: float) -> str:
+        """Return the sidestep that leads so far to the left, m, or none for little."""
         settings = self._settings
-        if self._latched in ("sidestep left", "sidestep right"):
+        if self._steps_aside:
             to_left = self._latched == "sidestep left"
             if (aside if to_left else -aside) > settings.end_sidestep:
                 return self._latched

@@ -17,7 +17,7 @@ ObstacleKind = Literal["gate", "bar", "closing door", "opening door"]
 OBSTACLE_KINDS: tuple[ObstacleKind, ...] = get_args(ObstacleKind)
 LENGTH, HALF_WIDTH = 40.0, 3.0
 """Length of the lane and half its width, m."""
-BAR_BOTTOM = 0.97
+BAR_BOTTOM = 1.005
 """Height of a bar's lower edge, m."""
 CLOSING_TIME, OPENING_TIME = 2.3, 6.0
 """Time after which a door closes or opens, once the robot is past the sensor before it, s."""
