@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from pdtui.paper.operator_behaviors import find_operator_behaviors
-from pdtui.robots.parkour.parkour_course import SENSOR_DISTANCE, ParkourObstacle
+from pdtui.robots.parkour.parkour_course import SENSOR_DISTANCE, ObstacleKind, ParkourObstacle
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 REACTION_TIME = 0.3
@@ -33,7 +33,7 @@ class CourseOperatorSettings:
             and ends a sidestep, m.
         glide: time for which the robot goes on aside as it did once it is let go, s.
         farthest_aside: distance from the middle of the lane from which it brings the robot back, m, as long
-            as the next obstacle is farther away than `clear_distance`, m.
+            as what the next obstacle asks for is farther away than `recentring_room`, m.
     """
 
     duck_distance: float = 0.95
@@ -44,7 +44,7 @@ class CourseOperatorSettings:
     end_sidestep: float = 0.15
     glide: float = 0.7
     farthest_aside: float = 1.2
-    clear_distance: float = 2.5
+    recentring_room: float = 0.6
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,10 @@ class CourseOperator:
         x, y = seen.x + REACTION_TIME * vx, seen.y + (REACTION_TIME + settings.glide) * vy
         distance = math.inf if obstacle is None else obstacle.place - x
         far = abs(y) > settings.farthest_aside or self._steps_aside
-        if obstacle is None or (obstacle.kind != "gate" and far and distance > settings.clear_distance):
-            return self._go_aside(-y) if far else DEFAULT
+        if obstacle is None:
+            return DEFAULT
+        if far and distance > self._action_distance(obstacle.kind) + settings.recentring_room:
+            return self._go_aside(-y)
         match obstacle.kind:
             case "gate":
                 return self._go_aside(obstacle.opening - y)
@@ -138,9 +140,20 @@ class CourseOperator:
                 under = -settings.clear_of_bar < distance < settings.duck_distance
                 return "duck" if under else DEFAULT
             case "closing door":
-                return "hurry" if distance - SENSOR_DISTANCE < settings.hurry_distance else DEFAULT
+                return "hurry" if distance < SENSOR_DISTANCE + settings.hurry_distance else DEFAULT
             case "opening door":
                 return "stop" if seen.closed and distance < settings.stop_distance else DEFAULT
+
+    def _action_distance(self, kind: ObstacleKind) -> float:
+        """Return the distance to an obstacle at which it does something about it, m."""
+        settings = self._settings
+        distances: dict[ObstacleKind, float] = {
+            "gate": math.inf,
+            "bar": settings.duck_distance,
+            "closing door": SENSOR_DISTANCE + settings.hurry_distance,
+            "opening door": settings.stop_distance,
+        }
+        return distances[kind]
 
     @property
     def _steps_aside(self) -> bool:
