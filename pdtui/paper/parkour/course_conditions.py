@@ -51,6 +51,7 @@ def evaluate_parkour(
     conditions: Sequence[CourseCondition] = tuple(CONDITIONS),
     sessions: Sequence[Path] = (),
     steps: int = STEPS,
+    obstacles: Sequence[ObstacleKind] = OBSTACLE_KINDS,
     record: Path | None = None,
     workers: int = 2,
     progress: StepProgress | None = None,
@@ -63,6 +64,7 @@ def evaluate_parkour(
         conditions: conditions to measure.
         sessions: a person's drives.
         steps: largest number of control steps per course.
+        obstacles: kinds of obstacles that are also attempted by themselves.
         record: folder for the operator's drives, each a session and a keystroke file.
 
     Raises:
@@ -90,7 +92,7 @@ def evaluate_parkour(
         _PassageJob(config, seed, one, kind)
         for one in CONDITIONS
         if one in conditions
-        for kind in OBSTACLE_KINDS
+        for kind in obstacles
         for seed in seeds
     ]
     total = len(jobs) + len(passages)

@@ -8,11 +8,11 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.outcome import Outcome
-from pdtui.core.scenery import NO_TRAFFIC, Traffic
+from pdtui.core.scenery import Traffic
 from pdtui.robots.parkour.parkour_course import HALF_WIDTH, LENGTH, ParkourObstacle, draw_parkour_course
 
-_RAISED = 1.6
-"""How high an open door is lifted where it is drawn, m."""
+_OPEN_DOOR_ASIDE = 2 * HALF_WIDTH
+"""How far to the left an open door is drawn: it has slid out of the lane, m."""
 
 
 NO_PROGRESS = np.array([0.0, 1.0, -1.0])
@@ -114,16 +114,13 @@ class ParkourRun:
         return self._boxes
 
     def read_traffic(self) -> Traffic:
-        """Return all boxes, doors that are open lifted."""
-        rows, lifted = [], []
+        """Return all boxes; doors that are open stand beside the lane."""
+        aside: list[float] = []
         for number, one in enumerate(self.course):
-            rows.append(one.boxes)
-            lifted += [0.0 if self._is_closed(number) else _RAISED] * len(one.boxes)
-        boxes = np.concatenate(rows)
-        if not len(boxes):
-            return NO_TRAFFIC
+            aside += [0.0 if self._is_closed(number) else _OPEN_DOOR_ASIDE] * len(one.boxes)
+        boxes = np.concatenate([one.boxes for one in self.course])
         poses = np.column_stack([boxes[:, :3], np.zeros(len(boxes))])
-        poses[:, 2] += lifted
+        poses[:, 1] += aside
         kinds = ("obstacle",) * len(boxes)
         return Traffic(np.arange(len(boxes)), kinds, poses, boxes[:, 3:].copy())
 
