@@ -88,8 +88,9 @@ class Cassie(LeggedRobot):
             ``parkour`` course.
         roughness: Largest height of rough ground, m.
         random_commands: Whether every reset draws the commands, for training's scores, instead of commanding
-            1 m/s forward, along x.
+            `speed` forward, along x.
         longer_swing: The reward's `LeggedRewardWeights.longer_swing`, s.
+        speed: Forward speed that is commanded where nothing else is, m/s.
     """
 
     name = "cassie"
@@ -130,9 +131,11 @@ class Cassie(LeggedRobot):
         roughness: float = 0.05,
         random_commands: bool = False,
         longer_swing: float = CASSIE_DESCRIPTION.rewards.longer_swing,
+        speed: float = 1.0,
     ) -> None:
         rewards = replace(CASSIE_DESCRIPTION.rewards, longer_swing=longer_swing)
         self.description = replace(CASSIE_DESCRIPTION, rewards=rewards)
+        self.commands = {"forward": speed, "heading": 0.0}
         self._goes_on, self._placed = False, NO_BOXES
         super().__init__(random_commands, terrain, roughness)
         self.attributes = (
