@@ -17,7 +17,7 @@ DEFAULT = "default"
 NEEDED_BEHAVIORS = ("stop", "hurry", "sidestep left", "sidestep right", "duck")
 _STEPS_PER_DECISION = 5
 _STEPS_OBSERVED = 24
-"""Control steps over which it estimates the robot's velocity: about a cycle of the gait, in which it sways."""
+"""Control steps over which it estimates the robot's velocity: about a cycle of the swaying gait."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The parkour experiment: what the policy does alone and with an operator, and the score of a recorded drive."""
+"""The parkour experiment: what the policy does alone and with an operator, and the score of a drive."""
 
 from __future__ import annotations
 

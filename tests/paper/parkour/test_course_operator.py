@@ -38,8 +38,7 @@ def _walk(
 
 
 @pytest.mark.parametrize(
-    ("kind", "behavior"),
-    [("bar", "duck"), ("closing door", "hurry"), ("opening door", "stop")],
+    ("kind", "behavior"), [("bar", "duck"), ("closing door", "hurry"), ("opening door", "stop")]
 )
 def test_it_does_what_an_obstacle_asks_for_before_it_is_there(
     cassie_map: StimulationMap, kind: ObstacleKind, behavior: str
@@ -51,9 +50,7 @@ def test_it_does_what_an_obstacle_asks_for_before_it_is_there(
 
 
 @pytest.mark.parametrize(("opening", "behavior"), [(1.2, "sidestep left"), (-1.2, "sidestep right")])
-def test_it_steps_aside_to_a_gates_opening(
-    cassie_map: StimulationMap, opening: float, behavior: str
-) -> None:
+def test_it_steps_aside_to_a_gates_opening(cassie_map: StimulationMap, opening: float, behavior: str) -> None:
     keys = _walk(CourseOperator(cassie_map, DT), "gate", 5.0, opening=opening)
     assert next(iter(keys.values())) == cassie_map.behaviors[behavior].key
     assert not _walk(CourseOperator(cassie_map, DT), "gate", 5.0, opening=opening, y=opening)
@@ -84,5 +81,7 @@ def test_it_presses_at_most_three_keys_a_second(cassie_map: StimulationMap) -> N
 
 def test_a_map_without_what_it_needs_is_refused(cassie_map: StimulationMap) -> None:
     less = {name: one for name, one in cassie_map.behaviors.items() if name != "duck"}
-    with pytest.raises(MapError, match=f"needs a behavior for each of {', '.join(NEEDED_BEHAVIORS)}; missing: duck"):
+    with pytest.raises(
+        MapError, match=f"needs a behavior for each of {', '.join(NEEDED_BEHAVIORS)}; missing: duck"
+    ):
         CourseOperator(replace(cassie_map, behaviors=less), DT)
