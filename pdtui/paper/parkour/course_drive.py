@@ -22,12 +22,14 @@ from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 PARKOUR = "parkour"
+ATTEMPTS_AT_ONE = 8
+"""Attempts at one obstacle after which a drive is over."""
 _PASSED, _ATTEMPTS = "obstacles passed", "attempts"
 
 
 @dataclass(frozen=True)
 class CourseScore:
-    """The score of one drive, up to the end of the course or the last step.
+    """The score of one drive, up to the end of the course or the last step, or until it is given up.
 
     Attributes:
         passed: number of obstacles passed.
@@ -75,7 +77,7 @@ def drive_course(
     recorder: SessionRecorder | None = None,
     until: Callable[[ParkourRun], bool] = lambda _: False,
 ) -> tuple[CourseScore, tuple[DriveEvent, ...]]:
-    """Drive along the course up to its end, or the last step; return score and events.
+    """Drive along the course to its end or the last step, or until it is given up; return score and events.
 
     Without an operator no key is pressed; the caller closes the recorder.
 
@@ -85,8 +87,9 @@ def drive_course(
     run = require_parkour_run(loop)
     events: list[DriveEvent] = []
     outcomes: list[Outcome] = []
-    done = 0
-    while done < steps:
+    done, given_up = 0, False
+    passed, before = run.passed, run.attempts
+    while done < steps and not given_up:
         key = operator.choose_key(look_at_course(loop)) if operator is not None else ""
         record = loop.advance(events_of_pressed_keys([key] if key else [], loop))
         if recorder is not None:
@@ -96,8 +99,10 @@ def drive_course(
         outcomes += [record.outcome] if record.outcome is not None else []
         if run.crossed or until(run):
             break
-    passed, attempts = run.progress[:2].tolist()
-    return _score(loop.seed, passed, attempts, outcomes, done, events), tuple(events)
+        if run.passed > passed:
+            passed, before = run.passed, run.attempts
+        given_up = run.attempts - before >= ATTEMPTS_AT_ONE
+    return _score(loop.seed, run.passed, run.attempts, outcomes, done, events), tuple(events)
 
 
 def record_course(
@@ -136,17 +141,22 @@ def read_course_score(path: Path, robot: str, steps: int) -> tuple[CourseScore, 
     if missing or not session.steps:
         raise SessionError(f"{path}: expected steps with the attributes '{_PASSED}' and '{_ATTEMPTS}'")
     arrived = [step + 1 for step, one in session.outcomes.items() if one is Outcome.ARRIVED]
-    count = min([session.steps, steps, *arrived])
-    passed, attempts = (float(session.attributes[count - 1, names.index(n)]) for n in (_PASSED, _ATTEMPTS))
+    end = min([session.steps, steps, *arrived])
+    passed, attempts = (session.attributes[:end, names.index(name)] for name in (_PASSED, _ATTEMPTS))
+    # The number of the first attempt at the obstacle that comes after as many.
+    first = np.array([attempts[np.searchsorted(passed, number)] for number in passed])
+    given_up = np.flatnonzero(attempts - first >= ATTEMPTS_AT_ONE) + 1
+    count = int(min([end, *given_up]))
     outcomes = [one for step, one in sorted(session.outcomes.items()) if step < count]
     events = [event for event in session.events if event.step < count]
-    return _score(info.seed, passed, attempts, outcomes, count, events), info.policy
+    last = int(passed[count - 1]), int(attempts[count - 1])
+    return _score(info.seed, *last, outcomes, count, events), info.policy
 
 
 def _score(
     seed: int,
-    passed: float,
-    attempts: float,
+    passed: int,
+    attempts: int,
     outcomes: Iterable[Outcome],
     steps: int,
     events: Sequence[DriveEvent],
@@ -155,9 +165,9 @@ def _score(
     pressed = [event for event in events if event.key]
     return CourseScore(
         seed,
-        int(passed),
+        passed,
         Outcome.ARRIVED in found,
-        int(attempts),
+        attempts,
         count_outcomes(one for one in found if one is not Outcome.ARRIVED),
         steps,
         tuple(event.key for event in pressed),

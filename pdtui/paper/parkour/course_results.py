@@ -13,7 +13,7 @@ from rich.table import Table
 from pdtui.core.outcome import Outcome, OutcomeCounts
 from pdtui.core.text_tables import format_seed_range, new_table
 from pdtui.evaluation.paired_statistics import share_interval
-from pdtui.paper.parkour.course_drive import CourseScore
+from pdtui.paper.parkour.course_drive import ATTEMPTS_AT_ONE, CourseScore
 from pdtui.robots.parkour.parkour_course import COUNT, LENGTH, OBSTACLE_KINDS, ObstacleKind
 
 CourseCondition = Literal["alone", "operator"]
@@ -137,7 +137,10 @@ def parkour_table(result: CourseExperimentResult) -> Group:
     parts: list[Table | str] = [table]
     if result.passages:
         parts.append(_passage_table(result.passages))
-    parts.append("A robot that fell or crashed began anew behind the last obstacle that it had passed.")
+    parts.append(
+        "A robot that fell or crashed began anew behind the last obstacle that it had passed. "
+        f"After {ATTEMPTS_AT_ONE} attempts at one obstacle the drive was over."
+    )
     return Group(*parts)
 
 
