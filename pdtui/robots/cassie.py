@@ -60,7 +60,6 @@ CASSIE_DESCRIPTION = LeggedRobotDescription(
         steps=0.0,
         one_foot=1.0,
         single_stance=2.5,
-        longer_swing=0.08,
         fall=2.0,
     ),
     max_action=3.0,
