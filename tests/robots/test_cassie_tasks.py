@@ -44,8 +44,8 @@ def test_lower_is_a_better_crouch() -> None:
     assert scores[0] < scores[-1]
 
 
-def _jump(airborne: int, height: float) -> dict[str, Floats]:
-    off, up = np.ones(200), np.full(200, 0.03)
+def _jump(airborne: int, height: float, steps: int = 200) -> dict[str, Floats]:
+    off, up = np.ones(steps), np.full(steps, 0.03)
     off[50 : 50 + airborne], up[50 : 50 + airborne] = 0.0, height
     return {"left_contact": off, "right_contact": off, "left_foot_height": up, "right_foot_height": up}
 
@@ -57,7 +57,7 @@ def test_a_jump_takes_both_feet_off_the_ground_for_long_and_high(
     airborne: int, height: float, done: bool
 ) -> None:
     assert judge_cassie_jump(_trace(200, **_jump(airborne, height))).success == done
-    assert not judge_cassie_jump(_trace(150, Outcome.FELL, **_jump(airborne, height))).success
+    assert not judge_cassie_jump(_trace(150, Outcome.FELL, **_jump(airborne, height, 150))).success
 
 
 def test_a_flip_turns_backward_and_lands() -> None:

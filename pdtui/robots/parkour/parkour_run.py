@@ -8,7 +8,7 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.outcome import Outcome
-from pdtui.core.scenery import Traffic
+from pdtui.core.scenery import BoxKind, Traffic
 from pdtui.robots.parkour.parkour_course import HALF_WIDTH, LENGTH, ParkourObstacle, draw_parkour_course
 
 _OPEN_DOOR_ASIDE = 2 * HALF_WIDTH
@@ -121,7 +121,7 @@ class ParkourRun:
         boxes = np.concatenate([one.boxes for one in self.course])
         poses = np.column_stack([boxes[:, :3], np.zeros(len(boxes))])
         poses[:, 1] += aside
-        kinds = ("obstacle",) * len(boxes)
+        kinds: tuple[BoxKind, ...] = ("obstacle",) * len(boxes)
         return Traffic(np.arange(len(boxes)), kinds, poses, boxes[:, 3:].copy())
 
     def _is_closed(self, number: int) -> bool:
