@@ -126,17 +126,19 @@ def _ended(session: SessionHeader, summary: SessionSummary) -> str:
 
 
 def _episodes(summary: SessionSummary) -> list[Table]:
-    """Return one row per episode, where the robot has a distance or obstacles."""
+    """Return one row per episode, where the robot has a distance or obstacles, or passed some."""
     tallies = summary.tallies
     far, hits = (
         any(getattr(tally, name) is not None for tally in tallies) for name in ("distance", "collisions")
     )
-    if not (far or hits):
+    over = any(tally.passed for tally in tallies)
+    if not (far or hits or over):
         return []
-    columns = ["distance"] * far + ["collisions"] * hits
+    columns = ["distance"] * far + ["collisions"] * hits + ["obstacles passed"] * over
     table = new_table("", "episode", "steps", *columns, "human involvement", "outcome", left=("outcome",))
     for tally in tallies:
         cells = [_figure(tally.distance, ".2f", " m")] * far + [_figure(tally.collisions, "g")] * hits
+        cells += [_figure(tally.passed, "g")] * over
         involvement = _involvement(tally, summary)
         table.add_row(str(tally.episode), str(tally.steps), *cells, involvement, tally.outcome)
     return [table]
