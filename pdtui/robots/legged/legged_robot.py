@@ -62,7 +62,7 @@ class LeggedRobot(MujocoRobot):
     _action: Floats
     _last_action: Floats
     _foot_times: Floats
-    state_arrays = ("_terrain_seed", "_command", "_action", "_last_action", "_foot_times")
+    state_arrays: tuple[str, ...] = ("_terrain_seed", "_command", "_action", "_last_action", "_foot_times")
 
     def __init__(self, random_commands: bool = False, terrain: str = "plane", roughness: float = 0.0) -> None:
         one, joints = self.description, len(self.description.default_angles)
