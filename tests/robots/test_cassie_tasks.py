@@ -23,7 +23,7 @@ ATTRIBUTES = tuple(Attribute(name, "") for name in NAMES)
 WALK = (1.0, 0.9, 1.0, 0.0, 0.03, 0.2, 0.0)
 
 
-def _trace(steps: int, outcome: Outcome | None = None, **changes: Floats | float) -> TaskRunTrace:
+def _trace(steps: int, outcome: Outcome | None = None, /, **changes: Floats | float) -> TaskRunTrace:
     values = np.tile(WALK, (steps, 1))
     for name, value in changes.items():
         values[:, NAMES.index(name.replace("_", " "))] = value

@@ -26,7 +26,7 @@ SENSOR_DISTANCE = 3.0
 OPENING_WIDTH = 1.3
 """Width of a gate's opening, m."""
 # Distances of the middle of a gate's opening from the middle of the lane, m.
-_ASIDE = (0.95, 1.35)
+_ASIDE = (1.6, 1.9)
 # Place of the first obstacle, distance to the next one, and how far each may be shifted, m.
 _FIRST, _SPACING, _SHIFT = 4.0, 5.0, 1.0
 COUNT = 7

@@ -11,6 +11,7 @@ from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import BoxKind, Traffic
 from pdtui.robots.parkour.parkour_course import HALF_WIDTH, LENGTH, ParkourObstacle, draw_parkour_course
 
+_KIND: BoxKind = "obstacle"
 _OPEN_DOOR_ASIDE = 2 * HALF_WIDTH
 """How far to the left an open door is drawn: it has slid out of the lane, m."""
 
@@ -121,7 +122,7 @@ class ParkourRun:
         boxes = np.concatenate([one.boxes for one in self.course])
         poses = np.column_stack([boxes[:, :3], np.zeros(len(boxes))])
         poses[:, 1] += aside
-        kinds: tuple[BoxKind, ...] = ("obstacle",) * len(boxes)
+        kinds = (_KIND,) * len(boxes)
         return Traffic(np.arange(len(boxes)), kinds, poses, boxes[:, 3:].copy())
 
     def _is_closed(self, number: int) -> bool:
