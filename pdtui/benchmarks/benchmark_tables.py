@@ -8,6 +8,7 @@ from rich.table import Table
 from pdtui.benchmarks.control_loop_benchmark import ControlLoopBenchmark
 from pdtui.benchmarks.dissection_benchmark import DissectionBenchmark
 from pdtui.benchmarks.recording_benchmark import MemoryBenchmark, RecordingBenchmark
+from pdtui.benchmarks.rollout_benchmark import RolloutBenchmark
 from pdtui.benchmarks.screen_benchmark import ScreenBenchmark
 from pdtui.core.text_tables import new_table
 
@@ -57,6 +58,27 @@ def dissection_benchmark_table(result: DissectionBenchmark) -> Group:
     rest.add_row("probing, 2 workers", f"{result.probing_two:.0f} steps/s")
     rest.add_row("2 workers over 1, median of rounds", f"{result.probing_ratio:.2f}")
     return Group(speed, growth, rest)
+
+
+def rollout_benchmark_table(result: RolloutBenchmark) -> Table:
+    """Return the steps per second of roll-outs one by one and in lock step, beside the bare simulators."""
+    table = new_table(
+        f"Roll-outs of {result.robot}, {result.workers} workers", "part", "steps/s", "share of bare"
+    )
+    parts = {
+        "bare simulators": (result.bare, 1.0),
+        "roll-outs one by one": (result.one_by_one, result.one_by_one_share),
+        "roll-outs in lock step": (result.lockstep, result.lockstep_share),
+    }
+    for name, (rate, share) in parts.items():
+        table.add_row(name, f"{rate:.0f}", f"{share:.0%}")
+    table.caption = (
+        f"Lock step over one by one, median of rounds: {result.ratio:.2f}. "
+        "Largest difference of an attribute's mean, over its spread among roll-outs: "
+        f"{result.difference:.1e}. "
+        f"Places in the order of the roll-outs by an attribute that are the same: {result.same_order:.0%}."
+    )
+    return table
 
 
 def recording_benchmark_table(result: RecordingBenchmark) -> Table:

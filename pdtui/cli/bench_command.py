@@ -75,6 +75,29 @@ def bench_dissect_command(
     print_result(asdict(result), as_json, lambda: dissection_benchmark_table(result))
 
 
+@bench_command.command("rollouts")
+@click.argument("robot", default="anymal")
+@robot_option_flag
+@own_policy_option
+@integer_option("--rollouts", least=8, default=192, help="Number of roll-outs per round.")
+@integer_option("--steps", least=10, default=60, help="Number of control steps per roll-out.")
+@integer_option("--rounds", default=5, help="Number of rounds to measure.")
+@integer_option("--workers", default=2, help="Number of worker processes.")
+@json_option
+def bench_rollouts_command(
+    robot: str, robot_options: tuple[str, ...], policy: str, as_json: bool, **sizes: int
+) -> None:
+    """Measure stimulated roll-outs one by one and in lock step against bare simulators."""
+    from pdtui.benchmarks.benchmark_tables import rollout_benchmark_table
+    from pdtui.benchmarks.rollout_benchmark import bench_rollouts
+    from pdtui.robots import RobotSpec
+
+    world = RobotSpec(robot, parse_robot_options(robot, robot_options))
+    with progress_bar("measuring", quiet=as_json) as advance:
+        result = bench_rollouts(world, policy or robot, progress=advance, **sizes)
+    print_result(asdict(result), as_json, lambda: rollout_benchmark_table(result))
+
+
 @bench_command.command("record")
 @click.argument("robot")
 @robot_option_flag

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -14,14 +14,18 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_compatibility import check_policy_fit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
+from pdtui.probing.lockstep_rollouts import FEWEST_TOGETHER, make_lockstep_rollouts
+from pdtui.probing.rollout_batch import run_rollouts
 from pdtui.probing.start_states import StartState
-from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome, run_rollout
+from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome
 from pdtui.robots import RobotSpec, make_robot, open_robot
 from pdtui.robots.robot import Robot
 
 # Control steps that a worker is sent at once: enough to make the cost of sending them negligible, few enough
 # for progress to be reported about once per second.
 _STEPS_PER_CHUNK = 1200
+# Long roll-outs in lock step are worth a longer wait: this many together, in no fewer chunks than that.
+_LARGEST_BATCH, _LEAST_CHUNKS = 16, 4
 
 WorkItem = TypeVar("WorkItem")
 WorkResult = TypeVar("WorkResult")
@@ -48,13 +52,14 @@ def _apply(work: Callable[[Robot, Policy, WorkItem], WorkResult], pair: _Pair, i
 
 def _run_chunk(pair: _Pair, chunk: _Chunk) -> list[RolloutOutcome]:
     jobs, starts, steps, measure_from = chunk
-    return [run_rollout(*pair, starts[index], plan, steps, measure_from) for plan, index in jobs]
+    return run_rollouts(*pair, starts, jobs, steps, measure_from)
 
 
 class RolloutPool(Closable):
     """Runs roll-outs of one policy on one robot, in a `WorkerPool`.
 
     The results do not depend on the number of workers, as each roll-out depends on its start and plan only.
+    Those in lock step, see `run_rollouts`, also depend on which run together, but not beyond rounding.
 
     Each worker process loads robot and policy by name. If one of the two is given as an object, all roll-outs
     run in this process. The import options say what the weights file leaves open.
@@ -111,6 +116,8 @@ class RolloutPool(Closable):
             WorkerError: a worker process died.
         """
         size = max(1, _STEPS_PER_CHUNK // steps)
+        if self.offers_lockstep:
+            size = max(size, min(_LARGEST_BATCH, len(jobs) // _LEAST_CHUNKS))
         # Roll-outs from one start follow each other, because some robots return to the last start quickly.
         order = sorted(range(len(jobs)), key=lambda number: jobs[number][1])
         numbers = [order[low : low + size] for low in range(0, len(jobs), size)]
@@ -138,6 +145,11 @@ class RolloutPool(Closable):
             WorkerError: a worker process died.
         """
         return self._pool.map(partial(_apply, function), items, progress)
+
+    @cached_property
+    def offers_lockstep(self) -> bool:
+        """Whether roll-outs that overwrite units run in lock step."""
+        return make_lockstep_rollouts(self.robot, self.policy, FEWEST_TOGETHER) is not None
 
     def count_rollouts(self, outcomes: Iterable[RolloutOutcome]) -> None:
         """Add roll-outs to `rollouts` and `control_steps`, whether they were run here or read from a file."""

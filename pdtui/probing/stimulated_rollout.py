@@ -74,7 +74,7 @@ def run_rollout(
     angles = np.array([attribute.wraps for attribute in robot.attributes])
     turned = np.zeros(len(angles))
     total, counted, errors, steps_survived, outcome = np.zeros(len(angles)), 0, 0.0, 0, None
-    controller = _Controller(plan, robot, before) if isinstance(plan, PidStimulationPlan) else None
+    controller = StimulationController(plan, robot, before) if isinstance(plan, PidStimulationPlan) else None
     stimulate = _plan_stimulation(plan, controller, robot, policy)
     values = before
     for step in range(steps):
@@ -101,7 +101,7 @@ def run_rollout(
 
 
 def _plan_stimulation(
-    plan: RolloutPlan, controller: _Controller | None, robot: Robot, policy: Policy
+    plan: RolloutPlan, controller: StimulationController | None, robot: Robot, policy: Policy
 ) -> ControlStepStimulation:
     if controller is not None:
         return lambda _, values: controller.stimulate(values)
@@ -111,7 +111,15 @@ def _plan_stimulation(
     return lambda _step, _values: fixed
 
 
-class _Controller:
+class StimulationController:
+    """The controller of a plan during one roll-out.
+
+    Args:
+        plan: The plan.
+        robot: Its robot.
+        values: The attributes at the start, shape (J,).
+    """
+
     def __init__(self, plan: PidStimulationPlan, robot: Robot, values: Floats) -> None:
         self._column = robot.attribute_index(plan.pid.attribute)
         self._wraps = robot.attributes[self._column].wraps
@@ -123,10 +131,12 @@ class _Controller:
         self._pid.set_target(value + plan.target if plan.relative else plan.target)
 
     def stimulate(self, values: Floats) -> Stimulation:
+        """Return the stimulation of a control step from the attributes before it, shape (J,)."""
         output = self._pid.update(float(values[self._column]))
         pairs = zip(self._base, self._units.values, strict=True)
         return Stimulation(self._units.units, tuple(base + weight * output for base, weight in pairs))
 
     def distance(self, values: Floats) -> float:
+        """Return how far the attribute is from its target, in its unit."""
         error = self._pid.target - float(values[self._column])
         return abs(wrap_angle(error) if self._wraps else error)

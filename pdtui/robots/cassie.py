@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +23,9 @@ from pdtui.robots.legged.legged_robot_description import (
     LeggedRewardWeights,
     LeggedRobotDescription,
 )
+from pdtui.robots.legged.legged_robot_state import LeggedRobotState
 from pdtui.robots.legged.mujoco_ground import load_legged_model
+from pdtui.robots.lockstep.lockstep_robots import LockstepRobots
 from pdtui.robots.parkour.parkour_geoms import add_parkour_geoms, place_parkour_boxes, touches_parkour_box
 from pdtui.robots.parkour.parkour_run import NO_BOXES, NO_PROGRESS, ParkourRun
 from pdtui.robots.robot import ResetResult, StepResult, TrainingRecipe
@@ -185,6 +186,10 @@ class Cassie(LeggedRobot):
         super().restore(snapshot)
         self._place_obstacles()
 
+    def make_lockstep_robots(self, count: int) -> LockstepRobots | None:
+        # Doors open at another time for each copy, but they all share a model.
+        return None if self.parkour is not None else super().make_lockstep_robots(count)
+
     def read_traffic(self) -> Traffic:
         return NO_TRAFFIC if self.parkour is None else self.parkour.read_traffic()
 
@@ -208,10 +213,14 @@ class Cassie(LeggedRobot):
         return tuple(f"{side} {joint}" for side in SIDES for joint in _JOINTS)
 
     def read_attributes(self) -> Floats:
-        motion = self.read_state()
-        x, _, z = motion.up[0].tolist()
-        # Unlike the Euler angle, it goes on beyond a right angle, so that it shows a flip.
-        pitch = math.atan2(-x, z)
-        feet = motion.feet_height[0], motion.touching[0].astype(np.float64)
-        passed, attempts = self._progress[:2]
-        return np.concatenate([super().read_attributes(), [pitch], *feet, [passed, attempts]])
+        return np.concatenate([super().read_attributes(), self._own_attributes(self.read_state())[0]])
+
+    def compute_attributes(self, motion: LeggedRobotState, commands: Floats) -> Floats:
+        shared = super().compute_attributes(motion, commands)
+        return np.concatenate([shared, self._own_attributes(motion)], axis=1)
+
+    def _own_attributes(self, motion: LeggedRobotState) -> Floats:
+        # Unlike the Euler angle, this pitch goes on beyond a right angle, so that it shows a flip.
+        pitch = np.arctan2(-motion.up[:, 0], motion.up[:, 2])
+        course = np.broadcast_to(self._progress[:2], (len(pitch), 2))
+        return np.concatenate([pitch[:, None], motion.feet_height, motion.touching, course], axis=1)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -23,6 +23,9 @@ from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions, format_robot_options
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
 from pdtui.robots.task import Task, find_task
+
+if TYPE_CHECKING:
+    from pdtui.robots.lockstep.lockstep_robots import LockstepRobots
 
 ResetResult = tuple[Floats, dict[str, Any]]
 StepResult = tuple[Floats, float, bool, bool, dict[str, Any]]
@@ -133,11 +136,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
 
     @abstractmethod
     def restore(self, snapshot: RobotState) -> None:
-        """Return to a snapshot, bit-exactly.
-
-        Raises:
-            RobotError: The snapshot is of another robot or has another size.
-        """
+        """Return to a snapshot, bit-exactly; one of another robot or size is a `RobotError`."""
 
     def allow_near_restores(self) -> float:
         """Let `restore` be as fast as it can be from now on, and return how far it may be off.
@@ -146,10 +145,14 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         to start anew. Where many roll-outs are compared, it need not be the last bit.
 
         Returns:
-            Largest deviation of an attribute 100 steps after a `restore`, in the attribute's unit; 0 for a
-            robot that always restores exactly.
+            Largest deviation of an attribute 100 steps after a `restore`, in its unit; 0 if there is none.
         """
         return 0.0
+
+    def make_lockstep_robots(self, count: int) -> LockstepRobots | None:
+        """Return copies of the robot that are stepped together; None where that gains too little."""
+        del count
+        return None
 
     @abstractmethod
     def digest(self) -> int:
@@ -158,8 +161,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     def outcome_of(self, terminated: bool, truncated: bool, info: Mapping[str, Any]) -> Outcome | None:
         """Return the outcome of the episode after a step that returned this; None while there is none.
 
-        Raises:
-            RobotError: The word in the info is no outcome.
+        A word in the info that is no outcome is a `RobotError`.
         """
         return outcome_of_step(terminated, truncated, info, self.name)
 

@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats, unwrap_angles
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.outcome import Outcome
+from pdtui.core.robot_links_and_state import RobotState
 from pdtui.core.units import NO_STIMULATION, Stimulation
 from pdtui.policies.runtime.policy import Policy
+from pdtui.probing.lockstep_rollouts import LockstepRollouts, make_lockstep_rollouts
 from pdtui.robots.robot import Robot
 from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict
 from pdtui.stimulation.interventions.gait_clock import GaitClock
@@ -35,6 +38,10 @@ class StimulationWithDuration:
     steps: int | None = None
     onset: Onset | None = None
 
+    def stimulation_at(self, step: int) -> Stimulation:
+        """Return the stimulation of a control step since it began."""
+        return self.stimulation if self.steps is None or step < self.steps else NO_STIMULATION
+
 
 def count_walk_steps(task: Task, seed: int) -> int:
     """Return how many control steps a roll-out of this seed walks before the behavior begins."""
@@ -43,9 +50,18 @@ def count_walk_steps(task: Task, seed: int) -> int:
 
 
 def judge_stimulations(
-    robot: Robot, policy: Policy, task: Task, plans: Sequence[StimulationWithDuration], seed: int
+    robot: Robot,
+    policy: Policy,
+    task: Task,
+    plans: Sequence[StimulationWithDuration],
+    seed: int,
+    one_by_one: bool = False,
 ) -> list[TaskVerdict]:
-    """Judge each plan after the same unstimulated walk; if that ends early, every plan has failed."""
+    """Judge each plan after the same unstimulated walk; if that ends early, every plan has failed.
+
+    Plans without an onset run in lock step where robot and policy offer that, unless they are to run one by
+    one, as in a drive, to the last bit.
+    """
     options = {"start": task.start} if task.start else None
     observation, _ = robot.reset(seed=seed, options=options)
     policy.reset()
@@ -56,12 +72,44 @@ def judge_stimulations(
         if terminated or truncated:
             return [TaskVerdict(False, 0.0, {}) for _ in plans]
     start, state = robot.snapshot(), policy.snapshot()
-    verdicts = []
-    for plan in plans:
-        robot.restore(start)
-        policy.restore(state)
-        verdicts.append(_judge_plan(robot, policy, task, plan, walked))
-    return verdicts
+    plain = [number for number, plan in enumerate(plans) if plan.onset is None and not plan.stimulation.edits]
+    lockstep = None if one_by_one else make_lockstep_rollouts(robot, policy, len(plain))
+    verdicts = {}
+    if lockstep is not None:
+        judged = _judge_together(lockstep, start, robot, task, [plans[number] for number in plain], walked)
+        verdicts = dict(zip(plain, judged, strict=True))
+    for number, plan in enumerate(plans):
+        if number not in verdicts:
+            robot.restore(start)
+            policy.restore(state)
+            verdicts[number] = _judge_plan(robot, policy, task, plan, walked)
+    return [verdicts[number] for number in range(len(plans))]
+
+
+def _judge_together(
+    lockstep: LockstepRollouts,
+    start: RobotState,
+    robot: Robot,
+    task: Task,
+    plans: Sequence[StimulationWithDuration],
+    walked: Sequence[Floats],
+) -> list[TaskVerdict]:
+    """Judge plans without an onset from the same start."""
+    lockstep.restore([start] * len(plans))
+    values: list[list[Floats]] = [[] for _ in plans]
+
+    def stimulate(step: int, _attributes: Floats) -> Sequence[Stimulation]:
+        return [plan.stimulation_at(step) for plan in plans]
+
+    def watch(_step: int, rows: NDArray[np.intp], attributes: Floats) -> None:
+        for row in rows.tolist():
+            values[row].append(attributes[row].copy())
+
+    outcomes = lockstep.run(stimulate, task.steps, watch)
+    before = np.array(walked)
+    return [
+        _judge_run(robot, task, before, run, outcome) for run, outcome in zip(values, outcomes, strict=True)
+    ]
 
 
 def _judge_plan(
@@ -74,8 +122,7 @@ def _judge_plan(
     observation, outcome = robot.observe(), None
     values: list[Floats] = []
     for step in range(task.steps):
-        on = plan.steps is None or step < plan.steps
-        acted = policy.act(observation, plan.stimulation if on else NO_STIMULATION)
+        acted = policy.act(observation, plan.stimulation_at(step))
         try:
             observation, _, terminated, truncated, info = robot.step(acted.action)
         except SimulationDiverged:
@@ -85,9 +132,15 @@ def _judge_plan(
         outcome = robot.outcome_of(terminated, truncated, info) or outcome
         if terminated or truncated:
             break
+    return _judge_run(robot, task, np.array(before), values, outcome)
+
+
+def _judge_run(
+    robot: Robot, task: Task, before: Floats, values: Sequence[Floats], outcome: Outcome | None
+) -> TaskVerdict:
     rows = np.array(values).reshape(-1, len(robot.attributes))
     smooth = unwrap_angles(rows, robot.attributes)
-    return task.judge(TaskRunTrace(robot.attributes, np.array(before), smooth, outcome))
+    return task.judge(TaskRunTrace(robot.attributes, before, smooth, outcome))
 
 
 def _wait_for_onset(robot: Robot, policy: Policy, onset: Onset, walked: list[Floats]) -> bool:

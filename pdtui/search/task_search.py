@@ -119,7 +119,7 @@ class TaskSearch:
             seeds, fresh = (self._seeds(stage, settings.selection_seeds) for stage in (1, 2))
             best = search_onset(self._pool, best, seeds, fresh, self._judge, start=self._task.start)
         plans, seeds = [best, StimulationWithDuration()], JUDGING_SEEDS[-settings.held_out_seeds :]
-        verdicts, untouched = map(tuple, self._judge(plans, seeds))
+        verdicts, untouched = map(tuple, self._judge(plans, seeds, one_by_one=True))
         return TaskSearchResult(
             self._task, best, search_score, verdicts, untouched, self._rollouts, self.seeds
         )
@@ -222,12 +222,13 @@ class TaskSearch:
         plans: Sequence[StimulationWithDuration],
         seeds: Sequence[int],
         progress: StepProgress | None = None,
+        one_by_one: bool = False,
     ) -> list[list[TaskVerdict]]:
         """Return the verdicts of each plan on each seed."""
         self._rollouts += len(plans) * len(seeds)
         size = max(1, min(32, len(plans) // 2 + 1))
         parts = [tuple(plans[low : low + size]) for low in range(0, len(plans), size)]
-        jobs = [(self._task.name, part, seed) for part in parts for seed in seeds]
+        jobs = [(self._task.name, part, seed, one_by_one) for part in parts for seed in seeds]
         results = iter(self._pool.map(judge_task_plans, jobs, progress))
         rows: list[list[TaskVerdict]] = []
         for part in parts:
@@ -237,8 +238,8 @@ class TaskSearch:
 
 
 def judge_task_plans(
-    robot: Robot, policy: Policy, job: tuple[str, tuple[StimulationWithDuration, ...], int]
+    robot: Robot, policy: Policy, job: tuple[str, tuple[StimulationWithDuration, ...], int, bool]
 ) -> list[TaskVerdict]:
     """Judge plans in a worker process; tasks hold functions, so they travel by name."""
-    name, plans, seed = job
-    return judge_stimulations(robot, policy, robot.find_task(name), plans, seed)
+    name, plans, seed, one_by_one = job
+    return judge_stimulations(robot, policy, robot.find_task(name), plans, seed, one_by_one)

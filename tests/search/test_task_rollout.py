@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
 from pdtui.robots.a1_tasks import A1_TASKS
 from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
-from pdtui.robots.task import TaskRunTrace, TaskVerdict, find_task
+from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict, find_task
 from pdtui.robots.walker import WALKER_TASKS
 from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
 
@@ -166,3 +168,30 @@ def test_bursts_of_one_seed_begin_from_the_same_walk(robot: str) -> None:
     assert together[0] == together[2]
     assert judge_stimulations(world, policy, task, [plan], 5) == [together[1]]
     assert together[0] != together[1]
+
+
+def test_plans_in_lock_step_are_judged_as_one_by_one() -> None:
+    """The judge sees the same walks, to rounding; a plan with a duration ends in the same step."""
+    task = Task(
+        name="walk",
+        key="w",
+        says="walks",
+        wanted="nothing",
+        walk=(10, 10),
+        steps=25,
+        judge=lambda trace: TaskVerdict(True, float(trace.values.sum()), {"steps": float(len(trace))}),
+    )
+    plans = [
+        StimulationWithDuration(),
+        StimulationWithDuration(Stimulation.of({3: 2.0})),
+        StimulationWithDuration(Stimulation.of({3: 2.0}), 5),
+        StimulationWithDuration(Stimulation.of({3: 2.0}), 6),
+        StimulationWithDuration(Stimulation.of(dict.fromkeys(range(224), 5.0))),
+    ]
+    world, policy = make_robot("anymal"), load_policy("anymal", "anymal")
+    alone, together = (judge_stimulations(world, policy, task, plans, 5, one) for one in (True, False))
+    for one, other in zip(alone, together, strict=True):
+        assert one.figures == other.figures
+        assert other.score == pytest.approx(one.score, rel=1e-3)
+    scores = [one.score for one in alone]
+    assert min(abs(a - b) / abs(a) for a, b in itertools.combinations(scores, 2)) > 2e-3, scores

@@ -114,16 +114,10 @@ class FastMlp:
 def make_fast_mlp(module: nn.Module, observations: int) -> FastMlp | None:
     """Return the module as a `FastMlp`; None unless that gives the same bits on a few observations.
 
-    The module must be an `nn.Sequential` of unnamed layers, or have a method ``stages()`` that returns its
-    submodules in order.
+    `find_plain_stages` says what the module must be.
     """
-    if isinstance(module, nn.Sequential) and all(name.isdigit() for name, _ in module.named_children()):
-        stages: list[nn.Module] = list(module)
-    elif hasattr(module, "stages"):
-        stages = cast(Any, module).stages()
-    else:
-        return None
-    if not stages or not all(_is_plain(stage) for stage in stages):
+    stages = find_plain_stages(module)
+    if stages is None:
         return None
     try:
         chain = FastMlp(stages, observations)
@@ -136,6 +130,20 @@ def make_fast_mlp(module: nn.Module, observations: int) -> FastMlp | None:
         if not torch.equal(chain.run(observation, Stimulation())[0], expected):
             return None
     return chain
+
+
+def find_plain_stages(module: nn.Module) -> list[nn.Module] | None:
+    """Return the submodules that a module calls in a row; None if it names none, or not all are plain.
+
+    It must be an `nn.Sequential` of unnamed layers, or have a method ``stages()`` that returns them.
+    """
+    if isinstance(module, nn.Sequential) and all(name.isdigit() for name, _ in module.named_children()):
+        stages: list[nn.Module] = list(module)
+    elif hasattr(module, "stages"):
+        stages = cast(Any, module).stages()
+    else:
+        return None
+    return stages if stages and all(_is_plain(stage) for stage in stages) else None
 
 
 def _is_plain(stage: nn.Module) -> bool:

@@ -91,7 +91,7 @@ class Policy:
     ) -> None:
         self.module, self.name, self.sha256 = copy.deepcopy(module).eval(), name, sha256
         self.shape = (observations,) if isinstance(observations, int) else tuple(observations)
-        self._decode, self._batched = decode, batched
+        self.decode, self._batched = decode, batched
         self._initial = (
             None if initial_state is None else recurrent_state.clone_recurrent_state(initial_state)
         )
@@ -199,7 +199,7 @@ class Policy:
                 return self.act(observation, stimulation, rng)
         if not stimulation:
             output, activations, _ = self._forward(observation, stimulation)
-            return PolicyStep(self._decode(output, rng), activations, stimulation, ())
+            return PolicyStep(self.decode(output, rng), activations, stimulation, ())
         places = stimulation.touched_units()
         # For a few units, Python's own functions are faster than NumPy's.
         own = stimulation.units
@@ -216,7 +216,7 @@ class Policy:
         output, activations, natural = self._forward(observation, stimulation)
         if stimulation.edits:
             stimulation = Stimulation(tuple(places.tolist()), tuple(activations[places].tolist()))
-        action = self._decode(output, rng)
+        action = self.decode(output, rng)
         return PolicyStep(action, activations, stimulation, tuple(natural[places].tolist()))
 
     def activations_for(self, observation: NDArray[Any], last_unit: int | None = None) -> NDArray[np.float32]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -11,28 +11,30 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from pdtui.core.attributes import Attribute, Floats
+from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError
 from pdtui.core.outcome import fall_info
 from pdtui.core.robot_links_and_state import RobotState
-from pdtui.robots.geometry import roll_pitch_yaw, rotate_vectors
+from pdtui.robots.legged.legged_attributes import (
+    compute_trunk_attributes,
+    describe_attributes,
+    read_trunk_attributes,
+)
 from pdtui.robots.legged.legged_observation_edits import legged_observation_edits
 from pdtui.robots.legged.legged_robot_description import LeggedRobotDescription
 from pdtui.robots.legged.legged_robot_state import LeggedRobotState, LeggedStateReader
 from pdtui.robots.legged.mujoco_ground import lay_rough_ground, load_legged_model
 from pdtui.robots.legged.observations_and_rewards import (
-    COMMAND_SCALES,
     compute_legged_observations,
     compute_legged_rewards,
     has_fallen,
 )
 from pdtui.robots.legged.terrain import RoughGround, draw_rough_ground
+from pdtui.robots.lockstep.lockstep_legged_robots import LockstepLeggedRobots
+from pdtui.robots.lockstep.lockstep_robots import LockstepRobots
 from pdtui.robots.robot import ResetResult, StepResult
-from pdtui.robots.simulators.joint_and_trunk_attributes import torque_attributes
 from pdtui.robots.simulators.mujoco_robot import MujocoRobot, read_model_links, silence_warnings
 
-COMMAND_UNITS = {"forward": "m/s", "lateral": "m/s", "yaw rate": "rad/s", "heading": "rad"}
-"""All commands that a legged robot can have, and their units. A robot has a yaw rate or a heading."""
 # Deviations at the start: of the yaw and the joints' angles (rad) and of all velocities (m/s, rad/s).
 _START_NOISE = 0.1
 
@@ -84,24 +86,8 @@ class LeggedRobot(MujocoRobot):
         self._terrain_seed = np.zeros(2)
         self.ground: RoughGround | None = None
         self._stand_still()
-        limits = self.model.actuator_forcerange[:, 1]
-        self.attributes = (
-            Attribute("vx", "m/s"),
-            Attribute("vy", "m/s"),
-            Attribute("speed", "m/s"),
-            Attribute("forward", "m/s", scale=float(COMMAND_SCALES[0])),
-            Attribute("sideways", "m/s", scale=float(COMMAND_SCALES[1])),
-            Attribute("yaw", "rad", wraps=True),
-            Attribute("yaw rate", "rad/s", scale=float(COMMAND_SCALES[2])),
-            Attribute("roll", "rad", wraps=True),
-            Attribute("pitch", "rad"),
-            Attribute("height", "m"),
-            *(
-                Attribute(f"{name} command", COMMAND_UNITS[name], wraps=name == "heading")
-                for name in self.commands
-            ),
-            *torque_attributes(self.joint_names(), limits.tolist()),
-        )
+        limits = self.model.actuator_forcerange[:, 1].tolist()
+        self.attributes = describe_attributes(self.commands, self.joint_names(), limits)
 
     def load_model(self) -> mujoco.MjModel:
         """Return the model, with its grounds."""
@@ -173,15 +159,26 @@ class LeggedRobot(MujocoRobot):
         return observation, float(reward[0]), bool(fell[0]), False, info
 
     def read_attributes(self) -> Floats:
-        vx, vy = self.data.qvel[:2].tolist()
-        roll, pitch, yaw = roll_pitch_yaw(*self.data.qpos[3:7].tolist())
-        forward, sideways = math.cos(yaw) * vx + math.sin(yaw) * vy, math.cos(yaw) * vy - math.sin(yaw) * vx
-        yaw_rate = float(rotate_vectors(self.data.qpos[3:7], self.data.qvel[3:6])[2])
+        x, y = self.data.qpos[:2].tolist()
+        ground = self.ground.height(x, y) if self.ground is not None else 0.0
+        trunk = read_trunk_attributes(self.data.qpos, self.data.qvel, ground)
         commands = self._command[[self.command_names.index(name) for name in self.commands]]
-        x, y, z = self.data.qpos[:3].tolist()
-        height = z - (self.ground.height(x, y) if self.ground is not None else 0.0)
-        moves = (vx, vy, math.hypot(vx, vy), forward, sideways, yaw, yaw_rate, roll, pitch, height)
-        return np.array([*moves, *commands, *self.data.actuator_force.tolist()])
+        return np.array([*trunk, *commands, *self.data.actuator_force.tolist()])
+
+    def compute_attributes(self, motion: LeggedRobotState, commands: Floats) -> Floats:
+        """Return what `read_attributes` would return in the states of n robots, shape (n, J), to rounding.
+
+        Args:
+            motion: The states.
+            commands: The commands of each, in the order of `command_names`, shape (n, 3).
+        """
+        places = motion.qpos[:, None, :2]
+        ground = np.zeros(len(places)) if self.ground is None else self.ground.heights_at(places)[:, 0]
+        given = commands[:, [self.command_names.index(name) for name in self.commands]]
+        return np.concatenate([compute_trunk_attributes(motion, ground), given, motion.torque], axis=1)
+
+    def make_lockstep_robots(self, count: int) -> LockstepRobots | None:
+        return LockstepLeggedRobots(self, count)
 
     def _stand_still(self) -> None:
         joints, feet = len(self.description.default_angles), len(self.description.feet)
@@ -190,10 +187,40 @@ class LeggedRobot(MujocoRobot):
 
     def read_state(self) -> LeggedRobotState:
         """Return what observations and rewards are computed from, as the state of one robot."""
-        data, ground = self.data, None if self.ground is None else self.ground.heights_at
-        actions = self._action[None], self._last_action[None]
+        data, actions = self.data, (self._action[None], self._last_action[None])
         motion = (data.qpos[None], data.qvel[None], actions, self._command[None])
-        return self._reader.read(*motion, data.actuator_force[None], data.sensordata[None], ground)
+        return self._read_motion(*motion, data.actuator_force[None], data.sensordata[None])
+
+    def read_states(
+        self, data: Sequence[mujoco.MjData], actions: tuple[Floats, Floats], commands: Floats
+    ) -> LeggedRobotState:
+        """Return the state of n copies of the robot that stand on its ground, as `read_state` does for one.
+
+        Args:
+            data: MuJoCo's data of each.
+            actions: Actions of the last control step and of the one before, each of shape (n, A).
+            commands: Commands, in the order of `command_names`, shape (n, 3).
+        """
+        motion = (np.array([one.qpos for one in data]), np.array([one.qvel for one in data]))
+        forces = np.array([one.actuator_force for one in data])
+        sensors = np.array([one.sensordata for one in data])
+        return self._read_motion(*motion, actions, commands, forces, sensors)
+
+    def read_controls(self) -> tuple[Floats, Floats, Floats]:
+        """Return the last action, the one before, and the commands in the order of `command_names`."""
+        return self._action, self._last_action, self._command
+
+    def _read_motion(
+        self,
+        qpos: Floats,
+        qvel: Floats,
+        actions: tuple[Floats, Floats],
+        commands: Floats,
+        forces: Floats,
+        sensors: Floats,
+    ) -> LeggedRobotState:
+        ground = None if self.ground is None else self.ground.heights_at
+        return self._reader.read(qpos, qvel, actions, commands, forces, sensors, ground)
 
     def lay_ground(self, terrain: int, seed: int) -> None:
         """Lay the ground of a terrain, by its number, and of a seed."""
