@@ -15,7 +15,7 @@ from pdtui.core.attributes import Floats
 
 ObstacleKind = Literal["gate", "bar", "closing door", "opening door"]
 OBSTACLE_KINDS: tuple[ObstacleKind, ...] = get_args(ObstacleKind)
-LENGTH, HALF_WIDTH = 40.0, 3.0
+LENGTH, HALF_WIDTH = 40.0, 3.3
 """Length of the lane and half its width, m."""
 BAR_BOTTOM = 1.005
 """Height of a bar's lower edge, m."""
@@ -26,7 +26,7 @@ SENSOR_DISTANCE = 3.0
 OPENING_WIDTH = 1.3
 """Width of a gate's opening, m."""
 # Distances of the middle of a gate's opening from the middle of the lane, m.
-_ASIDE = (1.6, 1.9)
+_ASIDE = (1.9, 2.15)
 # Place of the first obstacle, distance to the next one, and how far each may be shifted, m.
 _FIRST, _SPACING, _SHIFT = 4.0, 5.0, 1.0
 COUNT = 7
