@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from functools import partial, wraps
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 from torch import nn
 
+from pdtui.core.calling.dataclass_fields import takes_fields_of
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.dissection.dissect import dissect as run_dissection
 from pdtui.dissection.dissection_config import QUICK_DISSECTION, DissectionConfig, DissectionSettings
 from pdtui.dissection.dissection_result import Dissection
@@ -30,9 +32,7 @@ from pdtui.policies.weights.weights_file import find_weights_file
 from pdtui.robots import RobotSpec, open_robot
 from pdtui.robots.robot import Robot
 from pdtui.sessions.writer.session_recorder import SessionRecorder
-from pdtui.stimulation.map_library import find_map
-from pdtui.stimulation.map_policy_lookup import resolve_map_policy
-from pdtui.stimulation.map_reader import load_map
+from pdtui.stimulation.choosing.drive_map import choose_drive_map
 from pdtui.stimulation.map_robot_options import combine_map_and_robot
 from pdtui.stimulation.stimulation_map import StimulationMap
 
@@ -50,26 +50,6 @@ __all__ = [
     "replay",
 ]
 
-Fields = ParamSpec("Fields")
-Config = TypeVar("Config")
-Result = TypeVar("Result")
-
-
-def _takes_fields_of(
-    make_config: Callable[Fields, Config],
-) -> Callable[[Callable[[Config], Result]], Callable[Fields, Result]]:
-    """Let a function of a dataclass be called with the fields of that dataclass instead."""
-
-    def decorate(function: Callable[[Config], Result]) -> Callable[Fields, Result]:
-        @wraps(function)
-        def call(*args: Fields.args, **kwargs: Fields.kwargs) -> Result:
-            return function(make_config(*args, **kwargs))
-
-        call.__dict__["__signature__"] = inspect.signature(make_config)
-        return call
-
-    return decorate
-
 
 def load_policy(
     policy: str | Path | nn.Module,
@@ -79,7 +59,7 @@ def load_policy(
     observations: int | Sequence[int] | None = None,
     hidden: Sequence[str] | None = None,
     decode: Decoder | None = None,
-    batched: bool = False,
+    batched: bool | None = None,
     initial_state: Any = None,
     name: str = "",
 ) -> Policy:
@@ -140,12 +120,13 @@ def load_policy(
         )
 
 
-@_takes_fields_of(DissectionConfig)
+@takes_fields_of(DissectionConfig)
 def dissect(config: DissectionConfig) -> Dissection:
     """Find out which hidden units move what: monitor, match, probe, and search for behaviors.
 
     The arguments are the fields of `pdtui.dissection.dissection_config.DissectionConfig`. `workers` processes
-    load a robot and a policy given by name; an object stays in this process, with the same result.
+    load a robot and a policy given by name; an object stays in this process, with the same result. A notebook
+    shows the result as a table that can be sorted; `Dissection.to_pandas` gives a data frame.
 
     >>> import pdtui
     >>> from torch import nn
@@ -161,7 +142,11 @@ def dissect(config: DissectionConfig) -> Dissection:
     Raises:
         PdtuiError: What is wrong with the robot, the policy, or the map to start from.
     """
-    return run_dissection(config)
+    with progress_bar("dissecting", quiet=config.progress is not True) as advance:
+        if advance is not None:
+            bar = advance
+            config = replace(config, progress=lambda stage, done, total: bar(done, total, stage))
+        return run_dissection(config)
 
 
 def drive(
@@ -178,8 +163,12 @@ def drive(
     record: str | Path | None = None,
     overwrite: bool = False,
     force: bool = False,
+    minutes: float | None = None,
+    progress: bool = False,
 ) -> DriveArrays:
     """Drive without a screen, as fast as the machine allows.
+
+    A notebook shows the result as curves; `DriveArrays.to_pandas` gives a data frame.
 
     >>> import pdtui
     >>> drive = pdtui.drive("ant", keys={50: "x"}, steps=150)
@@ -188,10 +177,19 @@ def drive(
     >>> bool(drive["speed"][-20:].mean() < drive["speed"][30:50].mean())
     True
 
+    A policy without a map drives alone, on any environment of Gymnasium, too:
+
+    >>> from torch import nn
+    >>> network = nn.Sequential(nn.Linear(11, 8), nn.Tanh(), nn.Linear(8, 3))
+    >>> len(pdtui.drive("Hopper-v5", policy=network, steps=20))
+    20
+
     Args:
         robot: The robot's name, its name with options, which override the map's, or a `Robot`.
-        stimulation_map: A map, or its name or file. By default, the map that has the robot's name.
-        policy: The policy to use instead of the map's; a network in memory has to be the map's own.
+        stimulation_map: A map, or its name or file. By default, the map that has the robot's name, if it is
+            for this policy; otherwise the policy drives alone.
+        policy: The policy to use instead of the map's. If a map is named, a network in memory has to be its
+            own.
         import_options: Answers to what the weights file does not state, in preference to the map's.
         keys: One key or several for each control step before which they are pressed; or a keystroke file.
         steps: Control steps.
@@ -201,15 +199,14 @@ def drive(
         record: File of a new session.
         overwrite: Replace that file, if it exists, once the new session is whole.
         force: Drive even if the map was made for another policy.
+        minutes: Time after which the drive ends with the steps done so far.
+        progress: Show a progress bar on standard error.
 
     Raises:
         PdtuiError: Robot, map or policy cannot be loaded or do not fit each other, or a key means nothing.
     """
     name = robot if isinstance(robot, str) else robot.name
-    if not isinstance(stimulation_map, StimulationMap):
-        stimulation_map = load_map(find_map(str(stimulation_map or name)))
-    named = str(policy) if isinstance(policy, str | Path) else ""
-    stimulation_map = resolve_map_policy(stimulation_map, named, import_options)
+    stimulation_map = choose_drive_map(name, stimulation_map, policy, import_options, force=force)
     stimulation_map, robot = combine_map_and_robot(stimulation_map, robot)
     config = DriveConfig(name, stimulation_map, seed, stochastic=stochastic, start=start, force=force)
     with open_robot(robot) as world:
@@ -217,7 +214,8 @@ def drive(
         presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
         open_recorder = partial(SessionRecorder, existing="replace" if overwrite else "refuse")
         recorder = open_recorder(Path(record), loop.info) if record is not None else None
-        return collect_drive_arrays(loop, presses, steps, recorder)
+        with progress_bar("driving", quiet=not progress) as advance:
+            return collect_drive_arrays(loop, presses, steps, recorder, progress=advance, minutes=minutes)
 
 
 def replay(
@@ -225,6 +223,7 @@ def replay(
     *,
     robot: Robot | None = None,
     policy: str | Path | nn.Module | Policy | None = None,
+    progress: bool = False,
     **judging: Any,
 ) -> ReplayResult:
     """Run a session again and compare every step.
@@ -240,6 +239,7 @@ def replay(
         session: File of the session.
         robot: The robot, if the session's cannot be built from its name.
         policy: The policy, if the session's is not where its map says.
+        progress: Show a progress bar on standard error.
         judging: ``strict``, ``tolerance``, ``required_steps`` and ``force``, as for
             `pdtui.driving.session_replay.replay_session`.
 
@@ -247,4 +247,5 @@ def replay(
         PdtuiError: The session cannot be read, or the robot or the policy cannot be loaded.
     """
     given = str(policy or "") if policy is None or isinstance(policy, str | Path) else policy
-    return replay_session(Path(session), policy=given, robot=robot, **judging)
+    with progress_bar("replaying", quiet=not progress) as advance:
+        return replay_session(Path(session), policy=given, robot=robot, progress=advance, **judging)

@@ -49,7 +49,7 @@ class SessionReplayFixture:
         policy: str | Path | nn.Module | Policy | None = None,
         robot: Robot | None = None,
         strict: bool = False,
-        **tolerance: float,
+        **tolerance: Any,
     ) -> ReplayResult:
         # Imported here, so that only tests that replay a drive load torch and a simulator.
         from pdtui.api import replay

@@ -58,6 +58,9 @@ _KEPT = 1 << 20
 _HELP = "↵ close".encode()
 """On the frame of the help."""
 
+_PAST = b" steps ago"
+"""In the status line while the past is shown."""
+
 _PACE = re.compile("(?:▶|⏸ (paused) at) ([0-9.]+)×".encode())
 _QUERY, _ANSWER, _FRAME = b"\x1b[?2026$p", b"\x1b[?2026;2$y", b"\x1b[?2026h"
 """Asked whether frames may be bracketed; asked so, the program brackets them, and they can be counted."""
@@ -158,6 +161,8 @@ class Terminal:
             paused, speed = paces[-1] if paces else (b"", b"")
             if _HELP in self.seen:
                 self.send(b"\x1b")
+            elif _PAST in self.seen:
+                self.send(b"\x1b[F")
             elif not paces:
                 continue
             elif paused:

@@ -1,6 +1,7 @@
 """What a terminal may send, drawn at random: keys, clicks, scrolls, pasted text and garbage.
 
-Nothing drawn here quits the drive: neither q nor ctrl+c is among it, except in pasted text.
+Nothing drawn here quits the drive or branches off it, which would drive everything again: neither q nor
+ctrl+c nor ctrl+n is among it, except in pasted text.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ DRIVING = (
     *(b"w", b"t", b"h", b" ", b"w", b"t", b"h", b" "),  # the map's own
     *(b"\x1b[A", b"\x1b[B", b"\x1b[C", b"\x1b[D", b"+", b"-", b"r", b"\x7f"),
     *(b"p", b"p", b"n", b",", b".", b"v", b"?", b"?", b"z", b"\t"),
+    *(b"<", b"\x1b[F", b"\x1b[F"),  # into the past, and back
 )
-_CONTROL = [bytes([code]) for code in range(0x20) if code not in (0x03, 0x1B)]
+_CONTROL = [bytes([code]) for code in range(0x20) if code not in (0x03, 0x0E, 0x1B)]
 _FUNCTION = [b"\x1bO" + bytes([code]) for code in b"PQRSABCDFH"] + [
     b"\x1b[%d%s~" % (code, modifier) for code in range(1, 35) for modifier in (b"", b";2", b";5", b";3")
 ]

@@ -158,6 +158,17 @@ def test_units_hold_anymals_heading_nearly_as_well_as_its_command() -> None:
 
 
 @pytest.mark.slow
+def test_an_operator_brings_cassie_over_courses_that_it_cannot_cross_alone() -> None:
+    figures = _figures("evaluate", "cassie", "--experiment", "parkour", "--seeds", "120-139")
+    rows = {row["condition"]: row for row in figures["conditions"]}  # type: ignore[attr-defined]
+    assert rows["alone"]["crossed"] == 0
+    assert rows["with an operator"]["crossed"] >= 15
+    assert rows["with an operator"]["involvement"] <= 0.05
+    for row in figures["passages"]:  # type: ignore[attr-defined]
+        assert row["condition"] != "alone" or row["passed"] == 0, row
+
+
+@pytest.mark.slow
 def test_an_operator_takes_the_a1_farther_than_it_comes_alone() -> None:
     figures = _figures("evaluate", "a1", "--experiment", "forest", "--seeds", "100-119")
     rows = {row["condition"]: row for row in figures["conditions"]}  # type: ignore[attr-defined]

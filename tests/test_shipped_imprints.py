@@ -55,3 +55,32 @@ def test_the_walker_stands_and_runs_on() -> None:
     assert drive["speed"][150:250].mean() > 2.5
     assert drive["speed"][550:750].mean() < 0.5
     assert drive["speed"][-50:].mean() > 2.0
+
+
+@pytest.mark.parametrize(("there", "back", "sign"), [("left", "right", 1), ("right", "left", -1)])
+def test_cassie_turns_by_ninety_degrees_and_back(there: str, back: str, sign: int) -> None:
+    keys = {100: "h"} | {101 + n: there for n in range(6)} | {500 + n: back for n in range(6)}
+    drive = pdtui.drive("cassie", keys=keys, steps=900, seed=SEED)
+    assert not drive.endings
+    before = drive["yaw"][99]
+    turned = [
+        (drive["yaw"][part] - before + np.pi) % (2 * np.pi) - np.pi
+        for part in (slice(400, 500), slice(800, 900))
+    ]
+    assert np.mean(turned[0]) == pytest.approx(sign * np.pi / 2, abs=0.3)
+    assert np.mean(turned[1]) == pytest.approx(0.0, abs=0.3)
+
+
+@pytest.mark.parametrize(("key", "sign"), [("j", 1), ("l", -1)])
+def test_cassie_steps_aside(key: str, sign: int) -> None:
+    drive = pdtui.drive("cassie", keys={100: key}, steps=300, seed=SEED)
+    assert not drive.endings
+    assert 0.25 < sign * drive["vy"][150:].mean() < 0.8
+    assert drive["vx"][150:].mean() < 0.6
+
+
+def test_cassie_ducks_and_walks_on() -> None:
+    drive = pdtui.drive("cassie", keys={100: "c"}, steps=400, seed=SEED)
+    assert not drive.endings
+    assert drive["height"][60:100].mean() - drive["height"][130:175].mean() > 0.07
+    assert drive["forward"][-100:].mean() > 0.8

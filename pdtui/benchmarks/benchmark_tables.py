@@ -10,7 +10,7 @@ from pdtui.benchmarks.dissection_benchmark import DissectionBenchmark
 from pdtui.benchmarks.recording_benchmark import MemoryBenchmark, RecordingBenchmark
 from pdtui.benchmarks.rollout_benchmark import RolloutBenchmark
 from pdtui.benchmarks.screen_benchmark import ScreenBenchmark
-from pdtui.core.text_tables import new_table
+from pdtui.core.console.text_tables import new_table
 
 
 def loop_benchmark_table(result: ControlLoopBenchmark) -> Table:
@@ -111,4 +111,10 @@ def screen_benchmark_table(result: ScreenBenchmark) -> Table:
     table.add_row(
         f"CPU time of the screen's process over {result.seconds:g} s", f"{result.cpu_share:.0%} of one core"
     )
+    for name, times in (("key to its echo", result.echo), ("key to the drive's answer", result.confirmation)):
+        if times:
+            table.add_row(
+                f"{name}, of {len(times)}: median, largest",
+                f"{1000 * times[len(times) // 2]:.0f} ms, {1000 * times[-1]:.0f} ms",
+            )
     return table

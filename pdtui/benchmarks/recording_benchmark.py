@@ -15,7 +15,7 @@ from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.drive_server import PACED_ROWS_PER_WRITE
+from pdtui.driving.drive_recording import PACED_ROWS_PER_WRITE
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.session_replay import replay_session
 from pdtui.sessions.drive_info import DriveInfo

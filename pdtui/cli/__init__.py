@@ -11,6 +11,7 @@ import click
 
 from pdtui import __version__
 from pdtui.cli.command_group import LazyCommandGroup
+from pdtui.cli.completion import shell_scripts as _shell_scripts  # noqa: F401 - completes Bash by it
 
 COMMANDS = {
     "drive": "Drive a robot with the keys of its map.",
@@ -18,6 +19,9 @@ COMMANDS = {
     "maps": "List the maps.",
     "replay": "Repeat a session and compare every step.",
     "guide": "Read the guide.",
+    "serve": "Show the screen in a browser.",
+    "config": "Print the settings, and what they do.",
+    "completion": "Print a script for completion in the shell.",
     "sessions": "List, inspect, verify, repair and export sessions.",
     "evaluate": "Measure what the behaviors of a map do.",
     "dissect": "Find the units that steer a robot; write a map.",
@@ -29,11 +33,14 @@ COMMANDS = {
     "bench": "Measure speed and memory.",
 }
 """The summary of each command in `pdtui --help`; `pdtui.cli.NAME_command` has the command."""
+ABOUT_PROGRAM = ("robots", "maps", "guide", "serve", "config", "completion")
+"""Commands that are in the package `pdtui.cli.program` instead."""
 
 
 @click.group(
     cls=LazyCommandGroup,
     summaries=COMMANDS,
+    packages=dict.fromkeys(ABOUT_PROGRAM, "program"),
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -42,11 +49,11 @@ COMMANDS = {
 def main(ctx: click.Context) -> None:
     """Drive a trained neural controller by stimulating its hidden units.
 
-    Without a command, choose a robot and a map and drive.
+    Without a command, the home screen lists robots, maps, recent sessions and reports.
     """
     # A policy computes with one thread; PyTorch, which is not loaded yet, then need not switch in every step.
     os.environ.setdefault("MKL_NUM_THREADS", "1")
     if ctx.invoked_subcommand is None:
-        from pdtui.cli.drive_command import pick_and_drive
+        from pdtui.cli.screen.home import show_home
 
-        pick_and_drive()
+        show_home()

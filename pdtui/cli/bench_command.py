@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_robots
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.options.shared_options import (
     build_drive_config,
@@ -16,7 +17,8 @@ from pdtui.cli.options.shared_options import (
     own_policy_option,
     record_activations_option,
 )
-from pdtui.cli.output.command_output import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.sessions.session_schema import ActivationsKept
 
 
@@ -29,7 +31,7 @@ def bench_command() -> None:
 
 
 @bench_command.command("loop")
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @map_option
 @integer_option("--steps", least=100, default=5000, help="Number of control steps per round.")
@@ -48,7 +50,7 @@ def bench_loop_command(
 
 
 @bench_command.command("dissect")
-@click.argument("robot", default="ant")
+@click.argument("robot", default="ant", shell_complete=complete_robots)
 @robot_option_flag
 @own_policy_option
 @integer_option("--episodes", most=100, default=5, help="Number of episodes to record.")
@@ -99,7 +101,7 @@ def bench_rollouts_command(
 
 
 @bench_command.command("record")
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @map_option
 @integer_option("--steps", least=100, default=6000, help="Number of control steps per drive.")
@@ -118,7 +120,7 @@ def bench_record_command(
 
 
 @bench_command.command("memory")
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @map_option
 @integer_option(
@@ -148,7 +150,7 @@ def bench_memory_command(
 
 
 @bench_command.command("screen")
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @map_option
 @click.option(
@@ -163,13 +165,17 @@ def bench_memory_command(
 def bench_screen_command(
     robot: str, robot_options: tuple[str, ...], map_name: str | None, seconds: float, as_json: bool
 ) -> None:
-    """Measure the time to the first frame and the screen's CPU time."""
+    """Measure the time to the first frame, the screen's CPU time, and the time from a key to its echo."""
     from pdtui.benchmarks.benchmark_tables import screen_benchmark_table
     from pdtui.benchmarks.screen_benchmark import bench_screen
 
     # An error shows before the screen starts.
-    build_drive_config(robot, map_name, "", robot_options=robot_options)
+    drive_map = build_drive_config(robot, map_name, "", robot_options=robot_options).stimulation_map
     arguments = [robot, "--no-record", *(["--map", map_name] if map_name else [])]
     arguments += [part for text in robot_options for part in ("--robot-option", text)]
-    result = bench_screen(arguments, seconds)
+    behaviors = drive_map.behaviors.values()
+    lasting = [one.key for one in behaviors if one.period is None and one.onset is None]
+    sent = [" " if key == "space" else key for key in (*lasting[:1], drive_map.default_key)]
+    typed = len(sent) == 2 and all(len(key) == 1 for key in sent)
+    result = bench_screen(arguments, seconds, sent if typed else ())
     print_result(asdict(result), as_json, lambda: screen_benchmark_table(result))

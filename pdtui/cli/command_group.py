@@ -9,6 +9,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from pdtui.core.errors import PdtuiError
 from pdtui.core.printable_text import make_printable
@@ -26,11 +27,14 @@ class LazyCommandGroup(click.Group):
     """Imports a command's module when the command is used, and prints expected errors as one line.
 
     `summaries` gives the summary of each command NAME, which is `NAME_command` in `pdtui.cli.NAME_command`.
+    `packages` gives the package of `pdtui.cli` that has the module instead.
     """
 
-    def __init__(self, *, summaries: Mapping[str, str], **arguments: Any) -> None:
+    def __init__(
+        self, *, summaries: Mapping[str, str], packages: Mapping[str, str], **arguments: Any
+    ) -> None:
         super().__init__(**arguments)
-        self._summaries = summaries
+        self._summaries, self._packages = summaries, packages
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         return list(self._summaries)
@@ -38,9 +42,19 @@ class LazyCommandGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         if cmd_name not in self._summaries:
             return None
-        command = resolve_name(f"pdtui.cli.{cmd_name}_command:{cmd_name}_command")
+        package = f"pdtui.cli.{self._packages[cmd_name]}" if cmd_name in self._packages else "pdtui.cli"
+        command = resolve_name(f"{package}.{cmd_name}_command:{cmd_name}_command")
         assert isinstance(command, click.Command)
         return command
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[Any]]:
+        """Complete names without importing the commands."""
+        found = [
+            CompletionItem(name, help=summary)
+            for name, summary in self._summaries.items()
+            if name.startswith(incomplete)
+        ]
+        return found + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List names and summaries without importing the commands."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_maps, complete_robots
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.options.shared_options import (
     FILE_PATH,
@@ -20,11 +21,13 @@ from pdtui.cli.options.shared_options import (
     search_seed_option,
     workers_option,
 )
-from pdtui.cli.output.command_output import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result
+from pdtui.core.console.progress_bar import progress_bar
+from pdtui.core.settings.settings_file import own_folder
 
 
 @click.command()
-@click.argument("robot", required=False)
+@click.argument("robot", required=False, shell_complete=complete_robots)
 @click.option(
     "--env",
     metavar="ID",
@@ -63,7 +66,14 @@ from pdtui.cli.output.command_output import print_result, progress_bar
     metavar="FILE.rrd",
     help="File of the report for the Rerun viewer; default: the map's name with .rrd.",
 )
-@click.option("--figures", type=FILE_PATH, metavar="FOLDER", help="Also draw figures as PNG files.")
+@click.option("--figures", type=FILE_PATH, metavar="FOLDER", help="Also draw figures into this folder.")
+@click.option(
+    "--figure-format",
+    type=click.Choice(["png", "pdf", "svg"]),
+    default="png",
+    show_default=True,
+    help="Format of these figures.",
+)
 @click.option(
     "--null",
     is_flag=True,
@@ -74,6 +84,7 @@ from pdtui.cli.output.command_output import print_result, progress_bar
 @click.option(
     "--start-from",
     metavar="MAP",
+    shell_complete=complete_maps,
     help="Also begin the searches from the behaviors of this map, given by name or file.",
 )
 @minutes_option("--budget", note=" Every unit is screened even if that takes longer.")
@@ -88,6 +99,7 @@ def dissect_command(
     quick: bool,
     report: Path | None,
     figures: Path | None,
+    figure_format: str,
     null: bool,
     overwrite: bool,
     budget: float | None,
@@ -109,8 +121,8 @@ def dissect_command(
     name = str(robot or env)
     trust_module(name)
     world = RobotSpec(name, parse_robot_options(require_robot_name(name), robot_options))
-    output = output or Path("maps") / f"{robot_file_stem(name)}-dissected.toml"
-    outputs = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite)
+    output = output or own_folder("maps") / f"{robot_file_stem(name)}-dissected.toml"
+    outputs = PictureOutputs(report or output.with_suffix(".rrd"), figures, overwrite, figure_format)
     if not null:
         outputs.check()
     with progress_bar("dissecting", quiet=as_json) as advance:

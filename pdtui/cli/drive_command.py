@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import replace
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_robots
+from pdtui.cli.options.ghost_options import ghost_options
 from pdtui.cli.options.robot_option_flag import robot_option_flag
+from pdtui.cli.options.screen_options import screen_options
 from pdtui.cli.options.shared_options import (
     FILE_PATH,
     build_drive_config,
@@ -22,7 +25,10 @@ from pdtui.cli.options.shared_options import (
     record_activations_option,
     start_option,
 )
-from pdtui.core.errors import KeystrokeError, ScreenError, SessionError
+from pdtui.cli.screen.session_names import record_into_new_session
+from pdtui.cli.screen.show_drive import show_drive
+from pdtui.core.console.progress_bar import progress_bar
+from pdtui.core.errors import KeystrokeError, SessionError
 from pdtui.core.outcome import describe_outcomes
 from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
@@ -30,14 +36,16 @@ from pdtui.sessions.viewer.viewer_address import LOCAL, PORT, ViewerAddress
 from pdtui.sessions.writer.session_file import SYNC_MODES
 
 if TYPE_CHECKING:
+    from pdtui.core.settings.user_settings import UserSettings
     from pdtui.driving.drive_config import DriveConfig
 
 
 @click.command()
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @map_option
 @map_policy_option
+@ghost_options
 @import_option_flags
 @force_option
 @integer_option("--seed", least=0, most=2**31 - 1, default=0, help="Seed of every random choice.")
@@ -66,15 +74,21 @@ if TYPE_CHECKING:
     metavar="[PORT|HOST[:PORT]]",
     help=f"Also show the drive in a Rerun viewer that listens at this address; default: {LOCAL}:{PORT}.",
 )
-@integer_option("--fps", most=60, default=12, help="Number of frames per second on the screen.")
+@screen_options
 @click.option("--headless", is_flag=True, help="Drive without a screen, as fast as possible.")
 @click.option(
     "--keys",
     type=FILE_PATH,
     metavar="FILE",
-    help="Keystroke file to drive from with --headless; each line is 'STEP KEY'.",
+    help="Keystroke file to drive from with --headless; each line is 'STEP KEY' or 'STEP EDIT'.",
 )
 @integer_option("--steps", default=1000, help="Number of control steps to drive with --headless.")
+@click.option(
+    "--minutes",
+    type=click.FloatRange(0, min_open=True),
+    metavar="MINUTES",
+    help="End a drive with --headless after this time, with the steps done so far.",
+)
 def drive_command(
     robot: str,
     map_name: str | None,
@@ -84,14 +98,17 @@ def drive_command(
     overwrite: bool,
     no_record: bool,
     viewer: str | None,
-    fps: int,
+    settings: UserSettings,
     headless: bool,
     keys: Path | None,
     steps: int,
+    add_ghost: Callable[[DriveConfig], DriveConfig],
+    minutes: float | None,
     **options: Any,
 ) -> None:
     """Drive ROBOT with the keys of its map. ROBOT may also be a map file."""
     config = build_drive_config(robot, map_name, policy, import_options, without_map=True, **options)
+    config = add_ghost(config)
     if record is not None and record.exists() and not overwrite:
         raise SessionError(f"{record}: already exists; --overwrite replaces it")
     if overwrite and record is None:
@@ -101,7 +118,7 @@ def drive_command(
     if record is not None:
         config = replace(config, recording=str(record), existing="replace" if overwrite else "refuse")
     elif not no_record:
-        config = _record_into_new_session(config)
+        config = record_into_new_session(config)
     if keys is not None and not headless:
         raise KeystrokeError("--keys needs --headless; on the screen, keys are pressed by hand")
     if viewer is not None:
@@ -109,20 +126,12 @@ def drive_command(
             raise SessionError("--viewer shows the recording, so it cannot be used with --no-record")
         config = replace(config, viewer=ViewerAddress.parse(viewer))
     if headless:
-        _drive_headless(config, keys, steps)
+        _drive_headless(config, keys, steps, minutes)
     else:
-        show_drive(config, fps=fps)
+        show_drive(config, settings)
 
 
-def _record_into_new_session(config: DriveConfig) -> DriveConfig:
-    """Return the drive with a name for its session, to which a number is appended if it is taken."""
-    from pdtui.robots import robot_file_stem
-
-    name = f"{robot_file_stem(config.robot)}-{datetime.now():%Y%m%d-%H%M%S}-seed{config.seed}.rrd"
-    return replace(config, recording=str(Path("sessions") / name), existing="number")
-
-
-def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
+def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, minutes: float | None) -> None:
     from pdtui.driving.headless_drive import catch_ending_signals, drive_headless
     from pdtui.driving.keystrokes import read_keystrokes
     from pdtui.driving.loop_builder import build_control_loop
@@ -138,8 +147,8 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
     if config.recording:
         path, existing = Path(config.recording), config.existing
         recorder = SessionRecorder(path, info, viewer=viewer, existing=existing, sync=config.sync)
-    with catch_ending_signals() as ended:
-        summary = drive_headless(loop, presses, steps, recorder, ended)
+    with catch_ending_signals() as ended, progress_bar("driving", quiet=not sys.stderr.isatty()) as advance:
+        summary = drive_headless(loop, presses, steps, recorder, ended, progress=advance, minutes=minutes)
     takeover = " or a takeover" if loop.robot.manual_controls else ""
     cost = f"cost {summary.cost:g}, " if summary.cost else ""
     click.echo(
@@ -152,42 +161,3 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int) -> None:
         if recorder.notice:
             click.echo(make_printable(recorder.notice), err=True)
         click.echo(make_printable(f"recorded in {recorder.path}"))
-
-
-def show_drive(config: DriveConfig, *, fps: int = 12, watching: bool = False) -> None:
-    """Start the simulation's process, then show it on the screen."""
-    require_terminal()
-    from pdtui.driving.drive_client import DriveClient
-
-    connection = DriveClient(config)
-    try:
-        from pdtui.tui.drive_app import DriveApp
-
-        if not watching:
-            click.echo(make_printable(f"starting {config.robot} …"), err=True)
-        connection.wait_until_started()
-        app = DriveApp(connection, config.stimulation_map, fps=fps, watching=watching)
-        message = app.run()
-    finally:
-        last_words = connection.close()
-    if app.return_code or connection.failed:
-        said = message or last_words
-        raise ScreenError(said if connection.recording in said else f"{said}; {last_words}")
-    click.echo(make_printable(last_words))
-
-
-def pick_and_drive() -> None:
-    """Let the user choose a map, then drive with it."""
-    require_terminal()
-    from pdtui.stimulation.map_library import list_maps
-    from pdtui.tui.map_picker import MapPickerApp, map_picker_rows
-
-    chosen = MapPickerApp(map_picker_rows(list_maps())).run()
-    if chosen is not None:
-        show_drive(_record_into_new_session(build_drive_config(str(chosen), None, "")))
-
-
-def require_terminal() -> None:
-    """Raise a `ScreenError` unless standard input and output are a terminal."""
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise ScreenError("the screen needs a terminal; use --headless to drive without one")

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_maps, complete_robots
 from pdtui.cli.evaluate.paper_experiments import (
     EXPERIMENTS,
     check_experiment,
@@ -42,8 +43,8 @@ from pdtui.policies.weights.import_options import ImportOptions
 
 @experiment_options
 @click.command()
-@click.argument("robot")
-@click.argument("others", nargs=-1, metavar="[MAP.toml]...")
+@click.argument("robot", shell_complete=complete_robots)
+@click.argument("others", nargs=-1, metavar="[MAP.toml]...", shell_complete=complete_maps)
 @robot_option_flag
 @map_option
 @map_policy_option

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_robots
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.options.shared_options import (
     FILE_PATH,
@@ -16,7 +17,7 @@ from pdtui.cli.options.shared_options import (
     own_policy_option,
     preset_option,
 )
-from pdtui.cli.output.command_output import progress_bar
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.printable_text import make_printable
 
 
@@ -26,7 +27,7 @@ def figure_command() -> None:
 
 
 @figure_command.command("episode")
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @own_policy_option
 @import_option_flags

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_robots, complete_tasks
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.options.shared_options import (
     FILE_PATH,
@@ -19,12 +20,14 @@ from pdtui.cli.options.shared_options import (
     search_seed_option,
     workers_option,
 )
-from pdtui.cli.output.command_output import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result
+from pdtui.core.console.progress_bar import progress_bar
+from pdtui.core.settings.settings_file import own_folder
 
 
 @click.command()
-@click.argument("robot")
-@click.argument("task")
+@click.argument("robot", shell_complete=complete_robots)
+@click.argument("task", shell_complete=complete_tasks)
 @robot_option_flag
 @own_policy_option
 @import_option_flags
@@ -73,7 +76,7 @@ def pursue_command(
             world,
             task,
             policy or robot,
-            output or Path("maps") / f"{robot_file_stem(robot)}-dissected.toml",
+            output or own_folder("maps") / f"{robot_file_stem(robot)}-dissected.toml",
             settings=settings if units is None else replace(settings, screen_units=units),
             progress=advance,
             **search,

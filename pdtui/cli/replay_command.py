@@ -10,11 +10,14 @@ from typing import Any
 
 import click
 
-from pdtui.cli.drive_command import show_drive
+from pdtui.cli.completion.completed_names import complete_sessions
+from pdtui.cli.options.screen_options import screen_options
 from pdtui.cli.options.shared_options import FILE_PATH, policy_option
-from pdtui.cli.output.command_output import progress_bar
+from pdtui.cli.screen.show_drive import show_drive
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.errors import SessionError
 from pdtui.core.printable_text import make_printable
+from pdtui.core.settings.user_settings import UserSettings
 
 
 def replay_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -40,10 +43,11 @@ def replay_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @click.command()
-@click.argument("session", type=FILE_PATH)
+@click.argument("session", type=FILE_PATH, shell_complete=complete_sessions)
 @click.option("--watch", is_flag=True, help="Show the replay on the screen, at the pace of the drive.")
+@screen_options
 @replay_options
-def replay_command(session: Path, watch: bool, options: dict[str, Any]) -> None:
+def replay_command(session: Path, watch: bool, settings: UserSettings, options: dict[str, Any]) -> None:
     """Run SESSION again and compare every step.
 
     Exit codes: 0 if the drive repeats; 1 if it does not, or cannot be replayed.
@@ -56,7 +60,7 @@ def replay_command(session: Path, watch: bool, options: dict[str, Any]) -> None:
         recorded = read_session_header(session)
         if recorded.steps == 0:
             raise SessionError(f"{session}: no control step is recorded, so there is nothing to watch")
-        show_drive(config_from_session(recorded, str(session), options["policy"]), watching=True)
+        show_drive(config_from_session(recorded, str(session), options["policy"]), settings, watching=True)
         return
     with progress_bar("replaying") as advance:
         result = replay_session(session, progress=advance, **options)

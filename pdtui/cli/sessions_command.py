@@ -9,17 +9,20 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_sessions
 from pdtui.cli.options.shared_options import FILE_PATH, json_option
-from pdtui.cli.output.command_output import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result
 from pdtui.cli.replay_command import replay_options
 from pdtui.cli.sessions.export_subcommand import export_command
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.printable_text import make_printable, to_json
+from pdtui.core.settings.settings_file import own_folder
 
 BROKEN, DIFFERS = 1, 3
 """Exit codes."""
 _SHOWN = ("robot", "policy", "seed", "stochastic", "start", "layers", "activations")
-_file_argument = click.argument("file", type=FILE_PATH)
+_file_argument = click.argument("file", type=FILE_PATH, shell_complete=complete_sessions)
 
 
 @click.group()
@@ -31,7 +34,7 @@ sessions_command.add_command(export_command)
 
 
 @sessions_command.command("list")
-@click.argument("folder", type=FILE_PATH, default="sessions")
+@click.argument("folder", type=FILE_PATH, default=lambda: str(own_folder("sessions")))
 @json_option
 def list_command(folder: Path, as_json: bool) -> None:
     """List the sessions under FOLDER, and say what is wrong with broken ones."""
@@ -83,6 +86,7 @@ def show_command(file: Path, as_json: bool) -> None:
         "robot_options": dict(session.info.robot_options),
         "policy_sha256": session.info.policy_hash,
         **{name: getattr(session.info, name) for name in _SHOWN},
+        "branch": None if session.info.branch is None else asdict(session.info.branch),
         "map": session.info.map_text,
         "created": session.created,
         "outcome": session.outcome,
@@ -95,7 +99,7 @@ def show_command(file: Path, as_json: bool) -> None:
 
 
 @sessions_command.command()
-@click.argument("files", type=FILE_PATH, nargs=-1, required=True)
+@click.argument("files", type=FILE_PATH, nargs=-1, required=True, shell_complete=complete_sessions)
 @click.option("--no-replay", is_flag=True, help="Only compare the checksums, which needs no policy.")
 @replay_options
 @json_option
@@ -172,20 +176,38 @@ def repair_command(file: Path, output: Path | None, in_place: bool) -> None:
 
 
 @sessions_command.command()
-@click.argument("a", type=FILE_PATH)
-@click.argument("b", type=FILE_PATH)
+@click.argument("a", type=FILE_PATH, shell_complete=complete_sessions)
+@click.argument("b", type=FILE_PATH, shell_complete=complete_sessions)
+@click.option(
+    "--figure", type=FILE_PATH, metavar="FILE", help="Also draw both: a new .png, .pdf or .svg file."
+)
 @json_option
-def compare_command(a: Path, b: Path, as_json: bool) -> None:
-    """Compare sessions A and B step by step, in every stream.
+def compare_command(a: Path, b: Path, figure: Path | None, as_json: bool) -> None:
+    """Compare sessions A and B step by step, in every stream: two branches of a drive, for example.
 
     Exit codes: 0 if they are identical; 3 if they differ.
     """
     from pdtui.cli.output import session_tables
-    from pdtui.sessions.session_comparison import compare_sessions
+    from pdtui.sessions.comparison.session_comparison import compare_sessions
+    from pdtui.sessions.drive_path import compare_drive_paths, read_drive_path
     from pdtui.sessions.session_header import read_session_header
 
-    result = compare_sessions(read_session_header(a), read_session_header(b))
-    print_result(asdict(result), as_json, lambda: session_tables.session_comparison_table(result))
+    if figure is not None:
+        from pdtui.pictures.matplotlib_page import check_figure_path
+
+        check_figure_path(figure, overwrite=False)
+    headers = read_session_header(a), read_session_header(b)
+    result = compare_sessions(*headers)
+    courses = read_drive_path(headers[0]), read_drive_path(headers[1])
+    apart = result.first_difference is not None
+    paths = compare_drive_paths(*courses, result.first_difference or 0) if apart else ()
+    data = {**asdict(result), "paths": [asdict(row) for row in paths]}
+    print_result(data, as_json, lambda: session_tables.session_comparison_table(result, headers, paths))
+    if figure is not None:
+        from pdtui.pictures.session_figure import draw_session_comparison
+
+        draw_session_comparison(figure, headers, courses, result)
+        click.echo(make_printable(f"wrote {figure}"), err=True)
     if result.first_difference is not None or result.lengths[0] != result.lengths[1]:
         sys.exit(DIFFERS)
 
@@ -196,11 +218,7 @@ def compare_command(a: Path, b: Path, as_json: bool) -> None:
 def open_command(file: Path, web: bool) -> None:
     """Open FILE in the Rerun viewer, which listens on 127.0.0.1 only."""
     from pdtui.sessions.session_header import read_session_header
-    from pdtui.sessions.viewer.viewer_address import viewer_command_line
-    from pdtui.sessions.viewer.viewer_process import CANNOT_START, run_viewer
+    from pdtui.sessions.viewer.viewer_window import show_in_viewer
 
     read_session_header(file)  # for a file that is no session, the viewer would show an empty window
-    code = run_viewer(viewer_command_line(file, web=web))
-    if code:
-        how = "cannot be started" if code == CANNOT_START else f"ended with code {code}"
-        raise SessionError(f"{file}: the viewer {how}")
+    show_in_viewer(file, web=web)

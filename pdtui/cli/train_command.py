@@ -7,9 +7,10 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_robots
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.options.shared_options import FILE_PATH, integer_option
-from pdtui.cli.output.command_output import progress_bar
+from pdtui.core.console.progress_bar import progress_bar
 
 
 def _parse_layers(text: str | None) -> tuple[int, ...] | None:
@@ -22,7 +23,7 @@ def _parse_layers(text: str | None) -> tuple[int, ...] | None:
 
 
 @click.command()
-@click.argument("robot")
+@click.argument("robot", shell_complete=complete_robots)
 @robot_option_flag
 @integer_option("--seed", least=0, most=2**31 - 1, default=0, help="Seed of every random choice.")
 @integer_option(
@@ -55,7 +56,13 @@ def _parse_layers(text: str | None) -> tuple[int, ...] | None:
 @click.option(
     "--initial-policy",
     metavar="FILE",
-    help="Weights file or shipped policy that PPO starts from. One with other layers is imitated first.",
+    help="Weights file or shipped policy that the run starts from. PPO imitates one with other layers first, "
+    "and SAC imitates any.",
+)
+@integer_option(
+    "--imitation-rounds",
+    most=1000,
+    help="Rounds of imitation at the start, of 500 control steps of every world; default: 3.",
 )
 @click.option(
     "--forward",

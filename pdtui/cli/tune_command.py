@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_behaviors, complete_maps
 from pdtui.cli.options.robot_option_flag import robot_option_flag
 from pdtui.cli.options.shared_options import (
     SeedList,
@@ -18,15 +19,16 @@ from pdtui.cli.options.shared_options import (
     minutes_option,
     workers_option,
 )
-from pdtui.cli.output.command_output import describe_map_copy, print_result, progress_bar
+from pdtui.cli.output.command_output import describe_map_copy, print_result
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.errors import MapError
 from pdtui.core.printable_text import make_printable
 from pdtui.policies.weights.import_options import ImportOptions
 
 
 @click.command()
-@click.argument("map_name", metavar="MAP")
-@click.argument("behaviors", nargs=-1, metavar="[BEHAVIOR]...")
+@click.argument("map_name", metavar="MAP", shell_complete=complete_maps)
+@click.argument("behaviors", nargs=-1, metavar="[BEHAVIOR]...", shell_complete=complete_behaviors)
 @click.option("--all", "every", is_flag=True, help="Tune every behavior of mode pid.")
 @robot_option_flag
 @map_policy_option

@@ -19,10 +19,13 @@ class DriveEvent:
             `value` times the map's; ``takeover`` takes over all manual controls, at 0; ``control`` sets the
             control `name` to `value`, and takes it over if it was not; ``hand back`` hands all controls back
             to the policy; ``reset`` starts the next episode; ``rewind`` restores the state before step
-            `value`.
-        name: name of the behavior or of the control.
-        value: target, factor, value of the control, or step.
-        key: the key that the operator pressed; empty if the event has another cause.
+            `value`. Those of the unit bench are ``unit``, which holds unit `name` at `value`, and ``free``,
+            which lets it go; ``beside`` latches `name` and ends no other; ``release`` lets go of `name`
+            alone; ``mute`` and ``unmute``; ``order`` moves `name` to place `value` of the stack, 0 for the
+            lowest; ``kp``, ``ki`` and ``kd`` set a gain of `name`.
+        name: name of the behavior or of the control, or address of the unit.
+        value: target, factor, value of the control, step, output v of the unit, place, or gain.
+        key: the key that the operator pressed, `EDIT_KEY` for an edit; empty if the event has another cause.
     """
 
     step: int

@@ -52,6 +52,10 @@ class PictureError(PdtuiError):
     """A picture cannot be drawn or written."""
 
 
+class SettingsError(PdtuiError):
+    """The user's settings are malformed, or name something that does not exist."""
+
+
 class ScreenError(PdtuiError):
     """The terminal cannot show the screen."""
 

@@ -11,7 +11,25 @@ from dataclasses import dataclass
 from typing import Literal
 
 EventKind = Literal[
-    "behavior", "default", "target", "factor", "takeover", "control", "hand back", "reset", "rewind"
+    "behavior",
+    "default",
+    "target",
+    "factor",
+    "takeover",
+    "control",
+    "hand back",
+    "reset",
+    "rewind",
+    "unit",
+    "free",
+    "beside",
+    "release",
+    "mute",
+    "unmute",
+    "order",
+    "kp",
+    "ki",
+    "kd",
 ]
 
 
@@ -25,6 +43,16 @@ EVENT_WORDINGS: dict[EventKind, str] = {
     "hand back": "handed back to the policy",
     "reset": "next episode started",
     "rewind": "rewound to step {value:.0f}",
+    "unit": "unit {name} held at {value:.4g}",
+    "free": "unit {name} let go",
+    "beside": "behavior '{name}' latched beside the others",
+    "release": "behavior '{name}' let go",
+    "mute": "behavior '{name}' muted",
+    "unmute": "behavior '{name}' acts again",
+    "order": "behavior '{name}' moved to place {value:.0f} of the stack",
+    "kp": "gain kp of '{name}' set to {value:.4g}",
+    "ki": "gain ki of '{name}' set to {value:.4g}",
+    "kd": "gain kd of '{name}' set to {value:.4g}",
 }
 """What each kind of event does, in words that may contain ``{name}`` and ``{value}`` of the event."""
 JUMPS = ("reset", "rewind")
@@ -94,8 +122,94 @@ KEY_TABLE = (
         hint="ghost",
         hint_rank=5,
     ),
+    ReservedKey(
+        "bench",
+        "ctrl+e",
+        "opens or closes the unit bench, to edit hidden units",
+        action="bench('toggle')",
+        hint="bench",
+        hint_rank=5,
+    ),
+    ReservedKey(
+        "layer_before", "pageup", "shows the layers before in the strip", action="bench('layer before')"
+    ),
+    ReservedKey("next_layer", "pagedown", "shows the next layers in the strip", action="bench('next layer')"),
     ReservedKey("zoom_in", "right_square_bracket", "shows less of the path", action="zoom_path(-1)"),
     ReservedKey("zoom_out", "left_square_bracket", "shows more of the path", action="zoom_path(1)"),
+    ReservedKey(
+        "seek_back",
+        "less_than_sign",
+        "shows the run a second earlier",
+        action="pane('timeline', 'back')",
+        hint="earlier",
+        hint_rank=13,
+    ),
+    ReservedKey(
+        "seek_forward",
+        "greater_than_sign",
+        "shows the run a second later",
+        action="pane('timeline', 'forward')",
+        hint="later",
+        hint_rank=14,
+    ),
+    ReservedKey(
+        "mark_back",
+        "left_curly_bracket",
+        "shows the run at the key or the ending before",
+        action="pane('timeline', 'earlier mark')",
+    ),
+    ReservedKey(
+        "mark_forward",
+        "right_curly_bracket",
+        "shows the run at the next key or ending",
+        action="pane('timeline', 'later mark')",
+    ),
+    ReservedKey(
+        "seek_oldest", "home", "shows the oldest step that is kept", action="pane('timeline', 'oldest')"
+    ),
+    ReservedKey(
+        "seek_last",
+        "end",
+        "returns to the present, or to the end of a recording",
+        action="pane('timeline', 'last')",
+    ),
+    # Not ctrl+b, which many who work in tmux could not press.
+    ReservedKey(
+        "branch",
+        "ctrl+n",
+        "begins a new session from the step that is shown",
+        action="pane('timeline', 'branch')",
+        hint="branch",
+        hint_rank=15,
+    ),
+    ReservedKey(
+        "spectra",
+        "ctrl+f",
+        "opens or closes the spectrograms of an attribute and a unit",
+        action="pane('spectra', 'open')",
+        hint="spectra",
+        hint_rank=16,
+    ),
+    ReservedKey(
+        "spectra_attribute",
+        "f3",
+        "shows the spectrogram of the next attribute",
+        action="pane('spectra', 'attribute')",
+    ),
+    ReservedKey(
+        "spectra_unit",
+        "f4",
+        "shows the spectrogram of the next of the nearest units",
+        action="pane('spectra', 'unit')",
+    ),
+    ReservedKey(
+        "palette",
+        "ctrl+p",
+        "finds behaviors, keys and themes by name",
+        action="command_palette",
+        hint="commands",
+        hint_rank=18,
+    ),
     ReservedKey("help", "question_mark", "shows all keys", action="help", hint="help", hint_rank=0),
     ReservedKey("quit", "q", "ends the drive and quits", action="leave", hint="quit", hint_rank=1),
 )

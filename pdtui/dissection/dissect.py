@@ -62,7 +62,7 @@ def dissect(config: DissectionConfig) -> Dissection:
         first_map = load_map(find_map(str(first_map)))
 
     def stage(name: str) -> StepProgress | None:
-        report = config.progress
+        report = config.report
         return None if report is None else lambda done, total: report(name, done, total)
 
     pool = RolloutPool(config.robot, config.policy, config.workers, config.import_options)

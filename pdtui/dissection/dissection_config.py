@@ -161,7 +161,8 @@ class DissectionConfig:
         workers: Processes that run roll-outs. A robot or a policy given as an object stays in this process.
         journal: File that keeps every roll-out, so that an interrupted dissection continues where it stopped.
             It is left in place: delete it when the results are saved.
-        progress: Called with the stage, the units of work done, and their total.
+        progress: Called with the stage, the units of work done, and their total; or True for a bar on
+            standard error, for `pdtui.dissect` only.
 
     Raises:
         SeedError: The seed is reserved for judging.
@@ -180,7 +181,12 @@ class DissectionConfig:
     budget_minutes: float | None = None
     workers: int = 2
     journal: Path | None = None
-    progress: StageProgress | None = None
+    progress: StageProgress | bool | None = None
 
     def __post_init__(self) -> None:
         require_search_seeds([self.seed], "a dissection")
+
+    @property
+    def report(self) -> StageProgress | None:
+        """The function that is told of the progress, if any."""
+        return self.progress if callable(self.progress) else None

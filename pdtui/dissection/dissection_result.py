@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,9 @@ from pdtui.spectra.phase_correlation import PhaseCorrelations
 from pdtui.spectra.spectrogram import scaled_activation_series, scaled_attribute_series, usable_episodes
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import StimulationMap
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,29 @@ class Dissection:
             f"{len(self.attributes)} attributes, {sum(one.reached for one in self.behaviors)} of "
             f"{len(self.behaviors)} behaviors reached; {self.rollouts} roll-outs, {self.minutes:.1f} min>"
         )
+
+    def _repr_html_(self) -> str:
+        """Show every pair that was judged, as a table that a click on a heading sorts, in a notebook."""
+        from pdtui.dissection.dissection_summary import summarise_dissection
+        from pdtui.notebook.dissection_display import dissection_html
+
+        return dissection_html(repr(self).strip("<>"), summarise_dissection(self))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a data frame with a row for each pair of an attribute and a unit that was judged.
+
+        Its columns are the fields of `pdtui dissect --json` for such a pair: the output v (``value``), the
+        effect with its interval (``effect``, ``low``, ``high``) in the attribute's unit, falls, p-values, and
+        whether the pair is confirmed.
+
+        Raises:
+            PdtuiError: pandas is not installed.
+        """
+        from pdtui.dissection.dissection_summary import summarise_dissection
+        from pdtui.notebook.data_frames import make_data_frame
+        from pdtui.notebook.dissection_display import list_judged_pairs
+
+        return make_data_frame(list_judged_pairs(summarise_dissection(self)), "pair")
 
     def matches(self, attribute: str, count: int = 5) -> list[str]:
         """Return the addresses of the units whose spectrograms are nearest to an attribute's, nearest first.

@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
-from pdtui.core.text_tables import new_table
+from pdtui.core.console.text_tables import new_table
 from pdtui.core.units import describe_units
 from pdtui.dissection.steering.steering_summary import steering_tables
 from pdtui.probing.matching_hits import TOP_MATCHES

@@ -13,7 +13,7 @@ from scipy import stats
 from torch import nn
 
 from pdtui.core.attributes import Floats
-from pdtui.core.text_tables import new_table
+from pdtui.core.console.text_tables import new_table
 from pdtui.core.units import NO_STIMULATION
 from pdtui.dissection.dissection_config import DissectionConfig, DissectionSettings
 from pdtui.dissection.primitive_judging import measure_own_range
@@ -131,7 +131,7 @@ def count_false_confirmations(config: DissectionConfig, draws: int = 400) -> Nul
         with open_robot(config.robot) as world:
             policy = policy_from_network(config.policy, world.observation_space, world.action_space)
             return count_false_confirmations(replace(config, robot=world, policy=policy), draws)
-    seed, settings, report = config.seed, config.settings, config.progress
+    seed, settings, report = config.seed, config.settings, config.report
     preset = find_matching_preset(config.preset, config.preset_changes)
     with RolloutPool(config.robot, config.policy, config.workers, config.import_options) as pool:
         robot, network, prober = pool.robot, pool.policy, EffectProbe(pool)

@@ -12,16 +12,17 @@ from numpy.typing import NDArray
 
 from pdtui.core.attributes import Floats
 from pdtui.core.drive_events import DriveEvent
-from pdtui.core.errors import KeystrokeError, MapError, SimulationDiverged
+from pdtui.core.errors import KeystrokeError, SimulationDiverged
 from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
 from pdtui.core.units import Stimulation
 from pdtui.driving.manual_takeover import ManualTakeover
-from pdtui.driving.rewind_history import STEPS_PER_KEPT_STATE, DriveState, RewindHistory
+from pdtui.driving.timeline.rewind_history import STEPS_PER_KEPT_STATE, DriveState, RewindHistory
 from pdtui.policies.runtime.policy import Policy, PolicyStep
 from pdtui.robots.robot import Robot
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.stimulation.behavior_latch import BehaviorLatch
+from pdtui.stimulation.stack.latch_events import apply_latch_event
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 PolicyAct = Callable[[NDArray[Any], Stimulation, np.random.Generator | None], PolicyStep]
@@ -40,8 +41,7 @@ class ControlLoop:
         start: name of the state in which episodes start; empty for the robot's default.
 
     Raises:
-        PdtuiError: a unit or a command that the map names does not exist, the robot has no such start, or
-            its manual controls do not fit its action.
+        PdtuiError: map and robot do not fit: a unit, a command, the start, or a manual control.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class ControlLoop:
         stochastic: bool = False,
         start: str = "",
     ) -> None:
-        _check_commands(robot, stimulation_map)
+        stimulation_map.check_commands(robot.name, robot.commands)
         self.robot, self.policy, self.map, self.seed = robot, policy, stimulation_map, seed
         self.start = robot.check_start(start)
         self._options = {"start": self.start} if self.start else None
@@ -69,7 +69,8 @@ class ControlLoop:
         self.before_step: Callable[[Sequence[DriveEvent]], None] = lambda _: None
         """Called in each control step with its events, which have been applied, before it is simulated."""
         self._noise = np.random.default_rng(seed) if stochastic else None
-        self._ended = self._arrived = False
+        self._ended = self._arrived = self._begun = False
+        self._applied: list[DriveEvent] = []
         self.history = RewindHistory()
         self._observation, _ = robot.reset(seed=seed, options=self._options)
         policy.reset()
@@ -103,14 +104,8 @@ class ControlLoop:
         the simulation diverged, the loop cannot go on. An event that does not fit the map or the present
         state raises a `KeystrokeError`.
         """
-        if self._ended:
-            self._start_episode()
-        if self.step % STEPS_PER_KEPT_STATE == 0:
-            self.history.keep(self.step, self.copy_state())
-        for event in events:
-            if event.step != self.step:
-                raise KeystrokeError(f"event for step {event.step} given to step {self.step}")
-            self._apply(event)
+        self.apply_events(events)
+        events, self._applied, self._begun = tuple(self._applied), [], False
         self.before_step(events)
         stimulation = self.latch.stimulate(self.attributes)
         if self.robot.set_commands({**self.robot.commands, **self.latch.commands}):
@@ -133,7 +128,7 @@ class ControlLoop:
         record = StepRecord(
             self.step,
             self.episode,
-            tuple(events),
+            events,
             behaviors,
             acted.stimulation,
             acted.natural,
@@ -156,17 +151,28 @@ class ControlLoop:
         self._ended, self._arrived = bool(ended), self._arrived or outcome is Outcome.ARRIVED
         return record
 
+    def apply_events(self, events: Sequence[DriveEvent]) -> None:
+        """Apply events that come before the next control step at once, while a drive is paused.
+
+        `advance` need not be given them again; the record of the step has them. Errors are as in `advance`.
+        """
+        if not self._begun:
+            self._begun = True
+            if self._ended:
+                self._start_episode()
+            if self.step % STEPS_PER_KEPT_STATE == 0:
+                self.history.keep(self.step, self.copy_state())
+        for event in events:
+            if event.step != self.step:
+                raise KeystrokeError(f"event for step {event.step} given to step {self.step}")
+            self._apply(event)
+            self._applied.append(event)
+
     def _apply(self, event: DriveEvent, *, rehearsing: bool = False) -> None:
         """Apply an event; while rehearsing, only to latch, takeover and position in the rewind history."""
         match event.kind:
-            case "behavior":
-                self.latch.latch_behavior(event.name, self.attributes)
             case "default":
                 self._clear()
-            case "target":
-                self.latch.set_target(event.name, event.value)
-            case "factor":
-                self.latch.set_factor(event.name, event.value)
             case "takeover" | "control" | "hand back":
                 self.takeover.apply_event(event)
             case "reset" if rehearsing:
@@ -180,7 +186,7 @@ class ControlLoop:
             case "rewind":
                 self.restore_state(self.history.return_to(event.value, self.step))
             case _:
-                raise KeystrokeError(f"step {event.step}: unknown event '{event.kind}'")
+                apply_latch_event(self.latch, event, self.attributes)
 
     @contextmanager
     def rehearsal(self) -> Iterator[Callable[[DriveEvent], None]]:
@@ -236,14 +242,3 @@ class ControlLoop:
         self._observation = self.robot.observe()
         self.attributes = self.robot.read_attributes()
         self._ended, self._arrived = False, state.arrived
-
-
-def _check_commands(robot: Robot, stimulation_map: StimulationMap) -> None:
-    for behavior in stimulation_map.behaviors.values():
-        for name in behavior.commands:
-            if name not in robot.commands:
-                known = f"available: {', '.join(robot.commands)}" if robot.commands else "it has none"
-                raise MapError(
-                    f"{stimulation_map.source}: behavior '{behavior.name}': {robot.name} has no command "
-                    f"'{name}'; {known}"
-                )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,13 @@ from pdtui.core.outcome import Outcome, count_outcomes, describe_outcomes
 from pdtui.core.step_record import ReplacedAction, StepRecord
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.driving.headless_drive import drive_from_keystrokes, open_step_recorder
+from pdtui.driving.headless_drive import drive_from_keystrokes, end_after, open_step_recorder
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.writer.session_recorder import SessionRecorder
+from pdtui.stimulation.behavior_colors import BEHAVIOR_COLORS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,33 @@ class DriveArrays:
             f"{len(self.events)} events, {describe_outcomes(count_outcomes(self.outcomes.values()))}>"
         )
 
+    def _repr_html_(self) -> str:
+        """Show the attributes as curves in a notebook."""
+        from pdtui.notebook.drive_display import drive_html
+
+        title, facts = repr(self).strip("<>"), self.info
+        return drive_html(title, facts.dt, facts.attributes, self.attributes, self.behaviors, BEHAVIOR_COLORS)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a data frame with a row for each control step, which is its index.
+
+        Its columns are ``time`` in s, the attributes by their names, ``reward``, ``cost``, ``episode``,
+        ``behaviors`` (joined by commas), and the actions, ``action 0`` and so on.
+
+        Raises:
+            PdtuiError: pandas is not installed.
+        """
+        from pdtui.notebook.data_frames import make_data_frame
+
+        names = [attribute.name for attribute in self.info.attributes]
+        columns: dict[str, Any] = {"time": (np.arange(len(self)) + 1) * self.info.dt}
+        columns |= dict(zip(names, self.attributes.T, strict=True))
+        columns |= {"reward": self.rewards, "cost": self.costs, "episode": self.episodes}
+        columns["behaviors"] = [", ".join(active) for active in self.behaviors]
+        actions = self.actions.reshape(len(self), -1).T
+        columns |= {f"action {number}": column for number, column in enumerate(actions)}
+        return make_data_frame(columns, "step")
+
     def unit(self, address: str) -> NDArray[np.float32]:
         """Return the activations of one unit, shape (S,); a `PolicyError` says that there is no such unit."""
         return self.activations[:, parse_unit(address, self.info.layers)]
@@ -81,6 +112,9 @@ def collect_drive_arrays(
     keys: Mapping[int, str | Sequence[str]],
     steps: int,
     recorder: SessionRecorder | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    minutes: float | None = None,
 ) -> DriveArrays:
     """Drive from keystrokes as fast as possible and return the trajectory.
 
@@ -89,6 +123,8 @@ def collect_drive_arrays(
         keys: one key or several for each control step before which they are pressed.
         steps: control steps.
         recorder: records every step, and is closed however the drive ends.
+        progress: called with the number of steps done and the total.
+        minutes: time after which the drive ends with the steps done so far.
 
     Raises:
         KeystrokeError: a key means nothing in the state at its step.
@@ -97,9 +133,11 @@ def collect_drive_arrays(
     presses = {step: [pressed] if isinstance(pressed, str) else pressed for step, pressed in keys.items()}
     records: list[StepRecord] = []
     with open_step_recorder(recorder) as record_step:
-        for record in drive_from_keystrokes(loop, presses, steps):
+        for record in end_after(drive_from_keystrokes(loop, presses, steps), minutes):
             records.append(record)
             record_step(record)
+            if progress is not None:
+                progress(len(records), steps)
     return _stack_records(loop, records)
 
 

@@ -13,9 +13,11 @@ from pdtui.core.errors import PdtuiError
 from pdtui.core.processes.worker_pool import describe_exit, end_with_parent
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
+from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchRequest
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
+    from pdtui.driving.live_spectra.spectra_snapshot import SpectraChoice
 
 _PATIENCE = 60.0
 """Longest wait for the recording to be completed, s; after it, the process ends at once."""
@@ -32,13 +34,28 @@ class DriveConnection(Protocol):
         """
 
     def press_key(self, key: str) -> None:
-        """Send a key that changes the run; it applies before the next control step."""
+        """Send a key or an edit that changes the run; it applies before the next control step."""
 
     def change_pace(self, request: PaceRequest) -> None:
         """Change the pace, which is no part of the run and is not recorded."""
 
     def toggle_ghost(self) -> None:
         """Turn the ghost on or off, which is no part of the run and is not recorded."""
+
+    def seek(self, moment: int) -> None:
+        """Pause, and show the moment at which so many control steps had been done.
+
+        A replay that is watched goes on to a moment that is still to come, without its pace.
+        """
+
+    def choose_spectra(self, choice: SpectraChoice | None) -> None:
+        """Have snapshots bring spectrograms of an attribute and a unit, or none."""
+
+    def branch(self) -> None:
+        """Begin a drive, with a recording of its own, that goes on from the moment that is shown."""
+
+    def search_units(self, request: UnitSearchRequest) -> None:
+        """Search for units that change an attribute from now on, which is no part of the run either."""
 
     def close(self) -> str:
         """End the drive, wait until its recording is complete, and return one line on how it ended."""
@@ -49,9 +66,9 @@ def _simulate(connection: Connection, config: DriveConfig) -> None:
     os.environ.setdefault("RUST_LOG", "off")
     # The drive ends by itself once the screen has gone, unless its world is stuck in a step.
     threading.Thread(target=end_with_parent, args=(_PATIENCE,), daemon=True).start()
-    from pdtui.driving import drive_server  # loads torch and the simulator, which the screen does without
+    from pdtui.driving import drive_process  # loads torch and the simulator, which the screen does without
 
-    drive_server.serve_drive(connection, config)
+    drive_process.serve_drive(connection, config)
 
 
 class DriveClient(DriveConnection):
@@ -114,6 +131,18 @@ class DriveClient(DriveConnection):
     def toggle_ghost(self) -> None:
         self._send("ghost", None)
 
+    def seek(self, moment: int) -> None:
+        self._send("seek", moment)
+
+    def choose_spectra(self, choice: SpectraChoice | None) -> None:
+        self._send("spectra", choice)
+
+    def branch(self) -> None:
+        self._send("branch", None)
+
+    def search_units(self, request: UnitSearchRequest) -> None:
+        self._send("search", request)
+
     def close(self) -> str:
         self._send("close", None)
         deadline = time.monotonic() + _PATIENCE
@@ -142,7 +171,7 @@ class DriveClient(DriveConnection):
             return PdtuiError(self._describe_death())
         return message
 
-    def _send(self, kind: str, value: str | None) -> None:
+    def _send(self, kind: str, value: str | int | SpectraChoice | UnitSearchRequest | None) -> None:
         try:
             self._connection.send((kind, value))
         except OSError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pdtui.driving.ghost.ghost_variant import GhostVariant
 from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
@@ -30,6 +31,7 @@ class DriveConfig:
         viewer: address of a Rerun viewer that shows the recorded drive; None for none.
         watched: the session whose events are applied instead of keys, and with which every step is compared;
             None to drive by keys.
+        ghost: what is other in the ghost than that it has no behaviors; None for nothing.
     """
 
     robot: str
@@ -45,3 +47,4 @@ class DriveConfig:
     activations: ActivationsKept = "all"
     viewer: ViewerAddress | None = None
     watched: SessionHeader | None = None
+    ghost: GhostVariant | None = None

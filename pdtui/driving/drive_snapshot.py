@@ -13,10 +13,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pdtui.core.attributes import Attribute, Floats
+    from pdtui.core.outcome import Outcome
     from pdtui.core.robot_links_and_state import Link
     from pdtui.core.scenery import Scenery, Traffic
     from pdtui.core.step_record import ActiveBehavior
     from pdtui.driving.ghost.ghost_snapshot import GhostSnapshot
+    from pdtui.driving.live_spectra.spectra_snapshot import SpectraSnapshot
+    from pdtui.driving.unit_bench.natural_ranges import NaturalRanges
+    from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchSnapshot
+    from pdtui.stimulation.stack.stack_entry import StackEntry
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,12 @@ class DriveFacts:
         recording: file that the drive is recorded into, or will be; empty if it is not recorded.
         recorded: whether that file was created, which happens with the first control step.
         manual_controls: names of the controls that the operator can take over.
+        length: number of control steps of the recording that the drive follows; 0 if it follows none.
+        known_keys, known_ends: key presses and ends of episodes of that recording.
+        pictured: whether the world is shown by pictures, as it has no links.
+        branches: number of times that the drive has branched off; then, it begins again.
+        policy_hash: SHA-256 of the policy's weights.
+        output_bounds: the least and the largest output that the units of each layer can have by themselves.
     """
 
     title: str
@@ -45,6 +56,13 @@ class DriveFacts:
     recording: str = ""
     recorded: bool = False
     manual_controls: tuple[str, ...] = ()
+    length: int = 0
+    known_keys: tuple[KeyPress, ...] = ()
+    known_ends: tuple[EpisodeEnd, ...] = ()
+    pictured: bool = False
+    branches: int = 0
+    policy_hash: str = ""
+    output_bounds: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -68,6 +86,20 @@ class KeyPress(NamedTuple):
     step: int
     key: str
     behavior: int
+
+
+class EpisodeEnd(NamedTuple):
+    """How an episode ended, or that its task was done, with a control step."""
+
+    step: int
+    outcome: Outcome
+
+
+class PastPosition(NamedTuple):
+    """Where a past moment lies: number of control steps of the run, and the earliest moment to look at."""
+
+    present: int
+    oldest: int
 
 
 @dataclass(frozen=True)
@@ -101,7 +133,15 @@ class DriveSnapshot:
         scenery: `Robot.scenery` if it has changed since the last snapshot; else None.
         traffic: what was around the robot after the last step.
         key_presses: keys that changed the run since the last snapshot.
+        ends: ends of episodes since the last snapshot.
+        picture: picture of a world without links, shape (rows, columns, 3); None where there is no new one.
+        spectra: spectrograms of a unit and an attribute, where they were asked for.
+        past: where the moment lies that is shown; None for the present.
         ghost: the ghost; None while it is off.
+        stack: latched behaviors, muted ones too, in their order.
+        held_units: units that the operator holds, by flat index, and their outputs v.
+        natural_ranges: the ranges of what the units put out by themselves; None before the first step.
+        unit_search: the search for units; None before the first.
     """
 
     step: int
@@ -129,4 +169,12 @@ class DriveSnapshot:
     scenery: Scenery | None = None
     traffic: Traffic = NO_TRAFFIC
     key_presses: tuple[KeyPress, ...] = ()
+    ends: tuple[EpisodeEnd, ...] = ()
+    picture: NDArray[np.uint8] | None = None
+    spectra: SpectraSnapshot | None = None
+    past: PastPosition | None = None
     ghost: GhostSnapshot | None = None
+    stack: tuple[StackEntry, ...] = ()
+    held_units: tuple[tuple[int, float], ...] = ()
+    natural_ranges: NaturalRanges | None = None
+    unit_search: UnitSearchSnapshot | None = None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import signal
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -77,6 +79,15 @@ def drive_from_keystrokes(
             raise SimulationDiverged(f"step {record.step}: {record.ended}")
 
 
+def end_after(records: Iterator[StepRecord], minutes: float | None) -> Iterator[StepRecord]:
+    """Yield records until so much time has passed, or all of them if there is no limit."""
+    end = math.inf if minutes is None else time.monotonic() + 60.0 * minutes
+    for record in records:
+        yield record
+        if time.monotonic() >= end:
+            return
+
+
 def run_episode(
     loop: ControlLoop, steps: int, events_before: Callable[[int], Sequence[DriveEvent]] = lambda _: ()
 ) -> Iterator[StepRecord]:
@@ -132,6 +143,9 @@ def drive_headless(
     steps: int,
     recorder: SessionRecorder | None,
     ended: Callable[[], str] = str,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    minutes: float | None = None,
 ) -> DriveSummary:
     """Drive from keystrokes without a screen and return a summary.
 
@@ -141,6 +155,8 @@ def drive_headless(
         steps: number of control steps.
         recorder: records every step, and is closed however the drive ends.
         ended: called after each step; returns why to end the drive, or an empty string to go on.
+        progress: called with the number of steps done and the total.
+        minutes: time after which the drive ends with the steps done so far.
 
     Raises:
         DriveEnded: `ended` returned a reason.
@@ -150,9 +166,11 @@ def drive_headless(
     outcomes: list[Outcome] = []
     total = np.zeros(len(loop.robot.attributes))
     with open_step_recorder(recorder) as record_step:
-        for record in drive_from_keystrokes(loop, presses, steps):
+        for record in end_after(drive_from_keystrokes(loop, presses, steps), minutes):
             record_step(record)
             done += 1
+            if progress is not None:
+                progress(done, steps)
             cost += record.cost
             outcomes += [record.outcome] if record.outcome is not None else []
             involvement += record.involved

@@ -6,6 +6,16 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from pdtui.core.drive_edits import (
+    EDIT_KEY,
+    FACTOR_STEP,
+    NAMED_EDITS,
+    VALUED_EDITS,
+    edit_subject,
+    is_edit,
+    parse_edit,
+    write_edit,
+)
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import KeystrokeError
 from pdtui.core.reserved_keys import RUN_KEYS, ReservedKey
@@ -19,9 +29,9 @@ MAX_PRESSES = 200_000
 """Key presses of a file: a key in every step of an hour, at 50 Hz, is 180,000."""
 MAX_PRESSES_PER_STEP = 100
 """Key presses before one step."""
-FACTOR_STEP = 1.25  # by which a key strengthens or weakens a behavior
 REWIND_SECONDS = 3.0
-_LINE = re.compile(r"(\d{1,9})\s+(\S+)")
+_LINE = re.compile(r"(\d{1,9})\s+(\S.*)")
+_KEY = re.compile(r"\S+")
 
 
 def list_drive_keys(stimulation_map: StimulationMap) -> tuple[str, ...]:
@@ -31,7 +41,9 @@ def list_drive_keys(stimulation_map: StimulationMap) -> tuple[str, ...]:
 
 
 def interpret_key(key: str, loop: ControlLoop) -> DriveEvent | str:
-    """Return the event of a key in the loop's present state, or a sentence on why it has none."""
+    """Return the event of a key or an edit in the loop's present state, or a sentence on why it has none."""
+    if is_edit(key):
+        return parse_edit(key, loop.step)
     if key == loop.map.default_key:
         return DriveEvent(loop.step, "default", key=key)
     behavior = loop.map.behavior_of_key(key)
@@ -55,14 +67,29 @@ def interpret_key(key: str, loop: ControlLoop) -> DriveEvent | str:
 
 
 def interpret_keys(keys: Iterable[str], loop: ControlLoop) -> list[DriveEvent | str]:
-    """Interpret keys pressed before the same step, each in the state that those before it lead to."""
+    """Interpret keys and edits before the same step, each in the state that those before it lead to."""
     meanings: list[DriveEvent | str] = []
     with loop.rehearsal() as rehearse:
         for key in keys:
-            meanings.append(meaning := interpret_key(key, loop))
-            if isinstance(meaning, DriveEvent):
-                rehearse(meaning)
+            try:
+                meaning = interpret_key(key, loop)
+                if isinstance(meaning, DriveEvent):
+                    rehearse(meaning)
+            except KeystrokeError as error:  # an edit of something that is not there
+                meaning = str(error)
+            meanings.append(meaning)
     return meanings
+
+
+def note_press(pressed: list[str], key: str) -> None:
+    """Append a key or an edit to those pressed before a step.
+
+    Of edits of the same thing in a row, such as a slider sends many of, only the last one counts.
+    """
+    before = pressed[-1] if pressed else ""
+    if is_edit(key) and is_edit(before) and edit_subject(key) == edit_subject(before):
+        pressed.pop()
+    pressed.append(key)
 
 
 def _factor_event(row: ReservedKey, loop: ControlLoop) -> DriveEvent | str:
@@ -114,7 +141,7 @@ def _target_event(row: ReservedKey, loop: ControlLoop) -> DriveEvent | str:
 
 
 def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, list[str]]:
-    """Return key presses by control step from a text file with one ``STEP KEY`` per line.
+    """Return key presses by control step from a text file with one ``STEP KEY`` or ``STEP EDIT`` per line.
 
     ``#`` starts a comment. A `KeystrokeError` names the file or the line that is wrong.
     """
@@ -140,7 +167,12 @@ def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, li
         if match is None:
             raise KeystrokeError(f"{path}:{number}: expected 'STEP KEY', found {content[:40]!r}")
         step, key = int(match[1]), match[2]
-        if key not in known:
+        if is_edit(key):
+            try:
+                parse_edit(key, step)
+            except KeystrokeError as error:
+                raise KeystrokeError(f"{path}:{number}: {error}") from error
+        elif key not in known:
             raise KeystrokeError(
                 f"{path}:{number}: key '{key[:40]}' does nothing; keys are {', '.join(keys)[:1000]}"
             )
@@ -160,9 +192,12 @@ def read_keystrokes(path: Path, stimulation_map: StimulationMap) -> dict[int, li
 
 
 def format_keystrokes(events: Iterable[DriveEvent]) -> str:
-    """Return the key presses among events as the text of a keystroke file."""
-    pressed = [event for event in events if event.key]
-    for event in pressed:
-        if _LINE.fullmatch(f"{event.step} {event.key}") is None or "#" in event.key:
-            raise KeystrokeError(f"step {event.step}: {event.key[:40]!r} is not the name of a key")
-    return "".join(f"{event.step} {event.key}\n" for event in pressed)
+    """Return the key presses and edits among events as the text of a keystroke file."""
+    lines = []
+    for event in events:
+        edits = event.key == EDIT_KEY and event.kind in (*VALUED_EDITS, *NAMED_EDITS)
+        pressed = write_edit(event.kind, event.name, event.value) if edits else event.key
+        if pressed and ((not edits and _KEY.fullmatch(pressed) is None) or "#" in pressed):
+            raise KeystrokeError(f"step {event.step}: {pressed[:40]!r} is not the name of a key")
+        lines += [f"{event.step} {pressed}\n"] if pressed else []
+    return "".join(lines)

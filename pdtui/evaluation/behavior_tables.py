@@ -7,8 +7,13 @@ import math
 from rich.console import Group
 from rich.table import Table
 
+from pdtui.core.console.text_tables import (
+    format_mean_with_interval,
+    format_p_value,
+    format_seed_range,
+    new_table,
+)
 from pdtui.core.outcome import count_failures, failure_noun, format_failures
-from pdtui.core.text_tables import format_mean_with_interval, format_p_value, format_seed_range, new_table
 from pdtui.evaluation.behavior_evaluation import MapEvaluation
 from pdtui.evaluation.behavior_summary import AS_LARGE, BehaviorEvaluation
 from pdtui.evaluation.disturbance_conditions import UNDISTURBED

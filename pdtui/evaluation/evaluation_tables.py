@@ -8,8 +8,8 @@ from rich.console import Group
 from rich.table import Table
 
 from pdtui.core.confidence_intervals import PairedRatio
+from pdtui.core.console.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.core.outcome import Outcome, count_failures, describe_outcomes, failure_noun
-from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.evaluation.policy_evaluation import PolicyEvaluation
 from pdtui.search.gain_tuning import TunedGains
 from pdtui.search.step_response import StepResponseSummary

@@ -13,6 +13,7 @@ GUIDE_FOLDER = Path(__file__).parent
 TOPICS = (
     "index",
     "driving",
+    "settings",
     "sessions",
     "maps",
     "interventions",

@@ -9,11 +9,11 @@ import numpy as np
 from rich.table import Table
 
 from pdtui.core.confidence_intervals import confidence_interval
+from pdtui.core.console.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import RobotError
 from pdtui.core.outcome import Outcome, OutcomeCounts, count_failures, count_outcomes
 from pdtui.core.processes.worker_pool import StepProgress
-from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import run_episode

@@ -88,6 +88,18 @@ RECORD_OPTION = click.Option(
 REPEATS_OPTION = click.Option(
     ["--repeats"], type=click.IntRange(1), metavar="N", help="Number of repeats.  [default: 5]"
 )
+STEPS_OPTION = click.Option(
+    ["--steps"],
+    type=click.IntRange(1),
+    metavar="N",
+    help="Longest drive, in control steps.  [default: 2400 in the forest, 5000 for parkour]",
+)
+CONDITION_OPTION = click.Option(
+    ["--condition", "conditions"],
+    multiple=True,
+    type=click.Choice(["alone", "operator", "placebo", "vision"]),
+    help="Measure only this condition; may be repeated. Parkour has only the first two.  [default: all]",
+)
 """Options that several experiments take."""
 
 

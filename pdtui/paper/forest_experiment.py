@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-import click
-
 from pdtui.paper.experiment import (
+    CONDITION_OPTION,
     RECORD_OPTION,
     REPEATS_OPTION,
     SESSION_OPTION,
+    STEPS_OPTION,
     Experiment,
     ExperimentReport,
     ExperimentRequest,
@@ -37,21 +37,5 @@ EXPERIMENT = Experiment(
     "forest",
     "crossing the forest",
     run_forest_experiment,
-    (
-        click.Option(
-            ["--steps"],
-            type=click.IntRange(1),
-            metavar="N",
-            help="Longest episode, in control steps.  [default: 2400]",
-        ),
-        REPEATS_OPTION,
-        click.Option(
-            ["--condition", "conditions"],
-            multiple=True,
-            type=click.Choice(["alone", "operator", "placebo", "vision"]),
-            help="Measure only this condition; may be repeated.  [default: all]",
-        ),
-        SESSION_OPTION,
-        RECORD_OPTION,
-    ),
+    (STEPS_OPTION, REPEATS_OPTION, CONDITION_OPTION, SESSION_OPTION, RECORD_OPTION),
 )

@@ -64,7 +64,7 @@ def build_heading_figure(result: HeadingPrecisionComparison) -> HeadingFigure:
 
 def heading_precision_table(result: HeadingPrecisionComparison) -> Table:
     """Return a table with one column per behavior, map by map."""
-    from pdtui.core.text_tables import format_seed_range, new_table
+    from pdtui.core.console.text_tables import format_seed_range, new_table
     from pdtui.evaluation.evaluation_tables import add_tracking_figures, format_ratio
     from pdtui.search.tracking_drives import STEPS_EACH
 

@@ -95,9 +95,10 @@ def draw_effects(panel: Axes, dissection: Dissection, column: int) -> None:
         panel.plot(curve.values[fell], curve.means[fell], "x", color="black", markersize=4)
     panel.set_title(attribute.name)
     panel.set_ylabel(f"change ({attribute.unit})" if attribute.unit else "change")
-    panel.set_xlabel("output v")
+    panel.set_xlabel(f"output v ({dissection.refined.effects.shape[2]} starts)")
     if panel.has_data() and panel.get_legend_handles_labels()[1]:
-        panel.legend(loc="best", handlelength=1.2, borderpad=0.1)
+        # Beside the data: there is no corner in which no curve may end.
+        panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), handlelength=1.0, borderpad=0.0)
 
 
 def draw_effect_key(figure: Figure) -> None:

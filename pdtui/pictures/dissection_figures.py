@@ -1,4 +1,4 @@
-"""The figures of a dissection as PNG files, each as wide as a page."""
+"""The figures of a dissection as PNG, PDF or SVG files, each as wide as a page."""
 
 from __future__ import annotations
 
@@ -35,8 +35,13 @@ NAMES = ("spectrograms", "discrepancies", "effects", "side-effects", "hit-rates"
 """Stems of the files; figures with one panel per attribute are numbered where one page is not enough."""
 
 
-def draw_dissection_figures(folder: Path, dissection: Dissection) -> list[Path]:
+def draw_dissection_figures(folder: Path, dissection: Dissection, kind: str = "png") -> list[Path]:
     """Draw all figures into a folder, replace files of the same names, and return the files.
+
+    Args:
+        folder: The folder.
+        dissection: What to draw.
+        kind: Format of the files: ``png``, ``pdf`` or ``svg``.
 
     Raises:
         PictureError: A file cannot be written.
@@ -45,18 +50,18 @@ def draw_dissection_figures(folder: Path, dissection: Dissection) -> list[Path]:
     pages = [columns[first : first + _A_PAGE] for first in range(0, len(columns), _A_PAGE)]
     for name, draw_page in zip(NAMES, (_draw_spectrograms, _draw_rankings, _draw_effects), strict=False):
         for number, page in enumerate(pages, start=1):
-            written.append(folder / (f"{name}.png" if len(pages) == 1 else f"{name}-{number}.png"))
+            written.append(folder / (f"{name}.{kind}" if len(pages) == 1 else f"{name}-{number}.{kind}"))
             draw_page(written[-1], dissection, page)
     for name, draw in (("side-effects", draw_side_effects), ("hit-rates", draw_matching_hits)):
-        written.append(folder / f"{name}.png")
+        written.append(folder / f"{name}.{kind}")
         draw(written[-1], dissection)
     return written
 
 
-def existing_figures(folder: Path) -> list[Path]:
+def existing_figures(folder: Path, kind: str = "png") -> list[Path]:
     """Return the files in a folder that `draw_dissection_figures` may replace."""
     ends = ("", "-[0-9]*")
-    return sorted(path for name in NAMES for end in ends for path in folder.glob(f"{name}{end}.png"))
+    return sorted(path for name in NAMES for end in ends for path in folder.glob(f"{name}{end}.{kind}"))
 
 
 @contextmanager

@@ -74,12 +74,16 @@ def write_dissection_report(path: Path, dissection: Dissection) -> None:
 
 
 def _layout(dissection: Dissection) -> rrb.Tabs:
-    """Tabs: the tables, the figures of all attributes, and each attribute."""
+    """Tabs: the figures of all attributes, which are shown first, each attribute, and the tables."""
     return rrb.Tabs(
-        rrb.TextDocumentView(origin=SUMMARY, name="Summary"),
-        rrb.Spatial2DView(origin=SIDE_EFFECTS, name="Side effects"),
-        rrb.Spatial2DView(origin=HIT_RATES, name="Matching against probing"),
+        rrb.Horizontal(
+            rrb.Spatial2DView(origin=SIDE_EFFECTS, name="Side effects"),
+            rrb.Spatial2DView(origin=HIT_RATES, name="Matching against probing"),
+            name="Overview",
+        ),
         *(_attribute_tab(dissection, column) for column in range(len(dissection.attributes))),
+        rrb.TextDocumentView(origin=SUMMARY, name="Summary and tables"),
+        active_tab=0,
     )
 
 
@@ -189,11 +193,15 @@ def _origin(dissection: Dissection, summary: dict[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class PictureOutputs:
-    """Where the pictures of one dissection go: the report and, unless it is None, a folder of PNG files."""
+    """Where the pictures of one dissection go: the report and, unless it is None, a folder of figures.
+
+    `kind` is the format of the figures: ``png``, ``pdf`` or ``svg``.
+    """
 
     report: Path
     figures: Path | None
     overwrite: bool
+    kind: str = "png"
 
     def check(self) -> None:
         """Raise a `PictureError`, before minutes of work, if a file already exists or cannot be written."""
@@ -201,14 +209,14 @@ class PictureOutputs:
             raise PictureError(f"{self.report}: expected a name that ends in .rrd; the viewer opens no other")
         found = [self.report] if self.report.exists() else []
         if self.figures is not None:
-            found += existing_figures(self.figures)
+            found += existing_figures(self.figures, self.kind)
         if found and not self.overwrite:
             raise PictureError(f"{found[0]}: already exists; --overwrite replaces it")
-        for path in (self.report, *([] if self.figures is None else [self.figures / "figure.png"])):
+        for path in (self.report, *([] if self.figures is None else [self.figures / f"figure.{self.kind}"])):
             check_writable(path, PictureError)
 
     def draw(self, dissection: Dissection) -> list[Path]:
         """Write the pictures, and return their files; a `PictureError` says which one cannot be written."""
         write_dissection_report(self.report, dissection)
-        figures = [] if self.figures is None else draw_dissection_figures(self.figures, dissection)
+        figures = [] if self.figures is None else draw_dissection_figures(self.figures, dissection, self.kind)
         return [self.report, *figures]

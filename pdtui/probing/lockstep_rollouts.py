@@ -36,9 +36,9 @@ class LockstepRollouts:
     def __init__(self, robots: LockstepRobots, policy: BatchedPolicy) -> None:
         self._robots, self._policy, self._count = robots, policy, 0
 
-    def world_key(self, state: RobotState) -> Hashable:
+    def world_id(self, state: RobotState) -> Hashable:
         """Return what tells the world of a state from others; roll-outs in one world run together."""
-        return self._robots.world_key(state)
+        return self._robots.world_id(state)
 
     def restore(self, starts: Sequence[RobotState]) -> Floats:
         """Bring copies into the states in which roll-outs begin; return their attributes, shape (n, J)."""

@@ -39,12 +39,12 @@ def run_rollouts(
     policy offer that; their figures are then the same to rounding.
     """
     found: dict[int, RolloutOutcome] = {}
-    together = [number for number, (plan, _) in enumerate(jobs) if only_overwrites(plan)]
+    together = [number for number, (plan, _) in enumerate(jobs) if plan_only_overwrites(plan)]
     lockstep = make_lockstep_rollouts(robot, policy, len(together))
     if lockstep is not None:
         worlds: dict[Hashable, list[int]] = defaultdict(list)
         for number in together:
-            worlds[lockstep.world_key(starts[jobs[number][1]].snapshot)].append(number)
+            worlds[lockstep.world_id(starts[jobs[number][1]].snapshot)].append(number)
         for numbers in worlds.values():
             if len(numbers) >= FEWEST_TOGETHER:
                 measured = _measure_together(
@@ -62,14 +62,14 @@ def run_rollouts(
     return [found[number] for number in range(len(jobs))]
 
 
-def only_overwrites(plan: RolloutPlan) -> bool:
+def plan_only_overwrites(plan: RolloutPlan) -> bool:
     """Return whether a plan overwrites units by numbers, and nothing else."""
     if isinstance(plan, InterventionRolloutPlan):
         return False
     return not (plan.units if isinstance(plan, PidStimulationPlan) else plan).edits
 
 
-class _RolloutMeasurement:
+class _BatchMeasurement:
     """What `RolloutOutcome` measures, of n roll-outs at once."""
 
     def __init__(self, robot: Robot, before: Floats, measure_from: int) -> None:
@@ -106,7 +106,7 @@ def _measure_together(
     measure_from: int,
 ) -> list[RolloutOutcome]:
     before = lockstep.restore([start.snapshot for start in starts])
-    measurement = _RolloutMeasurement(robot, before, measure_from)
+    measurement = _BatchMeasurement(robot, before, measure_from)
     fixed = [plan if isinstance(plan, Stimulation) else Stimulation() for plan in plans]
     controllers = {
         row: StimulationController(plan, robot, before[row])

@@ -86,6 +86,7 @@ class MetaDrive(Robot):
             "chunk": 20,
             "steps_per_update": 1,
             "batch": 256,
+            "evaluate_every": 30_000,
             "random_steps": 24_000,
             "average_rate": 0.002,
         },
@@ -102,6 +103,7 @@ class MetaDrive(Robot):
         Attribute("gap ahead", "m", 1.0 / LIDAR_RANGE),
         Attribute("route", ""),
     )
+    repeats_actions = True
     links = (
         Link("body", 0, "box", (2.25, 0.93, 0.35), (0.0, 0.0, 0.0), _UPRIGHT),
         Link("cabin", 0, "box", (1.1, 0.8, 0.3), (-0.3, 0.0, 0.65), _UPRIGHT),

@@ -78,6 +78,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
             long as the world does, and another replaces it when that changes, as in `reset` and `restore`.
         outcomes: How its episodes can end by themselves. Tables say so even if none ended that way.
         state_arrays: Names of the Python attributes, all of them arrays, that belong to a robot's state.
+        repeats_actions: Whether `restore` repeats the actions since the reset, which takes time.
         build_options: Options with which `make_robot` built it; those that it does not name have defaults.
     """
 
@@ -98,6 +99,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     scenery: Scenery = NO_SCENERY
     outcomes: tuple[Outcome, ...] = (Outcome.FELL,)
     state_arrays: tuple[str, ...] = ()
+    repeats_actions: bool = False
     build_options: RobotOptions = NO_ROBOT_OPTIONS
 
     @property
@@ -222,11 +224,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         return start
 
     def find_task(self, name: str) -> Task:
-        """Return the task of a name.
-
-        Raises:
-            MapError: The robot has no such task.
-        """
+        """Return the task of a name; one that the robot does not have is a `MapError`."""
         return find_task(name, self.tasks, self.name)
 
     def attribute_index(self, name: str) -> int:

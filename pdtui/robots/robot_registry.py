@@ -56,12 +56,14 @@ class ListedRobot:
         name: Name of the robot.
         title: Its name for people.
         starts: States besides the usual one in which it can start.
+        tasks: What `pdtui pursue` can look for.
         problem: Why it cannot be built here; empty if it can.
     """
 
     name: str
     title: str = ""
     starts: tuple[str, ...] = ()
+    tasks: tuple[str, ...] = ()
     problem: str = ""
 
 
@@ -75,7 +77,10 @@ def list_robots() -> list[ListedRobot]:
         except RobotError as error:
             listed.append(ListedRobot(name, problem=str(error)))
             continue
-        listed.append(ListedRobot(name, getattr(kind, "title", ""), tuple(getattr(kind, "starts", ()))))
+        starts, tasks = tuple(getattr(kind, "starts", ())), getattr(kind, "tasks", ())
+        listed.append(
+            ListedRobot(name, getattr(kind, "title", ""), starts, tuple(task.name for task in tasks))
+        )
     return listed
 
 

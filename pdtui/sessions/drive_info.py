@@ -17,6 +17,21 @@ from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, SCHEMA, ActivationsK
 
 
 @dataclass(frozen=True)
+class BranchOrigin:
+    """Where a drive branched off another one, whose control steps before that it begins with.
+
+    Attributes:
+        session: name of the other session's file.
+        created: date and time at which the other drive began, ISO 8601.
+        step: the first control step that is the branch's own.
+    """
+
+    session: str
+    created: str
+    step: int
+
+
+@dataclass(frozen=True)
 class DriveInfo:
     """What is known about a drive before its first control step; with the events, it determines the run.
 
@@ -36,6 +51,7 @@ class DriveInfo:
             collisions then.
         roads: whether there are roads where the first episode starts.
         robot_options: options that the robot was built with, by name.
+        branch: where the drive branched off another one, which does not affect the run; None if it did not.
     """
 
     robot: str
@@ -53,6 +69,7 @@ class DriveInfo:
     obstacles: bool = False
     roads: bool = False
     robot_options: RobotOptions = field(default_factory=dict)
+    branch: BranchOrigin | None = None
 
 
 T = TypeVar("T")
@@ -81,6 +98,7 @@ def encode_drive_info(info: DriveInfo, created: str) -> dict[str, Any]:
         "links": json.dumps([asdict(link) for link in info.links]),
         "robot_options": json.dumps(dict(info.robot_options)),
         "map": info.map_text,
+        **({} if info.branch is None else {"branch": json.dumps(asdict(info.branch))}),
     }
 
 
@@ -129,6 +147,7 @@ def decode_drive_info(properties: Mapping[str, list[Any]]) -> tuple[DriveInfo, s
         obstacles=_read_value(properties, "obstacles", bool, False),
         roads=_read_value(properties, "roads", bool, False),
         robot_options=_read_robot_options(properties),
+        branch=_read_branch(properties),
     )
     return info, _read_text(properties, "created")
 
@@ -162,6 +181,20 @@ def _read_robot_options(properties: Mapping[str, list[Any]]) -> RobotOptions:
         return {_check_text(name): require_usable_value(value) for name, value in options.items()}
     except (ValueError, OverflowError, RecursionError) as error:
         raise SessionError(f"property 'robot_options': invalid: {error!r}") from error
+
+
+def _read_branch(properties: Mapping[str, list[Any]]) -> BranchOrigin | None:
+    text = _read_text(properties, "branch", 10 * _MAX_TEXT, "")
+    try:
+        found = json.loads(text) if text else None
+        if found is None:
+            return None
+        step = found["step"]
+        if type(step) is not int or not 0 < step < 1 << 40:
+            raise ValueError("expected the number of a control step")
+        return BranchOrigin(_check_text(found["session"]), _check_text(found["created"]), step)
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise SessionError(f"property 'branch': invalid: {error!r}") from error
 
 
 def _read_list(

@@ -25,6 +25,8 @@ class EpisodeStatistics:
         involvement: number of control steps that count as human involvement (`is_involvement_step`).
         distance: latest value of the robot's attribute ``distance``, m; None if the robot lacks it.
         collisions: sum of the cost of all steps where there are obstacles, else None.
+        passed: number of obstacles of a course that were passed, the latest value of the robot's attribute
+            ``obstacles passed``; None if the robot lacks it.
         outcome: how it ended, or that its task was done; empty while there is no outcome.
     """
 
@@ -33,6 +35,7 @@ class EpisodeStatistics:
     involvement: int = 0
     distance: float | None = None
     collisions: float | None = None
+    passed: float | None = None
     outcome: str = ""
 
     @property
@@ -49,14 +52,12 @@ class EpisodeStatisticsCounter:
     """Counts the statistics of each episode; after a rewind, those of the earlier episode are continued."""
 
     def __init__(self, info: DriveInfo) -> None:
-        columns = [
-            column
-            for column, attribute in enumerate(info.attributes)
-            if (attribute.name, attribute.unit) == ("distance", "m")
-        ]
-        self._column = columns[0] if columns else None
+        columns = {(one.name, one.unit): column for column, one in enumerate(info.attributes)}
+        self._column, self._passed = columns.get(("distance", "m")), columns.get(("obstacles passed", ""))
         self._none = EpisodeStatistics(
-            distance=None if self._column is None else 0.0, collisions=0.0 if info.obstacles else None
+            distance=None if self._column is None else 0.0,
+            collisions=0.0 if info.obstacles else None,
+            passed=None if self._passed is None else 0.0,
         )
         self._statistics: dict[int, EpisodeStatistics] = {}
 
@@ -69,6 +70,7 @@ class EpisodeStatisticsCounter:
             involvement=before.involvement + involved,
             distance=None if self._column is None else float(attributes[self._column]),
             collisions=None if before.collisions is None else before.collisions + cost,
+            passed=None if self._passed is None else float(attributes[self._passed]),
         )
 
     def add_steps(
@@ -86,6 +88,7 @@ class EpisodeStatisticsCounter:
                 collisions=None
                 if before.collisions is None
                 else before.collisions + float(costs[start:stop].sum()),
+                passed=None if self._passed is None else float(attributes[stop - 1, self._passed]),
             )
 
     def add_outcome(self, episode: int, outcome: Outcome) -> None:

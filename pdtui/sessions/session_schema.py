@@ -32,6 +32,7 @@ UNITS = "/view/units"
 TARGETS = "/view/targets"
 MAGNITUDES = "/view/magnitudes"
 HEAT_MAP = "/view/activations"
+TABLE = "/view/table"
 
 INFO, VERSIONS, OUTCOME, REPAIR = "drive", "versions", "outcome", "repair"
 
@@ -48,6 +49,9 @@ ExportFormat = Literal["parquet", "csv", "mcap"]
 """Formats into which streams are exported."""
 
 EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
+
+LEROBOT = "lerobot"
+"""Format of a whole session as a dataset, in a folder."""
 
 ActivationsKept = Literal["all", "half", "off"]
 """How activations are recorded: as float32, as float16, or not at all."""

@@ -114,6 +114,19 @@ def match_units(
     )
 
 
+def measure_discrepancies(
+    episode: MonitoredEpisode, attributes: Sequence[Attribute], preset: MatchingPreset
+) -> Floats:
+    """Compute the discrepancies of J attributes and U units over one episode, shape (J, U).
+
+    As `match_units` does, but in this thread alone, and without changing how many threads other libraries
+    use. The episode is at least one window long.
+    """
+    (target,) = scaled_attribute_series([episode], attributes, preset)
+    (series,) = scaled_activation_series([episode], slice(None), preset)
+    return _compare(_Spectra(target, preset), _Spectra(series, preset))[0]
+
+
 class _Spectra:
     """Flattened spectrograms of the series of one episode, and their squared norms."""
 

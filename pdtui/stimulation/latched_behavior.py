@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from pdtui.core.step_record import ActiveBehavior
 from pdtui.stimulation.interventions.bound_intervention import BoundIntervention
 from pdtui.stimulation.interventions.gait_clock import GaitClock, GaitMark
 from pdtui.stimulation.pid_magnitude import PidMagnitude
+from pdtui.stimulation.stack.stack_entry import PidTuning, StackEntry
 from pdtui.stimulation.stimulation_map import Behavior
 
 
@@ -30,6 +32,7 @@ class LatchedBehavior:
         age: Control steps since it began.
         fading: Control steps over which it fades; 0 while it is latched.
         controller: The controller of mode ``pid``.
+        muted: Whether it stays latched without acting.
     """
 
     behavior: Behavior
@@ -43,6 +46,7 @@ class LatchedBehavior:
     age: int = 0
     fading: int = 0
     controller: PidMagnitude | None = None
+    muted: bool = False
 
     @property
     def fade_factor(self) -> float:
@@ -63,9 +67,21 @@ class LatchedBehavior:
         if self.fading:
             return [self]
         steps = round(self.behavior.fade / dt)
-        if not steps or self.waiting is not None:
+        if not steps or self.waiting is not None or self.muted:
             return []
         return [replace(self, fading=steps, remaining=steps)]
+
+    def layer(self) -> StackEntry:
+        """Return its layer of the stack."""
+        edited = [unit for one in self.interventions for unit in one.units]
+        gains = None if self.controller is None else self.controller.gains
+        return StackEntry(
+            self.behavior.name,
+            self.factor,
+            self.muted,
+            tuple(dict.fromkeys((*self.base, *self.weights, *edited))),
+            None if gains is None else PidTuning(gains.kp, gains.ki, gains.kd),
+        )
 
     def copy(self) -> LatchedBehavior:
         """Copy what changes; behavior, weights and interventions never do."""
@@ -74,8 +90,9 @@ class LatchedBehavior:
 
 @dataclass(frozen=True)
 class LatchState:
-    """What a latch needs to go on: the latched behaviors, the gait, and the last activations."""
+    """What a latch needs to go on: the latched behaviors, the gait, the last activations, and held units."""
 
     latched: list[LatchedBehavior]
     clocks: dict[GaitMark, GaitClock]
     activations: NDArray[np.float32] | None
+    held: Mapping[int, float] = field(default_factory=dict)

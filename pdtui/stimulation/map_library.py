@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from pdtui.core.errors import MapError
+from pdtui.core.settings.settings_file import own_folder
 from pdtui.policies.weights.policy_file_lookup import is_file
 from pdtui.stimulation.map_reader import load_map, parse_map
 from pdtui.stimulation.map_writer import compose_map
@@ -20,9 +22,9 @@ def shipped_folder(kind: str) -> Path:
     return installed if installed.is_dir() else package.parent / kind
 
 
-def search_folders(kind: str) -> tuple[Path, ...]:
+def search_folders(kind: Literal["maps", "sessions"]) -> tuple[Path, ...]:
     """Return the folders to look in, the user's own first."""
-    own, shipped = Path.cwd() / kind, shipped_folder(kind)
+    own, shipped = Path.cwd() / own_folder(kind), shipped_folder(kind)
     return (own,) if own.resolve() == shipped.resolve() else (own, shipped)
 
 
@@ -38,8 +40,13 @@ def find_map(name: str) -> Path:
     for folder in search_folders("maps"):
         if is_file(folder / f"{name}.toml"):
             return folder / f"{name}.toml"
-    known = ", ".join(sorted({path.stem for path in _all_paths()})) or "none"
+    known = ", ".join(list_map_names()) or "none"
     raise MapError(f"no map '{name}'; available: {known}")
+
+
+def list_map_names() -> list[str]:
+    """Return the names of all maps, without reading them."""
+    return sorted({path.stem for path in _all_paths()})
 
 
 def user_map_path(path: Path) -> Path:
@@ -50,7 +57,7 @@ def user_map_path(path: Path) -> Path:
         MapError: the copy could not be found by its name, because there is one already.
     """
     shipped = shipped_folder("maps").resolve()
-    own = Path("maps") / path.name
+    own = own_folder("maps") / path.name
     if path.resolve().parent != shipped or own.parent.resolve() == shipped:
         return path
     if own.exists():

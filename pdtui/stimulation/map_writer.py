@@ -118,15 +118,23 @@ def replace_robot_options(text: str, options: RobotOptions, source: str) -> str:
     return _edit(text, source, replace)
 
 
-def add_behavior(text: str, behavior: Behavior, source: str) -> str:
-    """Return the text of a map with one more behavior; one of the same name is replaced but keeps its key."""
+def add_behavior(text: str, behavior: Behavior, source: str, comments: Sequence[str] = ()) -> str:
+    """Return the text of a map with one more behavior; one of the same name is replaced but keeps its key.
+
+    A new behavior begins with the comments.
+    """
     fields = behavior_fields(behavior)
 
     def add(document: Any) -> None:
         behaviors = document.setdefault("behaviors", tomlkit.aot())
         table = next((one for one in behaviors if one["name"] == behavior.name), None)
         if table is None:
-            behaviors.append(table_of(fields))
+            table = tomlkit.table()
+            for line in comments:
+                table.add(tomlkit.comment(line))
+            for name, value in table_of(fields).items():
+                table.add(name, value)
+            behaviors.append(table)
             return
         for name in [name for name in table if name not in ("name", "key")]:
             del table[name]

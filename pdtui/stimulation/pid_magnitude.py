@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Literal
+
 from simple_pid import PID
 
 from pdtui.core.attributes import wrap_angle
 from pdtui.stimulation.stimulation_map import PidGains
+
+GainName = Literal["kp", "ki", "kd"]
 
 
 class PidMagnitude:
@@ -41,6 +46,12 @@ class PidMagnitude:
     def set_target(self, target: float) -> None:
         """Move the target; an angle is wrapped."""
         self.target = wrap_angle(target) if self._wraps else target
+
+    def set_gain(self, name: GainName, value: float) -> None:
+        """Set a gain from now on; what the integral has summed up stays."""
+        kp, ki, kd = (value if one == name else getattr(self.gains, one) for one in ("kp", "ki", "kd"))
+        self.gains = replace(self.gains, kp=kp, ki=ki, kd=kd)
+        self._pid.tunings = kp, ki, kd
 
     def update(self, value: float) -> float:
         """Return the magnitude c for the attribute's present value; call it once per control step."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -195,3 +196,13 @@ class StimulationMap:
                     parse_unit(address, layers)
                 except PolicyError as error:
                     raise MapError(f"{self.source}: behavior '{behavior.name}': {error}") from error
+
+    def check_commands(self, robot: str, commands: Collection[str]) -> None:
+        """Check that a robot of this name has all commands that behaviors give; else raise a `MapError`."""
+        for behavior in self.behaviors.values():
+            for name in behavior.commands:
+                if name not in commands:
+                    known = f"available: {', '.join(commands)}" if commands else "it has none"
+                    raise MapError(
+                        f"{self.source}: behavior '{behavior.name}': {robot} has no command '{name}'; {known}"
+                    )

@@ -78,7 +78,7 @@ class LeggedRobotBatch:
         self._physics = np.zeros((count, 1 + self._nq + self._nv))
         self._command = np.zeros((count, 3))
         self._action, self._last_action = np.zeros((count, joints)), np.zeros((count, joints))
-        self._foot_times = np.zeros((count, len(self._one.feet)))
+        self._foot_times = np.zeros((count, 2, len(self._one.feet)))
         self._age = np.zeros(count, np.int64)
         self.ages = [0]
         self.restarted = np.zeros(count, bool)

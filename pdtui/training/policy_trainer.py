@@ -12,16 +12,16 @@ from typing import Any, Generic, TypeVar
 
 import jax
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.outcome import Outcome, is_failure
-from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
+from pdtui.policies.weights.policy_network import NetworkSpec
 from pdtui.policies.weights.weights_file import save_network
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot
-from pdtui.training.multilayer_perceptron import ACTIVATIONS, MlpParameters, apply_mlp
+from pdtui.training.actor_conversion import Actor, actor_to_network, make_numpy_actor
+from pdtui.training.multilayer_perceptron import MlpParameters
 from pdtui.training.robot_batch import RobotBatch
 from pdtui.training.training_checkpoint import load_checkpoint, save_checkpoint
 from pdtui.training.training_config import TrainingConfig
@@ -29,7 +29,6 @@ from pdtui.training.training_config import TrainingConfig
 # First seeds of the episodes that select the best weights, and of those that its published score comes from.
 SELECTION_SEEDS, REPORT_SEEDS = 1_000_000, 2_000_000
 _ITERATIONS_PER_REPORT = 16
-Actor = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 Config = TypeVar("Config", bound=TrainingConfig)
 
 
@@ -95,35 +94,6 @@ def _run_episodes(
     return returns, speeds / np.maximum(lengths, 1), outcomes
 
 
-def make_numpy_actor(
-    params: MlpParameters, rng: np.random.Generator | None, activation: str = "tanh"
-) -> Actor:
-    """Return a squashed Gaussian actor in NumPy: its mean actions, or samples where a generator is given."""
-    params, activate = jax.tree.map(np.asarray, params), ACTIVATIONS[activation][1]
-
-    def act(observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        mean, log_std = np.split(apply_mlp(params, observation, activate), 2, axis=-1)
-        if rng is not None:
-            noise = rng.standard_normal(mean.shape, np.float32)
-            mean = mean + np.exp(np.clip(log_std, -5.0, 2.0)) * noise
-        action: NDArray[np.float32] = np.tanh(mean)
-        return action
-
-    return act
-
-
-def actor_to_network(params: MlpParameters, spec: NetworkSpec) -> PolicyNetwork:
-    """Return the actor as the network that the policy runtime loads."""
-    network = PolicyNetwork(spec)
-    tensors = dict(network.state_dict())
-    for index, layer in enumerate(params):
-        name = "head" if index == len(params) - 1 else f"hidden.{index}"
-        tensors[f"{name}.weight"] = torch.from_numpy(np.array(layer["w"]).T.copy())
-        tensors[f"{name}.bias"] = torch.from_numpy(np.array(layer["b"]).copy())
-    network.load_tensors(tensors)
-    return network
-
-
 class PolicyTrainer(ABC, Generic[Config]):
     """One training run in a folder, which continues from its last checkpoint if there is one.
 
@@ -158,6 +128,11 @@ class PolicyTrainer(ABC, Generic[Config]):
             self.steps, self.best = int(progress["steps"]), progress["best"]
             self.restore_further(arrays, progress)
 
+    @property
+    def has_initial_policy(self) -> bool:
+        """Whether the run begins from a policy, so that its start is worth an evaluation."""
+        return bool(self.config.initial_policy or self.sample.training_recipe.initial_policy)
+
     @abstractmethod
     def build(self) -> None:
         """Make the robots, the learner and the untrained state."""
@@ -189,6 +164,8 @@ class PolicyTrainer(ABC, Generic[Config]):
             report: Called with the control steps so far, the score if there was an evaluation, and the best.
         """
         config, iterations = self.config, 0
+        if not self.steps and self.has_initial_policy:
+            report(0, self._evaluate(), self._best_score())
         while self.steps < config.total_steps:
             taken = self.advance()
             self.steps += taken

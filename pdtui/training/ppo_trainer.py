@@ -5,8 +5,8 @@ MuJoCo releases Python's lock while it steps. For a simulator that does not, eac
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -17,9 +17,10 @@ from threadpoolctl import threadpool_limits
 from pdtui.core.errors import TrainingError
 from pdtui.policies.weights.policy_network import PolicyNetwork
 from pdtui.policies.weights.weights_file import find_weights_file, load_network
+from pdtui.training.actor_conversion import Actor, make_numpy_actor, network_to_actor
 from pdtui.training.multilayer_perceptron import MlpParameters
-from pdtui.training.policy_imitation import fit_actor
-from pdtui.training.policy_trainer import PolicyTrainer, make_numpy_actor
+from pdtui.training.policy_imitation import fit_actor, imitate, make_demonstrator
+from pdtui.training.policy_trainer import PolicyTrainer
 from pdtui.training.ppo_learner import PpoLearner, PpoRollout, PpoState
 from pdtui.training.robot_batch import RemoteRobotBatch, RobotBatch, TransitionBatch
 from pdtui.training.training_config import PpoConfig
@@ -27,8 +28,6 @@ from pdtui.training.training_config import PpoConfig
 THREADS = 2
 # Control steps of the initial policy from which the observations are normalised.
 _WARM_START_STEPS = 200
-# Rounds of imitation, control steps of every robot in each, and the deviation of the noise on the actions.
-_IMITATION_ROUNDS, _IMITATION_STEPS, _IMITATION_NOISE = 3, 500, 0.08
 # A smaller deviation than this would blow up inputs that hardly change.
 _MIN_DEVIATION = 0.01
 
@@ -45,11 +44,14 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
             self.batches = [RemoteRobotBatch(self.robot, self.robot_options, share, seed) for seed in seeds]
         else:
             self.batches = [RobotBatch(self.make, share, seed) for seed in seeds]
+        initial = self.config.initial_policy or recipe.initial_policy
+        if not (initial or self.config.imitates):  # there is nothing that an untrained critic could spoil
+            self.config = replace(self.config, critic_iterations=0)
         self.learner = PpoLearner(self.config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self._threads = ThreadPoolExecutor(THREADS)
         if not self.checkpoint.exists():
-            self._begin(self.config.initial_policy or recipe.initial_policy)
+            self._begin(initial)
 
     def advance(self) -> int:
         on_host: PpoState = jax.tree.map(np.asarray, self.state)
@@ -74,43 +76,24 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
         if same and network.spec.activation == self.config.activation:
             self._warm_start(network)
         else:
-            actor = network_to_actor(network)
-            act, inputs = make_numpy_actor(actor, None, network.spec.activation), actor[0]["w"].shape[0]
-            self._imitate(lambda seen: act(seen[:, :inputs]))
+            self._imitate(make_demonstrator(network))
 
     def _warm_start(self, network: PolicyNetwork) -> None:
-        actor = network_to_actor(network)
-        act, inputs = make_numpy_actor(actor, None, self.config.activation), actor[0]["w"].shape[0]
-        seen = []
+        act, seen = make_demonstrator(network), []
         for _ in range(_WARM_START_STEPS):
-            observations = self._observations()
-            seen.append(observations)
-            self._step(act(observations[:, :inputs]))
+            seen.append(self._observations())
+            self._step(act(seen[-1]))
+        actor = network_to_actor(network)
         self.state = warm_start_policy(self.learner, self.state, actor, np.concatenate(seen))
 
-    def _imitate(self, demonstrate: Callable[[NDArray[np.float32]], NDArray[np.float32]]) -> None:
-        """Learn to act as somebody does, in several rounds.
-
-        After the first round the learner acts itself, so that it is told what to do where it goes astray
-        (Ross et al., "A Reduction of Imitation Learning and Structured Prediction to No-Regret Online
-        Learning", 2011).
-
-        Args:
-            demonstrate: Returns the actions to take, given observations.
-        """
+    def _imitate(self, demonstrate: Actor) -> None:
         untrained = self.state
-        seen: list[NDArray[np.float32]] = []
-        actions: list[NDArray[np.float32]] = []
-        for number in range(_IMITATION_ROUNDS):
-            act = make_numpy_actor(self.averaged_actor(), None, self.config.activation)
-            for _ in range(_IMITATION_STEPS):
-                seen.append(self._observations())
-                actions.append(demonstrate(seen[-1]))
-                noise = self.rng.normal(0.0, _IMITATION_NOISE, actions[-1].shape).astype(np.float32)
-                taken = act(seen[-1]) if number else actions[-1]
-                self._step(np.clip(taken + noise, -1.0, 1.0))
-            rows = np.concatenate(seen), np.concatenate(actions)
-            self.state, _ = fit_actor(self.learner, untrained, *rows, self.rng)
+
+        def fit(seen: NDArray[np.float32], actions: NDArray[np.float32]) -> Actor:
+            self.state, _ = fit_actor(self.learner, untrained, seen, actions, self.rng)
+            return make_numpy_actor(self.averaged_actor(), None, self.config.activation)
+
+        imitate(self._observations, self._step, demonstrate, fit, self.config.imitation_rounds, self.rng)
 
     def _collect(self, state: PpoState) -> PpoRollout:
         observation = self._observations()
@@ -125,14 +108,6 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
     def _step(self, squashed: NDArray[np.float32]) -> list[TransitionBatch]:
         shares = np.split(self.to_robot(squashed), len(self.batches))
         return list(self._threads.map(lambda batch, actions: batch.step(actions), self.batches, shares))
-
-
-def network_to_actor(network: PolicyNetwork) -> MlpParameters:
-    """Return the network's layers on raw observations, in the form of `PpoLearner.folded_actor`."""
-    return [
-        {"w": jnp.asarray(layer.weight.detach().numpy().T), "b": jnp.asarray(layer.bias.detach().numpy())}
-        for layer in (*network.hidden, network.head)
-    ]
 
 
 def warm_start_policy(

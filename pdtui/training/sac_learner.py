@@ -73,7 +73,7 @@ class SacLearner:
             optax.adam(optax.schedules.linear_schedule(rate, rate * config.final_rate, count))
             for count in (updates, max(updates // 2, 1), max(updates // 2, 1))
         )
-        self.update = jax.jit(self._update)
+        self.update, self.update_critics = jax.jit(self._update), jax.jit(self._update_critics)
 
     def init(self, seed: int) -> SacState:
         """Return the untrained state."""
@@ -139,3 +139,8 @@ class SacLearner:
             return self._actor_step(self._critic_step(state, second), second), None
 
         return jax.lax.scan(pair, state, batches)[0]
+
+    def _update_critics(self, state: SacState, batches: TransitionBatch) -> SacState:
+        """Update the critics alone for each batch, leading axes (pairs, 2, batch)."""
+        flat = TransitionBatch(*(leaf.reshape(-1, *leaf.shape[2:]) for leaf in batches))
+        return jax.lax.scan(lambda kept, batch: (self._critic_step(kept, batch), None), state, flat)[0]

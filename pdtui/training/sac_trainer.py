@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.policies.weights.weights_file import find_weights_file, load_network
+from pdtui.training.actor_conversion import Actor, make_numpy_actor
 from pdtui.training.multilayer_perceptron import MlpParameters
-from pdtui.training.policy_trainer import Actor, PolicyTrainer, make_numpy_actor
+from pdtui.training.policy_imitation import fit_gaussian_actor, imitate, make_demonstrator
+from pdtui.training.policy_trainer import PolicyTrainer
 from pdtui.training.robot_batch import RobotBatch, TransitionBatch
 from pdtui.training.sac_learner import SacLearner
 from pdtui.training.training_config import SacConfig
 
 # Deviation of the noise on what a rule-based driver does, so that the critics see other actions too.
 _DEMONSTRATION_NOISE = 0.2
+# With what a run from another policy begins: log deviations about those that the entropy is kept at, and a
+# small weight of the entropy, so that an untrained weight does not drive the actor away at once.
+_INITIAL_LOG_STD, _INITIAL_LOG_ALPHA = -2.4, -6.0
 
 
 class ReplayBuffer:
@@ -63,6 +71,8 @@ class SacTrainer(PolicyTrainer[SacConfig]):
         self.learner = SacLearner(config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self.replay = ReplayBuffer(config.capacity, self.observations, self.actions)
+        if config.initial_policy and not self.checkpoint.exists():
+            self._imitate(make_demonstrator(load_network(find_weights_file(config.initial_policy))))
 
     def advance(self) -> int:
         config = self.config
@@ -72,6 +82,9 @@ class SacTrainer(PolicyTrainer[SacConfig]):
             batches = self.replay.sample(self.rng, chunk // config.steps_per_update, config.batch)
             # The update runs in XLA's threads while the robots below step with the actor before it.
             self.state = self.learner.update(self.state, batches)
+        elif config.initial_policy and self.replay.size >= config.batch:
+            batches = self.replay.sample(self.rng, chunk // config.steps_per_update, config.batch)
+            self.state = self.learner.update_critics(self.state, batches)
         for _ in range(config.chunk):
             self._collect(actor)
         return chunk
@@ -89,13 +102,31 @@ class SacTrainer(PolicyTrainer[SacConfig]):
     def restore_further(self, arrays: dict[str, NDArray[Any]], progress: dict[str, Any]) -> None:
         self.replay.load(arrays, int(progress["count"]))
 
+    def _imitate(self, demonstrate: Actor) -> None:
+        untrained, (batch,) = self.state, self.batches
+
+        def fit(seen: NDArray[np.float32], actions: NDArray[np.float32]) -> Actor:
+            actor, _ = fit_gaussian_actor(untrained.actor, seen, actions, _INITIAL_LOG_STD, self.rng)
+            self.state = untrained._replace(
+                actor=actor, average=jax.tree.map(jnp.copy, actor), log_alpha=jnp.asarray(_INITIAL_LOG_ALPHA)
+            )
+            return make_numpy_actor(actor, None)
+
+        def step(squashed: NDArray[np.float32]) -> None:
+            batch.step(self.to_robot(squashed))
+
+        rounds = self.config.imitation_rounds
+        imitate(lambda: np.array(batch.observations), step, demonstrate, fit, rounds, self.rng)
+
     def _collect(self, actor: Actor) -> None:
         (batch,) = self.batches
         if self.replay.size < self.config.random_steps:
             shape = (self.config.worlds, self.actions)
-            if self.config.imitates:
+            if self.config.initial_policy or self.config.imitates:
                 noise = _DEMONSTRATION_NOISE * self.rng.standard_normal(shape, np.float32)
-                squashed = np.clip(batch.suggest_actions() + noise, -1.0, 1.0)
+                own = self.config.initial_policy
+                shown = actor(batch.observations) if own else batch.suggest_actions()
+                squashed = np.clip(shown + noise, -1.0, 1.0)
             else:
                 squashed = self.rng.uniform(-1.0, 1.0, shape).astype(np.float32)
         else:

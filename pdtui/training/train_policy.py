@@ -26,6 +26,7 @@ def train_policy(
     layers: tuple[int, ...] | None = None,
     activation: str | None = None,
     initial_policy: str | None = None,
+    imitation_rounds: int | None = None,
     robot_options: RobotOptions = NO_ROBOT_OPTIONS,
 ) -> Path:
     """Train a policy in a folder, or continue there, and return the path of the best weights.
@@ -52,9 +53,16 @@ def train_policy(
         raise TrainingError(f"training needs the extra: pip install 'pdtui[train]' ({error})") from error
     options = {**recipe.options, **({"forward": forward} if forward else {}), **robot_options}
     defaults = PpoConfig() if algorithm == "ppo" else SacConfig()
-    choices: dict[str, Any] = {"layers": layers, "activation": activation, "initial_policy": initial_policy}
-    if algorithm == "sac" and (activation not in (None, "tanh") or initial_policy):
-        raise TrainingError("--activation and --initial-policy are for PPO; SAC trains a tanh network anew")
+    choices: dict[str, Any] = {
+        "layers": layers,
+        "activation": activation,
+        "initial_policy": initial_policy,
+        "imitation_rounds": imitation_rounds,
+    }
+    if algorithm == "sac" and activation not in (None, "tanh"):
+        raise TrainingError("--activation is for PPO; SAC trains a tanh network")
+    if imitation_rounds is not None and not (initial_policy or recipe.settings.get("imitates")):
+        raise TrainingError("--imitation-rounds is for runs that begin with a policy; give --initial-policy")
     given = {"total_steps": steps, "learning_rate": learning_rate, **choices}
     settings = {**recipe.settings, **(recipe.sac_settings if algorithm == "sac" else {})}
     changes = {name: value for name, value in settings.items() if hasattr(defaults, name)}
@@ -69,6 +77,7 @@ def train_policy(
     command += f" --layers {','.join(map(str, layers))}" if layers else ""
     command += f" --activation {activation}" if activation else ""
     command += f" --initial-policy {Path(initial_policy).stem}" if initial_policy else ""
+    command += f" --imitation-rounds {imitation_rounds}" if imitation_rounds is not None else ""
 
     def report(taken: int, _: ActorScore | None, best: ActorScore | None) -> None:
         if progress is not None:

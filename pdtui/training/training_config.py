@@ -26,6 +26,9 @@ class TrainingConfig:
         evaluate_robots: Robots on which these episodes run at a time.
         imitates: Whether the policy first learns from the robot's rule-based driver: PPO to act as it does,
             and SAC from what it does instead of random actions.
+        initial_policy: Weights file or name of the shipped policy that the run starts from, instead of the
+            recipe's. PPO imitates one with other layers first, and SAC imitates any.
+        imitation_rounds: Rounds of imitation at the start, of 500 control steps of every robot each.
         reward_scale: Factor on rewards, which brings the values to the order of 1.
     """
 
@@ -42,6 +45,8 @@ class TrainingConfig:
     evaluate_steps: int = 1000
     evaluate_robots: int = 32
     imitates: bool = False
+    initial_policy: str = ""
+    imitation_rounds: int = 3
     reward_scale: float = 1.0
 
 
@@ -60,8 +65,6 @@ class PpoConfig(TrainingConfig):
         gae: λ of the generalised advantage estimation.
         entropy: Weight of the entropy bonus.
         log_std: Initial log standard deviation of the actions.
-        initial_policy: Weights file or name of the shipped policy that the run starts from, instead of the
-            recipe's. One with other layers is imitated first.
         critic_iterations: Iterations at the start in which only the critic learns, so that an untrained one
             does not spoil a policy that can act already.
         least_deviation: Least deviation by which an observed number is divided. Numbers that hardly change
@@ -80,7 +83,6 @@ class PpoConfig(TrainingConfig):
     gae: float = 0.95
     entropy: float = 0.001
     log_std: float = -0.5
-    initial_policy: str = ""
     critic_iterations: int = 0
     reward_scale: float = 0.02
     least_deviation: float = 0.0
@@ -95,7 +97,8 @@ class SacConfig(TrainingConfig):
         batch: Transitions per update.
         final_rate: Share of `learning_rate` that is left at the end of the run.
         tau: Rate per update at which the target critics follow the critics.
-        random_steps: Control steps with random actions, or a rule-based driver's, before learning starts.
+        random_steps: Control steps with random actions before learning starts, or with those of a rule-based
+            driver or of the policy that the run starts from. In the latter, only the critics learn.
         capacity: Transitions that the replay buffer holds.
     """
 

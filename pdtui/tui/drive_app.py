@@ -9,24 +9,26 @@ from time import monotonic
 from typing import cast
 
 from textual import events
-from textual.app import App, ComposeResult
-from textual.binding import Binding
+from textual.app import ComposeResult
 from textual.containers import Container
 from textual.reactive import reactive
 
 from pdtui.core.errors import PdtuiError
-from pdtui.core.reserved_keys import KEY_TABLE
 from pdtui.driving.drive_client import DriveConnection
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import displayed_key_name
+from pdtui.tui.commands.key_bound_app import HINTS, NO_KEYMAP, KeyBoundApp
 from pdtui.tui.help_screen import HelpScreen
 from pdtui.tui.snapshot_widget import SnapshotWidget
+from pdtui.tui.spectra.spectra_pane import SpectraPane
+from pdtui.tui.strip.unit_picked import UnitPicked
 from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
-from pdtui.tui.terminal_driver import TerminalDriver
 from pdtui.tui.terminal_size_notice import LEAST_SIZE, TerminalSizeNotice
 from pdtui.tui.theme import THEME
+from pdtui.tui.timeline.timeline_bar import TimelineBar, describe_past_keys
+from pdtui.tui.unit_bench.bench_pane import BenchPane, BenchRequest
 from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
 from pdtui.tui.widgets.attribute_table import AttributeTable
 from pdtui.tui.widgets.behavior_list import BehaviorList
@@ -34,23 +36,14 @@ from pdtui.tui.widgets.path_view import PathView
 from pdtui.tui.widgets.robot_view import RobotView
 from pdtui.tui.widgets.status_lines import KeyLine, NoticeLine, StatusLine
 from pdtui.tui.widgets.unit_table import UnitTable
+from pdtui.tui.widgets.world_picture import WorldPicture
 
 NOTICE_SECONDS = 4.0
 _ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
-# A key that changes the run goes to the drive under its original name, whatever key the user gave it.
-# Each binding has an id, so that users can remap it.
-BINDINGS: list[Binding] = [
-    *(Binding(row.key, row.action or f"run_key('{row.key}')", row.says, id=row.id) for row in KEY_TABLE),
-    Binding("ctrl+c", "leave", "ends the drive and quits, always", id="quit_always", priority=True),
-]
-_HINTS = {row.id: row.hint for row in sorted(KEY_TABLE, key=lambda row: row.hint_rank) if row.hint}
-"""Words of the key line by the bindings' ids, the most useful first."""
 
 
-class DriveApp(App[str], inherit_bindings=False):
+class DriveApp(KeyBoundApp):
     """Shows the newest snapshot of a drive and passes keys on to it.
-
-    Textual's own keys are left out: with its ctrl+q, which resumes output on many terminals, it would quit.
 
     The caller closes the connection afterwards. `run` returns None when the user quits; where the drive's
     process fails, it returns the failure's message and `return_code` is 1.
@@ -60,12 +53,12 @@ class DriveApp(App[str], inherit_bindings=False):
         stimulation_map: the behaviors that the drive was started with.
         fps: polls of the connection per second.
         watching: whether the drive follows a recording, so that keys that would change it are refused.
+        theme: name of the theme.
+        keymap: the user's keys, by the bindings' ids.
     """
 
     CSS = DRIVE
     TITLE = "pdtui"
-    BINDINGS = BINDINGS  # type: ignore[assignment]  # Textual's own type is an invariant list of a union
-    ENABLE_COMMAND_PALETTE = False
     HORIZONTAL_BREAKPOINTS = WIDTHS
     VERTICAL_BREAKPOINTS = HEIGHTS
 
@@ -80,16 +73,15 @@ class DriveApp(App[str], inherit_bindings=False):
         *,
         fps: int = 12,
         watching: bool = False,
+        theme: str = THEME.name,
+        keymap: Mapping[str, str] = NO_KEYMAP,
     ) -> None:
-        super().__init__(driver_class=TerminalDriver)
-        self.connection, self.map, self.fps, self.watching = connection, stimulation_map, fps, watching
-        # The map's keys come before the application's own.
         behaviors = stimulation_map.behaviors.values()
-        self._map_keys = {stimulation_map.default_key, *(behavior.key for behavior in behaviors)}
-        self._notice_until = 0.0
+        map_keys = {stimulation_map.default_key, *(behavior.key for behavior in behaviors)}
+        super().__init__(map_keys, theme, keymap)
+        self.connection, self.map, self.fps, self.watching = connection, stimulation_map, fps, watching
+        self._keymap_at_first, self._notice_until = keymap, 0.0
         self._help: HelpScreen | None = None
-        self.register_theme(THEME)
-        self.theme = THEME.name
 
     def compose(self) -> ComposeResult:
         def bound(panel: SnapshotWidget) -> SnapshotWidget:
@@ -99,13 +91,18 @@ class DriveApp(App[str], inherit_bindings=False):
         with Container(id="body"):
             with Container(id="left"):
                 yield bound(RobotView(self.map, id="robot"))
+                yield bound(WorldPicture(self.map, id="world"))
                 with Container(id="below"):
                     yield bound(PathView(self.map, id="path"))
                     yield bound(UnitTable(self.map, id="units"))
+                yield bound(SpectraPane(self.map, self.connection, id="spectra"))
             with Container(id="right"):
+                bench = BenchPane(self.map, self.action_run_key, self.connection.search_units, self.say)
+                yield bench.data_bind(DriveApp.facts, DriveApp.snapshot)
                 yield bound(BehaviorList(self.map, id="behaviors"))
                 yield bound(AttributeTable(self.map, id="attributes"))
         yield bound(ActivationHeatmap(self.map, id="heat"))
+        yield bound(TimelineBar(self.map, self.connection, id="timeline"))
         yield bound(NoticeLine(self.map, id="notice")).data_bind(DriveApp.notice)
         yield KeyLine(self.map, id="keys")
         yield TerminalSizeNotice(id="too-small")
@@ -114,16 +111,18 @@ class DriveApp(App[str], inherit_bindings=False):
         self.query_one(StatusLine).watching = self.watching
         self._show_keys()
         self.set_interval(1.0 / self.fps, self._poll)
-        # By default, these signals would leave the terminal raw and the recording unfinished. The event loop
-        # removes the handlers when it is closed.
+        self.say(self.describe_hidden_keys(self._keymap_at_first))
         loop = asyncio.get_running_loop()
-        for number in _ENDING_SIGNALS:
+        for number in _ENDING_SIGNALS:  # which would leave the terminal raw and the recording unfinished
             loop.add_signal_handler(number, self._end, number)
 
     def watch_facts(self, facts: DriveFacts | None) -> None:
         """Leave out the robot's picture for a world without links, and show the keys that the robot has."""
-        self.screen_stack[0].set_class(facts is not None and not facts.links, "-bodiless")
+        bodiless, pictured = (False, False) if facts is None else (not facts.links, facts.pictured)
+        self.screen_stack[0].set_class(bodiless, "-bodiless").set_class(pictured, "-pictured")
         self._show_keys()
+        if facts is not None and facts.branches:  # the drive has left the recording
+            self.query_one(StatusLine).watching = self.watching = False
 
     def _end(self, number: signal.Signals) -> None:
         self.exit(f"ended by {number.name}", return_code=1)
@@ -137,30 +136,28 @@ class DriveApp(App[str], inherit_bindings=False):
         super().set_keymap(dict(keymap))
         if self.is_running:
             self._show_keys()
-            if self._help is not None and self._help is not self.screen:
-                self.uninstall_screen("help")
-                self._help = None
+            self._forget_help()
 
-    @property
-    def keys_now(self) -> dict[str, tuple[str, str]]:
-        """Key and description of each binding by id, as remapped, unless map or robot leave it out."""
-        found: dict[str, tuple[str, str]] = {}
-        for key, active in self.screen_stack[0].active_bindings.items():
-            binding = active.binding
-            if active.node is self and binding.id and (binding.priority or key not in self._map_keys):
-                found.setdefault(binding.id, (key, binding.description))
-        if self.facts is None or not self.facts.manual_controls:
-            found.pop("takeover", None)
-        return {name: found[name] for binding in BINDINGS if (name := binding.id) in found}
+    def watch_theme(self, name: str) -> None:
+        super().watch_theme(name)
+        if self.is_running:
+            self._forget_help()
+
+    def _forget_help(self) -> None:
+        if self._help is not None and self._help is not self.screen:
+            self.uninstall_screen("help")
+            self._help = None
+
+    def has_binding(self, name: str) -> bool:
+        return name != "takeover" or (self.facts is not None and bool(self.facts.manual_controls))
 
     def _show_keys(self) -> None:
         now = self.keys_now
-        shown = tuple(
-            (displayed_key_name(now[name][0]), says) for name, says in _HINTS.items() if name in now
-        )
+        shown = tuple((now[name][0], says) for name, says in HINTS.items() if name in now)
         self.screen_stack[0].query_one(KeyLine).keys = shown
         leave = now.get("quit", now["quit_always"])[0]
-        self.screen_stack[0].query_one(NoticeLine).hints = f"{displayed_key_name(leave)} quits"
+        notices = self.screen_stack[0].query_one(NoticeLine)
+        notices.hints, notices.past_hints = f"{displayed_key_name(leave)} quits", describe_past_keys(now)
 
     def _poll(self) -> None:
         if self._notice_until and monotonic() > self._notice_until:
@@ -184,7 +181,11 @@ class DriveApp(App[str], inherit_bindings=False):
 
     def on_key(self, event: events.Key) -> None:
         """Give the map's keys precedence over all bindings, and name a key that is not bound."""
-        if event.key in self._map_keys:
+        if self.choosing_command:
+            return
+        if self.query_one(BenchPane).takes_key(event.key):
+            event.prevent_default()
+        elif event.key in self.map_keys:
             event.prevent_default()
             self.action_run_key(event.key)
         elif not self.screen.is_modal and event.key not in self.screen.active_bindings:
@@ -192,6 +193,8 @@ class DriveApp(App[str], inherit_bindings=False):
 
     def action_run_key(self, key: str) -> None:
         """Send a key that changes the run, unless a recording is being watched."""
+        if self.query_one(TimelineBar).takes_key(key):
+            return
         if self.watching:
             self.say(f"{displayed_key_name(key)}: this drive follows a recording, so keys cannot change it")
         elif self.snapshot is not None and self.snapshot.finished:
@@ -200,10 +203,15 @@ class DriveApp(App[str], inherit_bindings=False):
             self.say("the policy is still loading")
         else:
             self.connection.press_key(key)
+            self.query_one(BehaviorList).echo(key)
 
     def action_pace(self, request: str) -> None:
         """Change the drive's pace."""
         self.connection.change_pace(cast(PaceRequest, request))
+
+    def action_pane(self, pane: str, request: str) -> None:
+        """Have a pane do what its key asks for."""
+        cast(SnapshotWidget, self.query_one(f"#{pane}")).handle_request(request)
 
     def action_toggle_ghost(self) -> None:
         """Turn the ghost on or off; it is no part of the run, so it may run beside a recording, too."""
@@ -212,14 +220,20 @@ class DriveApp(App[str], inherit_bindings=False):
         else:
             self.connection.toggle_ghost()
 
+    def action_bench(self, request: BenchRequest) -> None:
+        """Open or close the unit bench, or show other layers."""
+        self.query_one(BenchPane).act(request)
+
+    def on_unit_picked(self, event: UnitPicked) -> None:
+        self.query_one(BenchPane).pick(event.unit)
+
     def action_zoom_path(self, change: int) -> None:
         """Show more of the path for 1, less for −1."""
         self.query_one(PathView).zoom(change)
 
     def action_toggle_view(self) -> None:
-        """Switch between side view and top view."""
-        robot = self.query_one(RobotView)
-        robot.view = "above" if robot.view == "side" else "side"
+        """Look at the robot from the side or from above."""
+        self.query_one(RobotView).toggle_view()
 
     def action_help(self) -> None:
         """Show the help."""

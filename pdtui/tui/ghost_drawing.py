@@ -32,9 +32,17 @@ def describe_ghost(ghost: GhostSnapshot, step: int) -> str:
         return f"ghost: {make_printable(ghost.message)}"
     if ghost.condition == "running" and ghost.latest is not None:
         behind = step - ghost.latest.step
-        since = f"ghost since step {ghost.first}"
+        since = " ".join(filter(None, ("ghost", make_printable(ghost.label), f"since step {ghost.first}")))
         return since if behind < _BEHIND else f"ghost: {behind} steps behind"
     return _CONDITIONS.get(ghost.condition, "")
+
+
+def add_ghost_to_title(title: str, ghost: GhostSnapshot | None, step: int) -> str:
+    """Return the title of a table that compares the drive with its ghost, if there is one."""
+    if ghost is None:
+        return title
+    said = describe_ghost(ghost, step)
+    return said if ghost.condition == "failed" else f"{title} · {said}"
 
 
 def draw_ghost(

@@ -17,6 +17,7 @@ from pdtui.core.printable_text import make_printable
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import displayed_key_name
 from pdtui.tui.theme import STYLES
+from pdtui.tui.unit_bench.bench_keys import BENCH_KEYS
 
 _LATCHING = (
     "A key latches its behavior, which stays active until its period ends, or until you press the key of "
@@ -65,5 +66,8 @@ class HelpScreen(ModalScreen[None]):
         text.append(f"\n{_LATCHING}\n", STYLES.muted)
         text.append("\nother keys\n", STYLES.accent)
         for key, says in self._keys:
+            line(key, says, STYLES.key, STYLES.text)
+        text.append("\nwhile the unit bench is open\n", STYLES.accent)
+        for key, says in BENCH_KEYS:
             line(key, says, STYLES.key, STYLES.text)
         return text

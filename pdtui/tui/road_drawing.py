@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -87,3 +89,30 @@ def draw_traffic(
             canvas.draw_polygon(dots[row, :4], ink, halo=1.0)
         else:
             draw_box_edges(canvas, dots[row], ink)
+
+
+def draw_links_on_road(
+    canvas: BrailleCanvas,
+    camera: PerspectiveCamera,
+    links: Sequence[Link],
+    placed: Floats,
+    ends: Floats,
+    ink: int,
+) -> None:
+    """Draw links in one colour, after the rims of all, so that none cuts into another.
+
+    Args:
+        canvas, camera: Where, and as seen from where.
+        links: The links.
+        placed: Their world poses, shape (L, 7).
+        ends: Both ends of the axis of each, m, shape (L, 2, 3).
+        ink: Number of the colour.
+    """
+    dots = camera.project(ends)[0]
+    for halo in (1.0, 0.0):
+        for row, link in enumerate(links):
+            if link.shape == "box":
+                corners, _, _ = camera.project(compute_box_corners(link, placed[row]))
+                canvas.draw_polygon(corners[:4], ink, halo=halo)
+            else:
+                canvas.draw_capsule(dots[row, 0], dots[row, 1], link.size[0] * camera.zoom, ink, halo=halo)

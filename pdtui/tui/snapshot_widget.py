@@ -16,6 +16,7 @@ from textual.widget import Widget
 
 if TYPE_CHECKING:
     from textual import events
+    from textual.theme import Theme
 
     from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
     from pdtui.stimulation.stimulation_map import StimulationMap
@@ -44,6 +45,7 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         self._framed: list[Strip | None] = []
         self._painted_size = Size(0, 0)
         self._sides: Sides | None = None
+        self.forget()
 
     @abstractmethod
     def paint(self, width: int, height: int) -> list[Strip]:
@@ -56,7 +58,22 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         """Keep what later frames need of a snapshot; called once per snapshot."""
         del snapshot
 
-    def watch_facts(self) -> None:
+    def on_mount(self) -> None:
+        self.app.theme_changed_signal.subscribe(self, self._adopt_theme)
+
+    def _adopt_theme(self, _theme: Theme) -> None:
+        self._painted_size = Size(0, 0)
+        self.redraw()
+
+    def handle_request(self, request: str) -> None:
+        """Do what a key asks of this pane."""
+
+    def forget(self) -> None:
+        """Drop what was kept of snapshots, as another run begins."""
+
+    def watch_facts(self, old: DriveFacts | None, facts: DriveFacts | None) -> None:
+        if old is not None and facts is not None and old.branches != facts.branches:
+            self.forget()
         self.redraw()
 
     def watch_snapshot(self, snapshot: DriveSnapshot | None) -> None:

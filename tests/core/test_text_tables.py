@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.console import Console
 
-from pdtui.core.text_tables import format_seed_range, new_facts_table, new_table
+from pdtui.core.console.text_tables import format_seed_range, new_facts_table, new_table
 
 
 def _shown(table: object) -> list[str]:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from pdtui.core.errors import PdtuiError
-from pdtui.driving import drive_server
+from pdtui.driving import drive_process, drive_server
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.headless_drive import ENDING_SIGNALS, catch_ending_signals
@@ -75,7 +75,7 @@ def test_an_exception_in_the_simulation_is_told_and_recorded(
     monkeypatch.setattr(signal, "signal", lambda *_: None)  # they are this process's own
     path = tmp_path / "a.rrd"
     ours, theirs = Pipe()
-    drive_server.serve_drive(theirs, DriveConfig("ant", small_map, 0, recording=str(path)))
+    drive_process.serve_drive(theirs, DriveConfig("ant", small_map, 0, recording=str(path)))
     messages = []
     while ours.poll():
         messages.append(ours.recv())

@@ -11,10 +11,10 @@ from rich.console import Console
 from scipy import stats
 
 from pdtui.core.confidence_intervals import confidence_interval
+from pdtui.core.console.text_tables import format_mean_with_interval
 from pdtui.core.errors import MapError, WorkerError
 from pdtui.core.outcome import Outcome
 from pdtui.core.printable_text import to_json
-from pdtui.core.text_tables import format_mean_with_interval
 from pdtui.core.units import Stimulation
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.behavior_evaluation import MapEvaluation, evaluate_behaviors, plan_evaluation

@@ -79,7 +79,8 @@ def read_session_file(path: Path) -> None:
     from pdtui.cli.output.session_tables import session_comparison_table, session_details
     from pdtui.driving.keystrokes import format_keystrokes
     from pdtui.driving.session_replay import config_from_session
-    from pdtui.sessions.session_comparison import compare_sessions
+    from pdtui.sessions.comparison.session_comparison import compare_sessions
+    from pdtui.sessions.drive_path import compare_drive_paths, read_drive_path
     from pdtui.sessions.session_header import read_session_header
     from pdtui.sessions.session_integrity import examine_session
     from pdtui.sessions.session_reader import read_activations, read_session
@@ -101,7 +102,9 @@ def read_session_file(path: Path) -> None:
     with Path("/dev/null").open("w") as nowhere:
         console = Console(file=nowhere)
         console.print(session_details(session, summarise_session(session)))
-        console.print(session_comparison_table(compare_sessions(session, session)))
+        course = read_drive_path(session)
+        paths = compare_drive_paths(course, course, 0)
+        console.print(session_comparison_table(compare_sessions(session, session), (session, session), paths))
     format_keystrokes(session.events)
     config_from_session(session, str(path))
 

@@ -44,7 +44,7 @@ def test_standing_on_one_foot_is_rewarded_only_while_it_is_to_move(robot: SmallL
     )
     one = replace(robot.description, rewards=weights)
     state = robot.read_state()
-    times, fell = np.array([[0.3, -0.3]]), np.zeros(1, bool)
+    times, fell = np.array([[[0.3, -0.3], [0.0, 0.1]]]), np.zeros(1, bool)
 
     def reward(touching: list[bool], forward: float) -> float:
         now = replace(
@@ -58,14 +58,23 @@ def test_standing_on_one_foot_is_rewarded_only_while_it_is_to_move(robot: SmallL
     both, single = reward([True, True], 0.5), reward([False, True], 0.5)
     assert single - both == pytest.approx((0.5 + 2.0 * 0.32) * 0.02)
     assert reward([False, True], 0.0) == pytest.approx(reward([True, True], 0.0))
+    # The foot on the ground swung for 0.1 s, and the other one is in the air for 0.32 s.
+    one = replace(robot.description, rewards=replace(weights, longer_swing=0.2))
+    assert reward([False, True], 0.5) == pytest.approx(reward([True, True], 0.5))
+    one = replace(robot.description, rewards=replace(weights, longer_swing=0.24))
+    assert reward([False, True], 0.5) == pytest.approx(single)
 
 
 def test_foot_times_count_up_in_the_air_and_down_on_the_ground(robot: SmallLeggedRobot) -> None:
     state, fell = robot.read_state(), np.zeros(1, bool)
     state = replace(state, touching=np.array([[False, True]]))
-    for before, after in (((0.3, 0.3), (0.32, -0.02)), ((-0.3, -0.3), (0.02, -0.32))):
-        times = compute_legged_rewards(state, np.array([before]), 0.02, robot.description, fell)[1]
-        np.testing.assert_allclose(times, [after])
+    before = ((0.3, 0.3), (-0.3, -0.3))
+    after = ((0.32, -0.02), (0.02, -0.32))
+    swings = ((0.1, 0.3), (0.1, 0.2))  # the right foot has just landed, or not
+    for since, now, swing in zip(before, after, swings, strict=True):
+        times = np.array([[since, (0.1, 0.2)]])
+        new = compute_legged_rewards(state, times, 0.02, robot.description, fell)[1]
+        np.testing.assert_allclose(new, [[now, swing]])
 
 
 def test_a_sensor_that_the_model_lacks_is_named(robot: SmallLeggedRobot) -> None:

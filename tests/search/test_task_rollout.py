@@ -13,9 +13,9 @@ from pdtui.core.outcome import Outcome
 from pdtui.core.units import Stimulation
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
-from pdtui.robots.a1_tasks import A1_TASKS
-from pdtui.robots.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
 from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict, find_task
+from pdtui.robots.tasks.a1_tasks import A1_TASKS
+from pdtui.robots.tasks.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
 from pdtui.robots.walker import WALKER_TASKS
 from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
 

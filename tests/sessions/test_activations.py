@@ -10,8 +10,8 @@ import pytest
 from rerun.chunk import RrdReader
 
 from pdtui.core.errors import SessionError
+from pdtui.sessions.comparison.session_comparison import compare_sessions
 from pdtui.sessions.export.export_writer import export_stream
-from pdtui.sessions.session_comparison import compare_sessions
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_activations, read_session
 from pdtui.sessions.session_repair import repair_session

@@ -115,6 +115,18 @@ def test_each_recording_has_an_application_of_its_own_with_its_layout(
     assert all(re.fullmatch(r"pdtui ant \d{4}-\d\d-\d\d [\d:]{8} \w{6}", name) for name in applications)
 
 
+def test_columns_have_names_in_the_table_for_the_viewer(recorded: Recorded) -> None:
+    path, loop, records = recorded
+    chunks = [chunk for chunk in RrdReader(path).stream() if chunk.entity_path == "/view/table"]
+    rows = [row for chunk in chunks for row in chunk.to_record_batch().to_pylist()]
+    assert [row["step"] for row in rows] == [record.step for record in records]
+    for column, one in enumerate(loop.robot.attributes):
+        found = np.array([row[f"{one.name} ({one.unit})"][0] for row in rows], np.float32)
+        assert np.array_equal(found, np.array([r.attributes[column] for r in records], np.float32))
+    assert [row["action 2"] for row in rows] == [[np.float32(record.action[2])] for record in records]
+    assert [row["reward"] for row in rows] == [[np.float32(record.reward)] for record in records]
+
+
 def test_the_layout_at_the_end_adds_what_came_and_leaves_out_what_did_not(
     recorded: Recorded, weights: Path, tmp_path: Path
 ) -> None:

@@ -76,7 +76,7 @@ def test_a_target_starts_at_the_present_value_and_moves(latch: BehaviorLatch) ->
     latch.latch_behavior("hold heading", np.array([0.0, 0.7]))
     view = latch.active[0]
     assert view.target == 0.7
-    latch.set_target("hold heading", 0.7 + 4.0)
+    latch.controller_of("hold heading").set_target(0.7 + 4.0)
     assert latch.active[0].target == pytest.approx(4.7 - 2 * math.pi)
     latch.latch_behavior("hold heading", AT_REST)
     assert latch.active == ()
@@ -87,7 +87,7 @@ def test_errors_name_what_there_is(latch: BehaviorLatch) -> None:
         latch.latch_behavior("fly", AT_REST)
     latch.latch_behavior("push", AT_REST)
     with pytest.raises(KeystrokeError, match="'push' holds no target"):
-        latch.set_target("push", 1.0)
+        latch.controller_of("push").set_target(1.0)
 
 
 def test_an_attribute_that_the_robot_lacks_is_named_at_once(small_map: StimulationMap) -> None:
@@ -98,7 +98,7 @@ def test_an_attribute_that_the_robot_lacks_is_named_at_once(small_map: Stimulati
 def test_a_saved_state_repeats_itself(latch: BehaviorLatch) -> None:
     values = np.column_stack([np.zeros(30), np.linspace(0.0, 0.5, 30)])
     latch.latch_behavior("hold heading", AT_REST)
-    latch.set_target("hold heading", 1.0)
+    latch.controller_of("hold heading").set_target(1.0)
     for row in values[:10]:
         latch.stimulate(row)
     state = latch.copy_state()
@@ -127,7 +127,7 @@ def test_a_controllers_output_is_added_to_its_base(map_text: str) -> None:
     latch = BehaviorLatch(parse_map(text, "m"), (16, 16), ATTRIBUTES, 0.05)
     latch.latch_behavior("hold heading", AT_REST)
     assert latch.stimulate(AT_REST) == Stimulation((5, 17), (0.5, -2.0))
-    latch.set_target("hold heading", 0.2)
+    latch.controller_of("hold heading").set_target(0.2)
     stimulation = latch.stimulate(AT_REST)
     controller = latch.active[0].magnitude
     assert controller is not None

@@ -10,11 +10,13 @@ import pytest
 import torch
 
 from pdtui.core.errors import TrainingError
-from pdtui.policies.weights.weights_file import load_network
+from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
+from pdtui.policies.weights.weights_file import load_network, save_network
 
 pytest.importorskip("jax", reason="the extra 'train' is not installed")
 
 from pdtui.policies.weights.policy_loading import load_policy
+from pdtui.training.actor_conversion import make_numpy_actor
 from pdtui.training.policy_trainer import ActorScore, PolicyTrainer
 from pdtui.training.ppo_trainer import PpoTrainer
 from pdtui.training.robot_batch import TransitionBatch
@@ -97,6 +99,35 @@ def test_the_weights_drive_and_say_how_they_came_about(tmp_path: Path) -> None:
     policy = load_policy(path, "ant")
     assert policy.layers == (8, 8)
     assert np.abs(policy.act(np.zeros(27)).action).max() <= 1.0
+
+
+@pytest.mark.parametrize("config", [SMALL, replace(SMALL_PPO, layers=(6, 6))], ids=["sac", "ppo"])
+def test_a_run_begins_by_imitating_a_policy(tmp_path: Path, config: SacConfig | PpoConfig) -> None:
+    """The critics of SAC learn for as long as the imitated actor drives, and no actor learns yet."""
+    torch.manual_seed(0)
+    bounds = (-1.0,) * 8, (1.0,) * 8
+    shown = PolicyNetwork(NetworkSpec("ant", 27, (8, 8), "tanh", 8, "squashed_gaussian", *bounds))
+    save_network(tmp_path / "shown.safetensors", shown)
+    initial = str(tmp_path / "shown.safetensors")
+    config = replace(config, initial_policy=initial, imitation_rounds=1, worlds=2, total_steps=64)
+    trainer = _make(tmp_path / "run", config)
+    seen = np.concatenate([batch.observations for batch in trainer.batches])
+    acted = make_numpy_actor(trainer.averaged_actor(), None)(seen)
+    goal = np.tanh(shown(torch.from_numpy(seen)).detach().numpy()[:, :8])
+    assert np.abs(acted - goal).mean() < 0.5 * np.abs(goal).mean()
+    if isinstance(config, SacConfig):
+        before = trainer.state
+        for _ in range(2):
+            trainer.advance()
+        assert all(
+            np.array_equal(a["w"], b["w"]) for a, b in zip(trainer.state.actor, before.actor, strict=True)
+        )
+        assert not np.array_equal(trainer.state.critics[0]["w"], before.critics[0]["w"])
+        assert trainer.state.log_alpha == before.log_alpha
+    first: list[tuple[int, ActorScore | None]] = []
+    trainer.run(lambda steps, score, _: first.append((steps, score)))
+    assert first[0][0] == 0
+    assert first[0][1] is not None
 
 
 def test_a_checkpoint_of_other_settings_is_refused(tmp_path: Path) -> None:

@@ -9,9 +9,9 @@ import torch
 
 from pdtui.core.errors import TrainingError
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
-from pdtui.training.policy_trainer import actor_to_network, make_numpy_actor
+from pdtui.training.actor_conversion import actor_to_network, make_numpy_actor, network_to_actor
 from pdtui.training.ppo_learner import PpoLearner
-from pdtui.training.ppo_trainer import network_to_actor, warm_start_policy
+from pdtui.training.ppo_trainer import warm_start_policy
 from pdtui.training.training_config import PpoConfig
 
 

@@ -9,7 +9,9 @@ import pytest
 
 from pdtui.core.errors import PdtuiError
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
+from pdtui.driving.live_spectra.spectra_snapshot import SpectraChoice
 from pdtui.driving.pacer import PaceRequest
+from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.drive_app import DriveApp
 from tests.tui.recorded_snapshots import drive_map, load
@@ -26,6 +28,10 @@ class ScriptedConnection:
         self.pressed: list[str] = []
         self.paced: list[PaceRequest] = []
         self.toggled = 0
+        self.sought: list[int] = []
+        self.branched = 0
+        self.spectra: list[SpectraChoice | None] = []
+        self.searched: list[UnitSearchRequest] = []
 
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:
         if not self.messages:
@@ -43,6 +49,18 @@ class ScriptedConnection:
 
     def toggle_ghost(self) -> None:
         self.toggled += 1
+
+    def seek(self, moment: int) -> None:
+        self.sought.append(moment)
+
+    def choose_spectra(self, choice: SpectraChoice | None) -> None:
+        self.spectra.append(choice)
+
+    def branch(self) -> None:
+        self.branched += 1
+
+    def search_units(self, request: UnitSearchRequest) -> None:
+        self.searched.append(request)
 
     def close(self) -> str:
         return "stopped: 0 steps"

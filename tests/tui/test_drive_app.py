@@ -18,7 +18,7 @@ from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
-from pdtui.tui.drive_app import BINDINGS
+from pdtui.tui.commands.key_bound_app import BINDINGS
 from pdtui.tui.help_screen import HelpScreen
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.widgets.robot_view import RobotView
@@ -31,7 +31,7 @@ Drive = tuple[DriveFacts, list[DriveSnapshot]]
 
 def test_importing_the_screen_loads_no_heavy_library() -> None:
     code = (
-        "import sys, pdtui.tui.drive_app, pdtui.tui.map_picker;"
+        "import sys, pdtui.tui.drive_app, pdtui.tui.home.home_app;"
         "print([m for m in ('torch', 'mujoco', 'gymnasium', 'rerun', 'scipy') if m in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

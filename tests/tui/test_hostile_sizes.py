@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -22,7 +23,8 @@ from pdtui.guide.guide_pages import read_guide
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 from pdtui.tui.guide.guide_app import GuideApp, GuideChooser
 from pdtui.tui.help_screen import HelpScreen
-from pdtui.tui.map_picker import MapPickerApp, MapPickerRow
+from pdtui.tui.home.home_app import HomeApp
+from pdtui.tui.home.home_contents import HomeContents
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.style_sheets import DRIVE
 from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
@@ -221,15 +223,16 @@ async def test_a_drive_survives_every_order_of_sizes(make_app: MakeApp, keys: li
                 assert [cell_len(line) for line in lines] == [panel.outer_size.width] * len(lines)
 
 
-async def test_the_list_of_maps_survives_every_order_of_sizes() -> None:
-    rows = [MapPickerRow("ant", f"Ant {row}", f"maps/ant{row}.toml", "p", row) for row in range(50)]
-    app = MapPickerApp(rows)
+async def test_the_home_screen_survives_every_order_of_sizes() -> None:
+    reports = tuple(Path(f"maps/ant{number}.rrd") for number in range(50))
+    app = HomeApp(HomeContents((), (), (), reports))
     async with app.run_test(size=(80, 24)) as pilot:
         for size in (*HOSTILE_SIZES, (80, 24)):
             await pilot.resize_terminal(*size)
             await pilot.press("pagedown", "7", "backspace")
         await pilot.press("7", "down", "enter")
-    assert app.return_value == rows[17]
+    assert app.return_value is not None
+    assert app.return_value.path == "maps/ant17.rrd"
 
 
 @pytest.mark.parametrize("key", ["", "t"])

@@ -66,7 +66,7 @@ def test_every_event_is_worded() -> None:
 async def test_the_help_lists_every_key_with_its_sentence(make_app: MakeApp, drive: Drive) -> None:
     facts, snapshots = drive
     app, connection = make_app([replace(facts, manual_controls=("steering",)), snapshots[0]])
-    async with app.run_test(size=(120, 60)) as pilot:
+    async with app.run_test(size=(120, 90)) as pilot:
         await played(pilot, connection)
         await pilot.press("question_mark")
         assert isinstance(app.screen, HelpScreen)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pdtui.core.scenery import Scenery
+from pdtui.core.scenery import Scenery, Traffic
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.pictures.perspective_camera import PerspectiveCamera
-from pdtui.sessions.episode_statistics import EpisodeStatistics
+from pdtui.sessions.episode_statistics import NO_STATISTICS, EpisodeStatistics
 from pdtui.tui.braille_canvas import BrailleCanvas
 from pdtui.tui.obstacle_drawing import draw_obstacles_from_above, draw_obstacles_from_side
 from pdtui.tui.theme import STYLES
@@ -73,6 +73,35 @@ async def test_a_drive_among_obstacles_begins_from_above(
         await played(pilot, connection)
         chosen: str = robot.view
         assert chosen == "side", "what the user chose stays"
+
+
+@pytest.mark.parametrize("size", [(80, 24), (160, 48)])
+async def test_a_wall_ahead_is_seen_from_the_side_and_from_above(
+    make_app: MakeApp, drive: Drive, size: tuple[int, int]
+) -> None:
+    facts, (first, *_) = drive
+    x, y = first.poses[0, :2]
+    app, connection = make_app([facts, first])
+    async with app.run_test(size=size) as pilot:
+        await played(pilot, connection)
+        robot = app.query_one(RobotView)
+        near = 2.5 * robot._extent  # beyond the edge of the picture of a robot without obstacles
+        wall = Traffic(
+            np.array([0]), ("obstacle",), np.array([[x + near, y, 0.5, 0.0]]), np.array([[0.1, 2.0, 1.0]])
+        )
+        counted = replace(NO_STATISTICS, passed=3.0, steps=100, involvement=1)
+        for view in ("side", "above"):
+            robot.view = view
+            connection.messages.append(replace(first, traffic=wall, statistics=counted))
+            await played(pilot, connection)
+            drawn = [
+                segment.text.strip()
+                for strip in robot.paint(*robot.content_size)
+                for segment in strip
+                if segment.style == STYLES.obstacle
+            ]
+            assert any(drawn), view
+        assert "3 passed · 1 step with a key" in notice(app)
 
 
 @pytest.mark.parametrize("size", [(80, 24), (160, 48)])

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
-from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
-from pdtui.tui.map_picker import MapPickerApp
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUnit
+from pdtui.tui.home.home_app import HomeApp
 from tests.tui.conftest import MakeApp, ScriptedConnection
 from tests.tui.ghost_snapshots import with_ghost
+from tests.tui.home.test_home_app import CONTENTS
 from tests.tui.screens import played
-from tests.tui.test_map_picker import ROWS
 
 Compare = Callable[..., bool]
 SMALL, LARGE = (80, 24), (160, 48)
@@ -54,6 +54,23 @@ def test_ghost(
     assert snap_compare(app, terminal_size=size, run_before=after(connection))
 
 
+@pytest.mark.parametrize("size", [SMALL, (120, 40)], ids=["small", "medium"])
+def test_unit_bench(
+    snap_compare: Compare,
+    make_app: MakeApp,
+    drive: tuple[DriveFacts, list[DriveSnapshot]],
+    size: tuple[int, int],
+) -> None:
+    facts, snapshots = drive
+    held = StimulatedUnit(12, 0.25, 2.5)
+    last = [
+        replace(one, held_units=((12, 2.5),), stimulated_units=(held,), active_behaviors=())
+        for one in with_ghost(snapshots[:64], 40)
+    ]
+    app, connection = make_app([replace(facts, output_bounds=((-1.0, 1.0),) * 2), *last])
+    assert snap_compare(app, terminal_size=size, run_before=after(connection, "ctrl+e"))
+
+
 def test_from_above(snap_compare: Compare, make_app: MakeApp) -> None:
     app, connection = make_app(64)
     assert snap_compare(app, terminal_size=LARGE, run_before=after(connection, "v"))
@@ -78,5 +95,5 @@ def test_too_small(snap_compare: Compare, make_app: MakeApp) -> None:
     assert snap_compare(app, terminal_size=(70, 20), run_before=after(connection))
 
 
-def test_picker(snap_compare: Compare) -> None:
-    assert snap_compare(MapPickerApp(ROWS), terminal_size=SMALL)
+def test_home(snap_compare: Compare) -> None:
+    assert snap_compare(HomeApp(CONTENTS), terminal_size=SMALL)

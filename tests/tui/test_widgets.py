@@ -11,8 +11,8 @@ from pdtui.core.step_record import ActiveBehavior
 from pdtui.driving.drive_snapshot import KeyPress
 from pdtui.pictures.perspective_camera import PerspectiveCamera, round_length_down
 from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number, format_signed
+from pdtui.tui.strip.unit_grid import UnitGrid, allocate_layer_rows, last_first_layer
 from pdtui.tui.theme import STYLES
-from pdtui.tui.widgets.activation_heatmap import UnitGrid, allocate_layer_rows
 from pdtui.tui.widgets.attribute_history import AttributeHistory
 from pdtui.tui.widgets.key_press_axis import KeyPressAxis, key_symbol
 from pdtui.tui.widgets.path_trail import MOST_POINTS, PathTrail
@@ -146,9 +146,21 @@ def test_a_unit_is_where_its_mark_is(units: int) -> None:
 
 
 def test_lines_are_shared_out_between_layers() -> None:
-    assert allocate_layer_rows(2, 2) == [(0, 1), (1, 1)]
-    assert allocate_layer_rows(2, 8) == [(0, 4), (4, 4)]
-    assert allocate_layer_rows(3, 2) == [(0, 1), (1, 1), (2, 0)]
+    assert allocate_layer_rows((64, 64), 2) == [(0, 1), (1, 1)]
+    assert allocate_layer_rows((64, 64), 8) == [(0, 4), (4, 4)]
+    assert allocate_layer_rows((64, 64, 64), 2) == [(0, 1), (1, 1), (2, 0)]
+    assert allocate_layer_rows((64, 64, 64), 2, first=1) == [(0, 0), (0, 1), (1, 1)]
+    assert allocate_layer_rows((512, 256, 128), 8) == [(0, 4), (4, 2), (6, 2)], "no row is left over"
+    assert [last_first_layer((64,) * 3, rows) for rows in (2, 4)] == [1, 0]
+
+
+@pytest.mark.parametrize(("units", "rows", "columns"), [(5, 1, 76), (5, 4, 76), (256, 2, 76), (300, 1, 76)])
+def test_a_pixel_shows_the_units_that_are_drawn_there(units: int, rows: int, columns: int) -> None:
+    grid = UnitGrid(units, rows, columns)
+    for index in range(units):
+        assert index in grid.units_at(grid.row_of(index), grid.column_of(index))
+    shown = [unit for row in range(rows) for column in range(columns) for unit in grid.units_at(row, column)]
+    assert set(shown) == set(range(units))
 
 
 def test_the_behavior_latched_last_owns_a_shared_unit() -> None:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pdtui.cli.output.command_output import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result
+from pdtui.core.console.progress_bar import progress_bar
 
 if TYPE_CHECKING:
     from pdtui.paper.experiment import Experiment

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pdtui.cli.drive_command import require_terminal
 from pdtui.cli.evaluate.run_watching import watch_runs
-from pdtui.cli.output.command_output import describe_map_copy, print_result, progress_bar
+from pdtui.cli.output.command_output import describe_map_copy, print_result
+from pdtui.cli.screen.show_drive import require_terminal
+from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.errors import MapError
 from pdtui.core.printable_text import make_printable
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from pdtui.cli.output.command_output import print_result, progress_bar
+from pdtui.cli.output.command_output import print_result
+from pdtui.core.console.progress_bar import progress_bar
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig

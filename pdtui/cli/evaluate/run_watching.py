@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pdtui.cli.drive_command import show_drive
+from pdtui.cli.screen.show_drive import show_drive
 from pdtui.core.printable_text import make_printable
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_maps, complete_policies, complete_starts
 from pdtui.cli.options.robot_option_flag import apply_robot_options, parse_robot_options
 from pdtui.core.errors import MapError, SeedError
 from pdtui.core.printable_text import make_printable
@@ -55,12 +56,17 @@ def policy_option(instead_of: str) -> Decorator:
         "--policy",
         default="",
         metavar="FILE",
+        shell_complete=complete_policies,
         help=f"Weights file, or name of a shipped policy; default: {instead_of}.",
     )
 
 
 map_option = click.option(
-    "--map", "map_name", metavar="MAP", help="Name or file of the map; default: the robot's map."
+    "--map",
+    "map_name",
+    metavar="MAP",
+    shell_complete=complete_maps,
+    help="Name or file of the map; default: the robot's map.",
 )
 force_option = click.option(
     "--force", is_flag=True, help="Use the map even if it was made for another policy."
@@ -85,6 +91,7 @@ start_option = click.option(
     "--start",
     default="",
     metavar="STATE",
+    shell_complete=complete_starts,
     help="State in which episodes start, for a robot that has several.",
 )
 record_activations_option = click.option(

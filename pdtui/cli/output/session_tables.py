@@ -11,15 +11,17 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from pdtui.core.console.text_tables import new_facts_table, new_table
 from pdtui.core.drive_events import describe_event
 from pdtui.core.outcome import describe_outcomes
 from pdtui.core.printable_text import make_printable
-from pdtui.core.text_tables import new_facts_table, new_table
 from pdtui.robots.options.robot_option import format_robot_options
+from pdtui.sessions.comparison.branch_descriptions import describe_branch, describe_branches
 
 if TYPE_CHECKING:
+    from pdtui.sessions.comparison.session_comparison import SessionComparison
+    from pdtui.sessions.drive_path import PathDifference
     from pdtui.sessions.episode_statistics import EpisodeStatistics
-    from pdtui.sessions.session_comparison import SessionComparison
     from pdtui.sessions.session_header import SessionHeader
     from pdtui.sessions.session_summary import SessionSummary
     from pdtui.sessions.streams.run_deviations import AttributeDeviation
@@ -83,6 +85,7 @@ def session_details(session: SessionHeader, summary: SessionSummary) -> Any:
         *([("missing", describe_step_ranges(session.gaps))] if session.gaps else []),
         ("seed", f"{info.seed}{', with action noise' if info.stochastic else ''}"),
         ("driven", session.created),
+        *([("branched off", describe_branch(info.branch))] if info.branch is not None else []),
         ("outcome", session.outcome or "none: the file is cut off"),
         *session.versions.items(),
     ]
@@ -126,17 +129,19 @@ def _ended(session: SessionHeader, summary: SessionSummary) -> str:
 
 
 def _episodes(summary: SessionSummary) -> list[Table]:
-    """Return one row per episode, where the robot has a distance or obstacles."""
+    """Return one row per episode, where the robot has a distance or obstacles, or passed some."""
     tallies = summary.tallies
     far, hits = (
         any(getattr(tally, name) is not None for tally in tallies) for name in ("distance", "collisions")
     )
-    if not (far or hits):
+    over = any(tally.passed for tally in tallies)
+    if not (far or hits or over):
         return []
-    columns = ["distance"] * far + ["collisions"] * hits
+    columns = ["distance"] * far + ["collisions"] * hits + ["obstacles passed"] * over
     table = new_table("", "episode", "steps", *columns, "human involvement", "outcome", left=("outcome",))
     for tally in tallies:
         cells = [_figure(tally.distance, ".2f", " m")] * far + [_figure(tally.collisions, "g")] * hits
+        cells += [_figure(tally.passed, "g")] * over
         involvement = _involvement(tally, summary)
         table.add_row(str(tally.episode), str(tally.steps), *cells, involvement, tally.outcome)
     return [table]
@@ -179,18 +184,34 @@ def attribute_deviation_table(deviations: Sequence[AttributeDeviation]) -> Table
     return table
 
 
-def session_comparison_table(result: SessionComparison) -> Any:
-    """Return the first value that differs, and how far the attributes are apart from there on."""
+def session_comparison_table(
+    result: SessionComparison,
+    headers: tuple[SessionHeader, SessionHeader],
+    paths: Sequence[PathDifference] = (),
+) -> Any:
+    """Return the first value that differs, and how far attributes and paths are apart from there on."""
     parts: list[Any] = [_cell(_compare_line(result))]
+    parts += [_cell(line) for line in describe_branches(*headers)]
     if result.difference is not None:
         parts.append(_cell(result.difference.between_sessions()))
     if result.first_event:
         parts.append(_cell(result.first_event))
     if result.deviations:
         parts += ["", attribute_deviation_table(result.deviations)]
+    if paths:
+        parts += ["", _path_table(paths, headers[0].info.dt)]
     if result.circumstances:
         parts += ["", *(_cell(line, "dim") for line in result.circumstances)]
     return Group(*parts)
+
+
+def _path_table(paths: Sequence[PathDifference], dt: float) -> Table:
+    """Return where both robots were, from above."""
+    table = new_table("", "path", "step", "first: x, y", "second: x, y", "apart")
+    for row in paths:
+        places = (f"{x:.2f}, {y:.2f} m" for x, y in (row.first, row.second))
+        table.add_row(f"{(row.step + 1) * dt:.2f} s", str(row.step), *places, f"{row.apart:.2f} m")
+    return table
 
 
 def _compare_line(result: SessionComparison) -> str:

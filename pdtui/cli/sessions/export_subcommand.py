@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pdtui.cli.completion.completed_names import complete_sessions
 from pdtui.cli.options.shared_options import FILE_PATH, overwrite_option, policy_option
 from pdtui.core.atomic_file import write_file
 from pdtui.core.errors import SessionError
 from pdtui.core.printable_text import make_printable
-from pdtui.sessions.session_schema import EXPORT_FORMATS
+from pdtui.sessions.session_schema import EXPORT_FORMATS, LEROBOT
 
 if TYPE_CHECKING:
     from pdtui.sessions.session_header import SessionHeader
 
 
 @click.command("export")
-@click.argument("file", type=FILE_PATH)
+@click.argument("file", type=FILE_PATH, shell_complete=complete_sessions)
 @click.option(
     "--stream",
     metavar="NAME",
@@ -28,8 +29,9 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "form",
-    type=click.Choice(EXPORT_FORMATS),
-    help="Format of the table; default: from the file's extension. MCAP needs pip install 'pdtui[export]'.",
+    type=click.Choice((*EXPORT_FORMATS, LEROBOT)),
+    help="Format of the table; default: from the file's extension. MCAP needs pip install 'pdtui[export]'. "
+    "'lerobot' writes the session as a LeRobot dataset into a folder, without --stream.",
 )
 @click.option(
     "-o",
@@ -58,7 +60,10 @@ def export_command(
     from pdtui.sessions.export.export_streams import STREAMS
     from pdtui.sessions.export.export_writer import export_all_streams, export_stream
 
-    if (stream is None) != (output is None):
+    if form == LEROBOT:
+        if output is None or stream is not None:
+            raise SessionError("--format lerobot needs -o FOLDER, and takes no --stream")
+    elif (stream is None) != (output is None):
         raise SessionError("--stream and -o must be given together")
 
     def observe(header: SessionHeader) -> Iterator[tuple[Any, Any]]:
@@ -66,7 +71,12 @@ def export_command(
 
         return replay_observations(header, policy)
 
-    if stream is not None and output is not None:
+    if form == LEROBOT and output is not None:
+        from pdtui.sessions.export.lerobot.lerobot_dataset import export_lerobot_dataset
+
+        episodes, steps = export_lerobot_dataset(file, output, overwrite=overwrite, observe=observe)
+        click.echo(make_printable(f"wrote {output}: {episodes} episodes, {steps} control steps"))
+    elif stream is not None and output is not None:
         export: dict[str, Any] = {"form": form, "overwrite": overwrite, "observe": observe}
         if stream == "all":
             rows = export_all_streams(file, output, **export)
@@ -76,7 +86,7 @@ def export_command(
         click.echo(make_printable(f"wrote {output}: {told}"))
     if keys is not None:
         _export_keys(file, keys, overwrite)
-    if stream is None and keys is None:
+    if stream is None and keys is None and form != LEROBOT:
         for name, one in STREAMS.items():
             click.echo(f"{name:<12} {one.says}")
 

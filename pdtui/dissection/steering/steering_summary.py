@@ -9,7 +9,7 @@ from typing import Any
 from rich.table import Table
 
 from pdtui.core.attributes import Attribute
-from pdtui.core.text_tables import new_table
+from pdtui.core.console.text_tables import new_table
 from pdtui.dissection.steering.steering_candidates import BASELINES, SteeringMethod
 from pdtui.dissection.steering.steering_results import SteeringComparison, SteeringResult
 

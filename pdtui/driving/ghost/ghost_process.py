@@ -34,7 +34,8 @@ class GhostProcess(Closable):
     """
 
     def __init__(self, config: DriveConfig) -> None:
-        self._config = replace(config, recording="", viewer=None, watched=None)
+        config = config if config.ghost is None else config.ghost.configure(config)
+        self._config = replace(config, recording="", viewer=None, watched=None, ghost=None)
         self._changed = threading.Condition()
         self._worker: WorkerProcess | None = None
         self._start: GhostStart | None = None

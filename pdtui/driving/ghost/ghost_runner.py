@@ -21,6 +21,8 @@ from pdtui.stimulation.latched_behavior import LatchState
 
 MOST_BEHIND = 2000
 """Control steps by which a ghost may be behind the drive before it is given up."""
+_LATCHING = ("behavior", "beside", "release", "default", "unit", "free")
+"""Events that begin a ghost where they latch something, or end it where nothing is left."""
 _TAKEOVER = ("takeover", "control", "hand back")
 _NOTHING_LATCHED = LatchState([], {}, None)
 
@@ -28,11 +30,12 @@ _NOTHING_LATCHED = LatchState([], {}, None)
 class GhostRunner(Closable):
     """Begins and ends the ghost of a drive: the twin that runs on without the behavior.
 
-    While it is on, a ghost begins whenever a behavior is latched, in the state of that step, and follows the
-    drive step by step, with the operator's controls but with no behavior. It ends when the default key, or
-    a behavior's own key, has left nothing latched, and where the drive jumps: by a reset, a rewind or the end
-    of the episode. A period that runs out does not end it, as the aftermath is still to be seen.
-    If a behavior is latched already when the ghost is turned on, or after a rewind, it begins there.
+    While it is on, a ghost begins whenever a behavior is latched or a unit is held at another output, in the
+    state of that step, and follows the drive step by step, with the operator's controls but with no behavior
+    and no unit held. It ends when a key or an edit has left nothing latched and nothing held, and where the
+    drive jumps: by a reset, a rewind or the end of the episode. A period that runs out does not end it, as
+    the aftermath is still to be seen. If a behavior is latched already when the ghost is turned on, or after
+    a rewind, it begins there.
 
     It only reads the drive, and never waits for the ghost.
 
@@ -43,6 +46,10 @@ class GhostRunner(Closable):
 
     def __init__(self, config: DriveConfig, loop: ControlLoop) -> None:
         self._config, self._loop = config, loop
+        self._variant = config.ghost
+        self._label = "" if config.ghost is None else config.ghost.label
+        # A ghost with another policy runs on also while nothing is latched.
+        self._runs_alone = config.ghost is not None and config.ghost.has_other_policy
         self._process: GhostProcess | None = None
         self._turned_on = False
         self._first = -1
@@ -62,7 +69,8 @@ class GhostRunner(Closable):
         """Turn the ghost on, for which a process is started, or off, which ends the process."""
         if self._process is None:
             self._process, self._turned_on, self._failure = GhostProcess(self._config), True, ""
-            self.notice = "the ghost is on: it runs on without the behavior that you latch"
+            told = f"it is {self._label}" if self._label else "it runs on without the behavior that you latch"
+            self.notice = f"the ghost is on: {told}"
         else:
             self.close()
             self.notice = "the ghost is off"
@@ -76,6 +84,8 @@ class GhostRunner(Closable):
         elif not self._ended:
             later = record.step > self._first  # earlier events are part of the state
             events = [event for event in record.events if later and event.kind in _TAKEOVER]
+            if self._variant is not None:
+                events += self._variant.list_events(record, self._loop.map, first=not later)
             self._unmatched[record.step] = record.attributes
             self._process.advance(record.step, events)
             if len(self._unmatched) > MOST_BEHIND:
@@ -105,6 +115,7 @@ class GhostRunner(Closable):
             self._latest,
             np.array([step.attributes for step in steps]).reshape(-1, len(self._loop.robot.attributes)),
             _path(steps),
+            self._label,
         )
 
     def close(self) -> None:
@@ -118,11 +129,14 @@ class GhostRunner(Closable):
         if self._process is None:
             return
         latched = {behavior.name for behavior in self._loop.latch.active}
-        pressed = [event for event in events if event.kind in ("behavior", "default")]
+        acting = bool(latched or self._loop.latch.held.outputs)
+        pressed = [event for event in events if event.kind in _LATCHING]
         jumped = any(event.jumps for event in events)
-        if jumped or (pressed and not latched):
+        goes_on = bool(acting or self._runs_alone)
+        if jumped or (pressed and not goes_on):
             self._end()
-        if any(event.name in latched for event in pressed) or (latched and (jumped or self._turned_on)):
+        begun = any(event.kind in ("unit", "free") or event.name in latched for event in pressed)
+        if (acting and begun) or (goes_on and (jumped or self._turned_on)):
             self._begin(self._process)
         self._turned_on = False
 
@@ -134,7 +148,7 @@ class GhostRunner(Closable):
         except PdtuiError as error:  # the drive goes on
             self._fail(f"no ghost: {error}")
         else:
-            process.start(GhostStart(loop.step, state, loop.robot.digest()))
+            process.start(GhostStart(loop.step, state, loop.robot.digest(), self._runs_alone))
             self._first = loop.step
 
     def _end(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from pdtui.core.attributes import Floats
@@ -13,7 +13,7 @@ from pdtui.core.errors import RobotError
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.driving.rewind_history import DriveState
+from pdtui.driving.timeline.rewind_history import DriveState
 
 _NICENESS = 5  # the drive goes first where there are not enough processors for both
 
@@ -26,11 +26,13 @@ class GhostStart:
         step: the control step before which the drive was in that state.
         state: the state, with nothing latched.
         digest: digest of the simulator's state.
+        is_other_policy: whether the ghost's policy cannot go on from the state of the drive's.
     """
 
     step: int
     state: DriveState
     digest: int
+    is_other_policy: bool = False
 
 
 class GhostStepInput(NamedTuple):
@@ -70,6 +72,18 @@ def answer_when_loaded(loop: ControlLoop) -> None:
     del loop
 
 
+def restore_ghost_start(loop: ControlLoop, start: GhostStart) -> None:
+    """Bring a loop into the state of a start; a `RobotError` says that it is not the same to the last bit."""
+    loop.step = start.step
+    state = start.state
+    if start.is_other_policy:
+        loop.policy.reset()
+        state = replace(state, policy=loop.policy.snapshot())
+    loop.restore_state(state)
+    if loop.robot.digest() != start.digest:
+        raise RobotError(f"{loop.robot.name}: expected the drive's own state to begin with, got another")
+
+
 def run_ghost(
     loop: ControlLoop, start: GhostStart | None, tasks: Sequence[GhostStepInput]
 ) -> list[GhostStepResult]:
@@ -79,12 +93,7 @@ def run_ghost(
         RobotError: the robot could not be brought into the state of the start, to the last bit.
     """
     if start is not None:
-        loop.step = start.step
-        loop.restore_state(start.state)
-        if loop.robot.digest() != start.digest:
-            raise RobotError(
-                f"{loop.robot.name}: expected the state in which the behavior was latched, got another"
-            )
+        restore_ghost_start(loop, start)
     steps: list[GhostStepResult] = []
     for task in tasks:
         record = loop.advance(task.events)

@@ -40,6 +40,7 @@ class GhostSnapshot:
         latest: the latest control step that ghost and drive have done; None before the first.
         history: attributes of the ghost in the steps up to that one, shape (n, J).
         path: x, y of the ghost in m, in the same steps, shape (n, 2); empty for a robot without poses.
+        label: what is other in it than that it has no behaviors; else empty.
     """
 
     condition: GhostCondition
@@ -48,3 +49,4 @@ class GhostSnapshot:
     latest: GhostPose | None = None
     history: Floats | None = None
     path: Floats | None = None
+    label: str = ""

@@ -6,7 +6,9 @@ from pdtui.core.drive_events import DriveEvent, group_events_by_step
 from pdtui.core.errors import SessionError
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.replays.replay_comparison import ReplayComparison, describe_info_differences
+from pdtui.driving.session_replay import REQUIRED_STEPS
 from pdtui.sessions.drive_info import DriveInfo
+from pdtui.sessions.environment_versions import collect_versions, list_version_differences
 from pdtui.sessions.session_header import SessionHeader
 from pdtui.sessions.streams.step_block_reader import read_step_blocks
 
@@ -16,6 +18,9 @@ _READ_AT_ONCE = 128
 
 class StepByStepComparison:
     """Compares control steps one by one, in all streams.
+
+    On the machine and with the versions that recorded the session, every bit has to be the same. Elsewhere,
+    only what rounding cannot explain counts as a difference, as in `replay_session`.
 
     Args:
         header: the header of the session.
@@ -33,7 +38,8 @@ class StepByStepComparison:
             raise SessionError(f"{header.path}: differs: description: {'; '.join(different)}")
         self._events = group_events_by_step(header.events)
         self._blocks = read_step_blocks(header, activations=True, poses=True, block_steps=_READ_AT_ONCE)
-        self._comparison = ReplayComparison(header.info, 0)
+        self._elsewhere = bool(list_version_differences(header.versions, collect_versions(), numeric=True))
+        self._comparison = ReplayComparison(header.info, REQUIRED_STEPS if self._elsewhere else 0)
         self._block, self._row = next(self._blocks, None), 0
         self.ended = self._block is None
 
@@ -58,5 +64,14 @@ class StepByStepComparison:
         if self._row == len(self._block):
             self._block, self._row = next(self._blocks, None), 0
             self.ended = self._block is None
-        difference = self._comparison.difference
+        found = self._comparison
+        difference = found.beyond_rounding if self._elsewhere else found.difference
         return "" if difference is None else f"step {record.step} differs from the session: {difference}"
+
+    @property
+    def verdict(self) -> str:
+        """The result in one line, where nothing differs by more than it may."""
+        difference = self._comparison.difference
+        if difference is None:
+            return f"identical, {self.steps} steps"
+        return f"bits differ from step {difference.step} on, as elsewhere they may; {self.steps} steps"

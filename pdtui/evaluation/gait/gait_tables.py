@@ -6,8 +6,8 @@ import math
 
 from rich.console import Group
 
+from pdtui.core.console.text_tables import format_seed_range, new_facts_table, new_table
 from pdtui.core.outcome import describe_outcomes
-from pdtui.core.text_tables import format_seed_range, new_facts_table, new_table
 from pdtui.evaluation.gait.gait_evaluation import STEPS_BEFORE, GaitEvaluation, MeanWithDeviation
 from pdtui.evaluation.gait.quadruped_gaits import IRREGULAR, PLACES
 from pdtui.evaluation.gait.walk_metrics import CONTACT_HEIGHT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.table import Table
 
-from pdtui.core.text_tables import format_seed_range, new_table
+from pdtui.core.console.text_tables import format_seed_range, new_table
 from pdtui.evaluation.key_release.key_release_evaluation import WALKS_ON, KeyReleaseEvaluation
 
 

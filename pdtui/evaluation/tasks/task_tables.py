@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
+from pdtui.core.console.text_tables import format_p_value, new_table
 from pdtui.core.outcome import describe_outcomes, failure_noun, format_failures
-from pdtui.core.text_tables import format_p_value, new_table
 from pdtui.evaluation.disturbance_conditions import UNDISTURBED
 from pdtui.evaluation.protocol_settings import ProtocolSettings
 from pdtui.evaluation.tasks.task_success import TaskEvaluation

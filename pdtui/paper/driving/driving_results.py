@@ -10,7 +10,7 @@ from rich.console import Group
 from rich.table import Table
 
 from pdtui.core.confidence_intervals import PairedRatio, paired_ratio
-from pdtui.core.text_tables import format_mean_with_interval, new_table
+from pdtui.core.console.text_tables import format_mean_with_interval, new_table
 from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.paper.driving.drive_operators import SharedControl
 from pdtui.paper.driving.driving_episode import DrivingScore

@@ -11,8 +11,8 @@ from rich.console import Group
 from rich.table import Table
 
 from pdtui.core.confidence_intervals import PairedRatio, paired_ratio
+from pdtui.core.console.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.core.outcome import Outcome, is_failure
-from pdtui.core.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.paper.forest.forest_episode import ForestEpisodeScore
 from pdtui.paper.forest.key_motion_model import KeyMotionModel

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from pdtui.core.units import Stimulation
+from pdtui.policies.runtime.output_bounds import find_output_bounds
 from pdtui.policies.weights.policy_network import ACTIVATIONS
 
 ACTIVATION_TYPES = tuple(ACTIVATIONS.values())
@@ -45,6 +46,9 @@ class FastMlp:
         widths = _stage_widths(stages, observations)
         units = [isinstance(stage, ACTIVATION_TYPES) for stage in stages]
         self.layers = tuple(width for width, has_units in zip(widths, units, strict=True) if has_units)
+        self.output_bounds = tuple(
+            find_output_bounds(one) for one, own in zip(stages, units, strict=True) if own
+        )
         self._activations = np.empty(sum(self.layers), np.float32)
         self._natural = np.empty_like(self._activations)
         whole = torch.from_numpy(self._activations)

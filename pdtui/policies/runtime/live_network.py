@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import torch
@@ -33,7 +35,7 @@ def policy_from_network(
     observations: int | Sequence[int] | None = None,
     hidden: Sequence[str] | None = None,
     decode: Decoder | None = None,
-    batched: bool = False,
+    batched: bool | None = None,
     initial_state: Any = None,
     name: str = "",
     sha256: str = "",
@@ -46,7 +48,9 @@ def policy_from_network(
         action_space: The world's. Where it is discrete, the network's output is taken as logits, otherwise as
             the action.
         observations: Length or shape of the observation, if there is no observation space.
-        hidden, batched, initial_state: As for `Policy`.
+        hidden, initial_state: As for `Policy`.
+        batched: As for `Policy`; by default, a network that cannot take an observation alone is tried with a
+            batch of one.
         decode: Turns the output into an action, instead of the action space's decoder.
         name: Name for messages and maps; by default that of the module's class.
         sha256: Hash of the file that the network came from; by default `hash_network`.
@@ -62,13 +66,21 @@ def policy_from_network(
         decode = (
             decode_categorical_action if isinstance(action_space, spaces.Discrete) else decode_mean_action
         )
-    return Policy(
+    build = partial(
+        Policy,
         module,
         shape,
         hidden=hidden,
         decode=decode,
-        batched=batched,
         initial_state=initial_state,
         name=owner,
         sha256=sha256 or hash_network(module),
     )
+    try:
+        return build(batched=bool(batched))
+    except PolicyError:
+        if batched is not None:
+            raise
+        with suppress(PolicyError):
+            return build(batched=True)
+        raise

@@ -17,6 +17,7 @@ from pdtui.core.units import NO_STIMULATION, LayerWidths, Stimulation, describe_
 from pdtui.policies.runtime import recurrent_state
 from pdtui.policies.runtime.action_decoders import Decoder, decode_mean_action
 from pdtui.policies.runtime.fast_mlp import make_fast_mlp
+from pdtui.policies.runtime.output_bounds import find_layer_bounds
 from pdtui.policies.runtime.recurrent_state import PolicyState
 from pdtui.policies.runtime.unit_layers import UnitHooks, find_hidden_modules, name_layers
 
@@ -102,10 +103,12 @@ class Policy:
             self._fast_mlp = make_fast_mlp(self.module, self.shape[0]) if plain else None
             if self._fast_mlp is not None:
                 self.layers = LayerWidths(self._fast_mlp.layers, [])
+                self.output_bounds = self._fast_mlp.output_bounds
             else:
                 names = self._watch_units(hidden)
                 self._try_network()
                 self.layers = LayerWidths((output.size for output in self._hooks.outputs), names)
+                self.output_bounds = find_layer_bounds(self.module, names)
         if not self.layers:
             raise PolicyError(
                 f"{name}: the network has no hidden layer to stimulate: no submodule is an activation "

@@ -13,8 +13,14 @@ POLICY_FOLDERS_VARIABLE = "PDTUI_POLICY_FOLDERS"
 """Environment variable: further folders whose files maps and sessions may name, separated as in PATH."""
 
 
+SHIPPED_WEIGHTS = Path(__file__).parent / "shipped"
 PACKAGE_POLICIES = {"metadrive:expert": "examples/ppo_expert/expert_weights.npz"}
 """Policies that come with another package: its name, a colon and a name of ours, and the file in it."""
+
+
+def list_shipped_policies() -> list[str]:
+    """Return the names of the policies that come with pdtui, and of those that come with other packages."""
+    return [*sorted(path.stem for path in SHIPPED_WEIGHTS.glob("*.safetensors")), *PACKAGE_POLICIES]
 
 
 def find_package_policy(name: str) -> Path | None:

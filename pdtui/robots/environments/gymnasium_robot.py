@@ -200,7 +200,7 @@ class GymnasiumRobot(Robot):
         if self._repeats is None:
             self._repeats = False
             uncopyable = python_state.has_uncopyable_attributes(self.env, self._restored_apart())
-            self._repeats = uncopyable or not self._copies_restore()
+            self.repeats_actions = self._repeats = uncopyable or not self._copies_restore()
 
     def _copies_restore(self) -> bool:
         """Return whether a restored copy continues exactly like the original, for a few random actions."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -60,11 +60,11 @@ class LeggedRobot(MujocoRobot):
         RobotError: There is no such terrain, or the model lacks something that the description names.
     """
 
-    description: ClassVar[LeggedRobotDescription]
+    description: LeggedRobotDescription
     _action: Floats
     _last_action: Floats
     _foot_times: Floats
-    state_arrays = ("_terrain_seed", "_command", "_action", "_last_action", "_foot_times")
+    state_arrays: tuple[str, ...] = ("_terrain_seed", "_command", "_action", "_last_action", "_foot_times")
 
     def __init__(self, random_commands: bool = False, terrain: str = "plane", roughness: float = 0.0) -> None:
         one, joints = self.description, len(self.description.default_angles)
@@ -73,7 +73,7 @@ class LeggedRobot(MujocoRobot):
             raise RobotError(f"{self.name}: no terrain '{terrain}'; available: {', '.join(terrains)}")
         self._random_commands, self.terrain, self.roughness = random_commands, terrain, roughness
         self._rough = draw_rough_ground(np.random.default_rng(0), roughness) if self.starts else None
-        self.model = load_legged_model(one.model, self._rough)
+        self.model = self.load_model()
         self.data = mujoco.MjData(self.model)
         self.links = read_model_links(self.model)
         self.frame_skip = one.substeps
@@ -88,6 +88,10 @@ class LeggedRobot(MujocoRobot):
         self._stand_still()
         limits = self.model.actuator_forcerange[:, 1].tolist()
         self.attributes = describe_attributes(self.commands, self.joint_names(), limits)
+
+    def load_model(self) -> mujoco.MjModel:
+        """Return the model, with its grounds."""
+        return load_legged_model(self.description.model, self._rough)
 
     def joint_names(self) -> tuple[str, ...]:
         """Return the joints' names in attributes; by default those of the model."""
@@ -116,7 +120,7 @@ class LeggedRobot(MujocoRobot):
         start = self.check_start(str((options or {}).get("start", ""))) or self.terrain
         rng, one = self.np_random, self.description
         if self.starts:
-            self._lay_ground(self.starts.index(start), int(rng.integers(2**31)))
+            self.lay_ground(self.starts.index(start), int(rng.integers(2**31)))
         mujoco.mj_resetData(self.model, self.data)
         silence_warnings(self.data)
         yaw = rng.uniform(-_START_NOISE, _START_NOISE)
@@ -179,7 +183,7 @@ class LeggedRobot(MujocoRobot):
     def _stand_still(self) -> None:
         joints, feet = len(self.description.default_angles), len(self.description.feet)
         self._action, self._last_action = np.zeros(joints), np.zeros(joints)
-        self._foot_times = np.zeros((1, feet))
+        self._foot_times = np.zeros((1, 2, feet))
 
     def read_state(self) -> LeggedRobotState:
         """Return what observations and rewards are computed from, as the state of one robot."""
@@ -218,9 +222,9 @@ class LeggedRobot(MujocoRobot):
         ground = None if self.ground is None else self.ground.heights_at
         return self._reader.read(qpos, qvel, actions, commands, forces, sensors, ground)
 
-    def _lay_ground(self, terrain: int, seed: int) -> None:
+    def lay_ground(self, terrain: int, seed: int) -> None:
         """Lay the ground of a terrain, by its number, and of a seed."""
-        if self.starts[terrain] == "plane":
+        if self.starts[terrain] != "rough":
             self.ground = None
         else:
             self.ground = draw_rough_ground(np.random.default_rng(seed), self.roughness)
@@ -231,7 +235,7 @@ class LeggedRobot(MujocoRobot):
         self._check_snapshot(snapshot)
         if self.starts:
             terrain, seed = snapshot.extras[0].tolist()
-            self._lay_ground(int(terrain), int(seed))
+            self.lay_ground(int(terrain), int(seed))
         super().restore(snapshot)
 
     def _copy_arrays(self) -> tuple[Floats, ...]:

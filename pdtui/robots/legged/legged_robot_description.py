@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -55,6 +56,8 @@ class LeggedRewardWeights:
         single_stance: Further reward then, per s for which both feet have been where they are, up to
             `longest_stance`.
         longest_stance: Longest such time that is rewarded, s.
+        longer_swing: By how much longer than the other foot's last swing a foot may be in the air until both
+            rewards end, s; infinite for a robot that may limp.
         fall: Penalty for a fall, once.
     """
 
@@ -79,6 +82,7 @@ class LeggedRewardWeights:
     one_foot: float = 0.0
     single_stance: float = 0.0
     longest_stance: float = 0.4
+    longer_swing: float = math.inf
     fall: float = 0.0
 
 

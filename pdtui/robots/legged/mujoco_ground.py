@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -13,10 +14,12 @@ _NAME = "rough ground"
 _THICKNESS = 0.1
 
 
-def load_legged_model(path: Path, rough: RoughGround | None) -> mujoco.MjModel:
+def load_legged_model(
+    path: Path, rough: RoughGround | None, add_more: Callable[[mujoco.MjSpec], None] = lambda _: None
+) -> mujoco.MjModel:
     """Return the model of a file, with rough ground of the size of `rough` added, if there is any.
 
-    The ground is added level and without effect; `lay_rough_ground` changes that.
+    The ground is added level and without effect; `lay_rough_ground` changes that. `add_more` adds more.
     """
     if rough is None:
         return mujoco.MjModel.from_xml_path(str(path))
@@ -41,6 +44,7 @@ def load_legged_model(path: Path, rough: RoughGround | None) -> mujoco.MjModel:
         friction=floor.friction,
         rgba=floor.rgba,
     )
+    add_more(spec)
     return spec.compile()
 
 

@@ -72,14 +72,15 @@ def compute_legged_rewards(
     description: LeggedRobotDescription,
     fell: NDArray[np.bool_],
 ) -> tuple[Floats, Floats]:
-    """Return the rewards of a step and how long each foot has been where it is, shapes (n,) and (n, F).
+    """Return the rewards of a step, shape (n,), and the times of the feet, shape (n, 2, F).
 
-    These times are positive for a foot in the air and negative for one on the ground, s. Rewards are clipped
-    below at 0, so that a policy that moves badly does not learn to end the episode; the penalty for a fall
-    comes on top.
+    A foot's first time says how long it has been where it is, positive in the air and negative on the ground,
+    and the second one how long its last swing took, s. Rewards are clipped below at 0, so that a policy that
+    moves badly does not learn to end the episode; the penalty for a fall comes on top.
     """
     weights = description.rewards
-    air_time = np.maximum(foot_times, 0.0)
+    since, swings = foot_times[:, 0], foot_times[:, 1]
+    air_time = np.maximum(since, 0.0)
     touching = motion.touching
     landed = touching & (air_time > 0.0)
     moving = (np.linalg.norm(motion.command, axis=1) > _MIN_COMMAND).astype(np.float64)
@@ -89,7 +90,8 @@ def compute_legged_rewards(
     too_low = np.minimum(0.0, motion.feet_height - weights.swing_height)
     posture = list(weights.posture_joints)
     off = motion.qpos[:, [7 + joint for joint in posture]] - description.stance[posture]
-    times = np.where(touching, np.minimum(foot_times, 0.0) - dt, air_time + dt)
+    times = np.where(touching, np.minimum(since, 0.0) - dt, air_time + dt)
+    swings = np.where(landed, air_time, swings)
     reward = (
         weights.velocity * np.exp(-np.square(error).sum(1) / weights.tracking_width)
         + weights.yaw_rate * np.exp(-np.square(yaw_error) / weights.tracking_width)
@@ -105,13 +107,19 @@ def compute_legged_rewards(
         - weights.posture * np.square(off).sum(1)
     )
     steps = ((air_time - weights.least_air_time) * landed).sum(1) * moving * weights.steps
-    gait = steps + _single_stance(times, touching, weights) * moving
-    return np.maximum(0.0, reward * dt + gait * dt) - weights.fall * fell, times
+    gait = steps + _single_stance(times, swings, touching, weights) * moving
+    new_times = np.stack([times, swings], axis=1)
+    return np.maximum(0.0, reward * dt + gait * dt) - weights.fall * fell, new_times
 
 
-def _single_stance(times: Floats, touching: NDArray[np.bool_], weights: LeggedRewardWeights) -> Floats:
+def _single_stance(
+    times: Floats, swings: Floats, touching: NDArray[np.bool_], weights: LeggedRewardWeights
+) -> Floats:
     """Return the reward for standing on exactly one foot, per second, shape (n,)."""
     single = touching.sum(axis=1) == 1
-    shared = np.minimum(np.abs(times).min(axis=1), weights.longest_stance)
-    rewards: Floats = single * (weights.one_foot + weights.single_stance * shared)
+    shared = np.abs(times).min(axis=1)
+    # The foot on the ground has swung as long as the other one may now; a robot that limps earns less.
+    equal = shared <= (swings * touching).sum(axis=1) + weights.longer_swing
+    shared = np.minimum(shared, weights.longest_stance)
+    rewards: Floats = single * equal * (weights.one_foot + weights.single_stance * shared)
     return rewards

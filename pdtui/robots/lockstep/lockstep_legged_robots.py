@@ -38,11 +38,13 @@ class LockstepLeggedRobots:
         self.observations = np.zeros((count, robot.description.observations))
         self.attributes = np.zeros((count, len(robot.attributes)))
 
-    def world_key(self, state: RobotState) -> Hashable:
-        # The ground is in the model, which all copies share; a plane is the same for all seeds.
+    def world_id(self, state: RobotState) -> Hashable:
+        # The ground is in the model, which all copies share: a plane is the same for all seeds. Any other
+        # world may have state of its own, so that no two share it.
         terrain, seed = state.extras[0].tolist()
-        level = self._robot.starts[int(terrain) :][:1] in ((), ("plane",))
-        return None if level else (terrain, seed)
+        name = self._robot.starts[int(terrain)] if self._robot.starts else "plane"
+        shared: dict[str, Hashable] = {"plane": None, "rough": seed}
+        return shared.get(name, object())
 
     def restore(self, row: int, state: RobotState) -> None:
         robot, own = self._robot, self._robot.data

@@ -26,7 +26,7 @@ class LockstepRobots(Protocol):
     observations: Floats
     attributes: Floats
 
-    def world_key(self, state: RobotState) -> Hashable:
+    def world_id(self, state: RobotState) -> Hashable:
         """Return what tells the world of a state from others: all copies have to be in the same world."""
 
     def restore(self, row: int, state: RobotState) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from pdtui.core.drive_edits import NAMED_EDITS, VALUED_EDITS
 from pdtui.core.units import format_unit
 from pdtui.robots.geometry import rotate_vectors
 from pdtui.sessions.session_header import SessionHeader
@@ -49,16 +50,19 @@ class ExportStream:
 def event_columns(header: SessionHeader) -> Columns:
     """Return the columns of the events; what an event of its kind does not have is null."""
     events = header.events
-    named = {"behavior", "target", "factor", "control"}
-    valued = {"target", "factor", "control", "rewind"}
+    named = {"behavior", "control", *VALUED_EDITS, *NAMED_EDITS}
+    valued = {"control", "rewind", *VALUED_EDITS}
     values = [event.value if event.kind in valued else None for event in events]
     return {
         "step": ExportColumn(np.array([event.step for event in events], np.int64)),
         "kind": _texts([event.kind for event in events], "what the event does"),
         "name": _texts(
-            [event.name if event.kind in named else "" for event in events], "behavior or manual control"
+            [event.name if event.kind in named else "" for event in events],
+            "behavior, manual control or unit",
         ),
-        "value": ExportColumn(pa.array(values, pa.float64()), says="target, factor, control, or step"),
+        "value": ExportColumn(
+            pa.array(values, pa.float64()), says="target, factor, control, step, output, place or gain"
+        ),
         "key": _texts([event.key for event in events], "key that the operator pressed"),
     }
 

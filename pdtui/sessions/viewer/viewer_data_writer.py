@@ -21,6 +21,7 @@ from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_schema import BEHAVIORS, HEAT_MAP, MAGNITUDES, PATH, ROBOT, TARGETS, UNITS
 from pdtui.sessions.viewer.activation_heat_map import ActivationHeatMap
 from pdtui.sessions.viewer.behavior_legend import BehaviorColorLegend
+from pdtui.sessions.viewer.named_columns import NamedColumnWriter
 from pdtui.sessions.viewer.scenery_writer import SceneryWriter
 from pdtui.sessions.viewer.session_blueprint import BlueprintContent
 from pdtui.sessions.viewer.traffic_writer import TrafficWriter
@@ -58,6 +59,7 @@ class ViewerDataWriter:
         self._magnitudes = ViewerCurves[str](MAGNITUDES, str, color, ("",), send, log_static)
         self._scenery = SceneryWriter(send, log_static)
         self._traffic = TrafficWriter(self._draw_every, send)
+        self._table = NamedColumnWriter(info, send)
         self._shown_units: dict[str, tuple[int, ...]] = {}
         self._left_out = False
         self._states: dict[str, tuple[str, ...]] = {name: (name,) for name in self._legend.names}
@@ -78,6 +80,7 @@ class ViewerDataWriter:
         self._pending += len(records)
         self._scenery.add(records)
         self._traffic.add(records)
+        self._table.add(records)
         for record in records:
             self._last, behaviors, stimulation = record.step, record.behaviors, record.stimulation
             state = " + ".join([behavior.name for behavior in behaviors]) if behaviors else ""
@@ -115,6 +118,7 @@ class ViewerDataWriter:
             self._drawn = []
         self._pending = 0
         self._traffic.write()
+        self._table.write()
         for curves in (self._units, self._targets, self._magnitudes):
             curves.write()
 

@@ -120,6 +120,11 @@ class SessionRecorder:
         return self._recording.size
 
     @property
+    def began(self) -> str:
+        """Date and time at which the drive began, ISO 8601."""
+        return self._created
+
+    @property
     def created(self) -> bool:
         """Whether there is a file: not before the first control step."""
         return self._recording.created

@@ -24,8 +24,7 @@ from pdtui.stimulation.interventions.unit_edits import (
     SetCoordinates,
 )
 
-# Makes the edits of a control step at a strength, some seconds after the behavior began, of which a share is
-# left while it fades.
+# Makes the edits of a step at a strength, some seconds after the behavior began, a share of which is left.
 _MakeEdits = Callable[[float, float, float], tuple[UnitEdit, ...]]
 
 
@@ -41,6 +40,8 @@ class BoundIntervention:
 
     def __init__(self, intervention: Intervention, make: _MakeEdits, column: int, dt: float) -> None:
         self._intervention, self._make, self._column, self._dt = intervention, make, column, dt
+        self.units = tuple(unit for one in make(1.0, 0.0, 1.0) for unit in one.units.tolist())
+        """Flat indices of the units that it can change."""
 
     def make_edits(
         self,

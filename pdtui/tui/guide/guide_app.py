@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from rich.text import Text
 from textual import work
-from textual.app import App, ComposeResult
+from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal
 from textual.screen import ModalScreen
@@ -18,8 +18,8 @@ from pdtui.guide.guide_pages import GUIDE_FOLDER, GuidePage, search_guide
 from pdtui.tui.choice_list import ChoiceList, ListChoice, has_all_words
 from pdtui.tui.guide.guide_viewer import GuideViewer, guide_line_link
 from pdtui.tui.style_sheets import WIDTHS
-from pdtui.tui.terminal_driver import TerminalDriver
 from pdtui.tui.theme import STYLES, THEME
+from pdtui.tui.themes.themed_app import ThemedApp
 
 GUIDE_STYLE = """
 Screen { background: $background; }
@@ -37,7 +37,7 @@ GuideChooser ChoiceList { width: 96; height: 80%; }
 _KEYS = "/ search   l links   t contents   b back   [ ] pages   ↑ ↓ scroll   q quit"
 
 
-class GuideApp(App[None]):
+class GuideApp(ThemedApp[None]):
     """Shows all pages, which are given by topic and in reading order, beginning with one topic."""
 
     CSS = GUIDE_STYLE
@@ -55,11 +55,9 @@ class GuideApp(App[None]):
         Binding("right_square_bracket", "turn_page(1)", "shows the next page", id="guide_next"),
     ]
 
-    def __init__(self, pages: Mapping[str, GuidePage], topic: str) -> None:
-        super().__init__(driver_class=TerminalDriver)
+    def __init__(self, pages: Mapping[str, GuidePage], topic: str, theme: str = THEME.name) -> None:
+        super().__init__(theme)
         self._pages, self._first = pages, topic
-        self.register_theme(THEME)
-        self.theme = THEME.name
 
     @property
     def page(self) -> GuidePage:

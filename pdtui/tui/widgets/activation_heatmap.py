@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
@@ -10,38 +9,58 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.segment import Segment
 from rich.style import Style
+from textual import events
 from textual.color import Color
 from textual.strip import Strip
 
-from pdtui.core.units import format_unit, split_flat_index
-from pdtui.driving.drive_snapshot import DriveSnapshot, StimulatedUnit
-from pdtui.tui.cell_text import ScreenRow, format_number
+from pdtui.core.errors import PolicyError
+from pdtui.core.units import split_flat_index
+from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.tui.snapshot_widget import SnapshotWidget
+from pdtui.tui.strip.natural_outputs import NaturalOutputs
+from pdtui.tui.strip.stimulation_marks import MAX_MARKED, draw_stimulation_marks, sum_up_stimulation
+from pdtui.tui.strip.unit_grid import UnitGrid, allocate_layer_rows, last_first_layer
+from pdtui.tui.strip.unit_picked import UnitPicked
 from pdtui.tui.theme import HEAT_LEVELS, STYLES
 from pdtui.tui.widgets.unit_table import behaviors_of_units
 
 _LABEL = 4  # width of the layers' numbers, in cells
-
-# More stimulated units than this are summed up.
-_MAX_MARKED = 16
+_OVERWRITTEN, _CURSOR = "◆", "◇"
+_Cells = dict[tuple[int, int], tuple[str, Style]]
+_NO_CELLS: _Cells = {}
 
 
 class ActivationHeatmap(SnapshotWidget):
     """Draws two rows of pixels per line in half blocks: cold is negative, warm is positive, dark is zero.
 
-    The rows are divided among the layers. A layer's units run down its rows, then right; if it has more units
-    than pixels, a pixel shows the strongest of its units.
+    The rows are divided among the layers, and the strip scrolls where not all have room. A layer's units run
+    down its rows, then right; if it has more units than pixels, a pixel shows the strongest of its units.
     """
 
     BORDER_TITLE = "hidden units"
     _scale = 1e-6
+    _first = 0  # layer that is shown first
+    _cursor = -1  # unit that the unit bench points to
 
-    def watch_facts(self) -> None:
+    def scroll_layers(self, change: int) -> None:
+        """Scroll by so many layers, as far as there are any."""
         if self.facts is not None:
-            widths = enumerate(self.facts.layers)
-            layers = " · ".join(f"layer {layer}: {width}" for layer, width in widths)
-            self.border_title = f"hidden units · {layers}"
-        super().watch_facts()
+            self._first = max(0, min(self._first + change, last_first_layer(self.facts.layers, self._rows)))
+            self.redraw()
+
+    def point_to(self, unit: int) -> None:
+        """Mark a unit, by its flat index, and scroll to its layer; −1 for none."""
+        if self.facts is not None and unit >= 0:
+            layer = split_flat_index(unit, self.facts.layers)[0]
+            if not allocate_layer_rows(self.facts.layers, self._rows, self._first)[layer][1]:
+                self._first = min(layer, last_first_layer(self.facts.layers, self._rows))
+        self._cursor = unit
+        self.redraw()
+
+    @property
+    def _rows(self) -> int:
+        """Number of pixel rows."""
+        return 2 * max(1, self.content_size.height - 1)
 
     def remember(self, snapshot: DriveSnapshot) -> None:
         finite = np.abs(snapshot.activations[np.isfinite(snapshot.activations)])
@@ -55,19 +74,31 @@ class ActivationHeatmap(SnapshotWidget):
             return []
         columns = width - _LABEL
         lines = max(1, height - 1)
-        places = allocate_layer_rows(len(self.facts.layers), lines * 2)
-        pixels = np.zeros((lines * 2, columns), np.int64)
+        layers = self.facts.layers
+        places = allocate_layer_rows(layers, lines * 2, min(self._first, last_first_layer(layers, lines * 2)))
+        self._write_title(places)
+        pixels = np.full((lines * 2, columns), -1, np.int64)
         first = 0
-        for layer, units in enumerate(self.facts.layers):
+        for (top, rows), units in zip(places, layers, strict=True):
             values = self.snapshot.activations[first : first + units]
-            top, rows = places[layer]
             if rows:
                 pixels[top : top + rows] = self._levels(values, rows, columns)
             first += units
+        cells = self._mark_cells(pixels, places)
         return [
-            *(self._line(pixels[2 * line : 2 * line + 2], line, places) for line in range(lines)),
+            *(self._line(pixels[2 * line : 2 * line + 2], line, places, cells) for line in range(lines)),
             self._marks(width, columns, places),
         ]
+
+    def _write_title(self, places: list[tuple[int, int]]) -> None:
+        assert self.facts is not None
+        shown = [layer for layer, (_, rows) in enumerate(places) if rows]
+        widths = " · ".join(f"layer {layer}: {self.facts.layers[layer]}" for layer in shown)
+        hidden = len(places) - len(shown)
+        more = f" · {hidden} more: PgUp PgDn" if hidden else ""
+        title = f"hidden units · {widths}{more}"
+        if title != self.border_title:
+            self.border_title = title
 
     def _levels(self, values: NDArray[np.float32], rows: int, columns: int) -> NDArray[np.int64]:
         """Return the colour numbers of a layer's pixels, −1 for none, shape (rows, columns)."""
@@ -76,67 +107,107 @@ class ActivationHeatmap(SnapshotWidget):
         level = np.round(share * HEAT_LEVELS).astype(np.int64) + HEAT_LEVELS
         return np.where(np.isnan(strongest), -1, level)
 
-    def _line(self, pixels: NDArray[np.int64], line: int, places: list[tuple[int, int]]) -> Strip:
+    def _line(
+        self, pixels: NDArray[np.int64], line: int, places: list[tuple[int, int]], cells: _Cells = _NO_CELLS
+    ) -> Strip:
         starting = [str(layer) for layer, (top, rows) in enumerate(places) if rows and top // 2 == line]
         label = "/".join(starting).rjust(_LABEL - 1)[: _LABEL - 1] + " "
         segments = [Segment(label, STYLES.muted)]
         pairs = pixels[0] * 1000 + pixels[1]
-        cuts = [0, *(np.flatnonzero(pairs[1:] != pairs[:-1]) + 1).tolist(), len(pairs)]
-        for a, b in pairwise(cuts):
+        own = {column: cell for (at, column), cell in cells.items() if at == line}
+        cuts = {0, len(pairs), *(np.flatnonzero(pairs[1:] != pairs[:-1]) + 1).tolist()}
+        cuts |= {edge for column in own for edge in (column, column + 1)}
+        for a, b in pairwise(sorted(cuts)):
+            if a in own:
+                segments.append(Segment(*own[a]))
+                continue
             upper, lower = int(pixels[0, a]), int(pixels[1, a])
             text = "▀" if max(upper, lower) >= 0 else " "
             style = _style(*(STYLES.heat[level] if level >= 0 else None for level in (upper, lower)))
             segments.append(Segment(text * (b - a), style))
         return Strip(segments, _LABEL + pixels.shape[1])
 
-    def _marks(self, width: int, columns: int, places: list[tuple[int, int]]) -> Strip:
-        """Return the line that marks stimulated units under their columns, with their values."""
+    def _mark_cells(self, pixels: NDArray[np.int64], places: list[tuple[int, int]]) -> _Cells:
+        """Return what stands in the cells of overwritten units, and in that of the marked unit."""
         assert self.facts is not None
         assert self.snapshot is not None
+        units = [view.unit for view in self.snapshot.stimulated_units]
+        marked = units if len(units) <= MAX_MARKED else []
         names = behaviors_of_units(self.map, self.snapshot.active_behaviors, self.facts.layers)
-        units = sorted(self.snapshot.stimulated_units, key=lambda view: view.unit)
-        if len(units) > _MAX_MARKED:
-            return self._sum_up(width, units)
-        marks = [(self._column(view, columns, places), view) for view in units]
-        marks.sort(key=lambda mark: mark[0])
-        row, hidden = ScreenRow(width), 0
-        for index, (column, view) in enumerate(marks):
-            style = STYLES.behavior(self.row_of(names.get(view.unit, "")))
-            address = format_unit(view.unit, self.facts.layers)
-            text = f"▲{address} {format_number(view.natural)}→{format_number(view.overwritten)} "
-            at = width - row.left
-            rest = sum(
-                len(format_unit(other.unit, self.facts.layers)) + 16 for _, other in marks[index + 1 :]
-            )
-            target = max(at, min(column + _LABEL, width - len(text) - rest))
-            if target + len(text) > width:
-                hidden += 1
+        cells: _Cells = {}
+        for unit in [*marked, *([self._cursor] if self._cursor >= 0 else [])]:
+            place = self._pixel_of(unit, pixels.shape[1], places)
+            if place is None:
                 continue
-            row.add(" " * (target - at), style).add(text, style)
-        if hidden and row.left >= 4:
-            row.add(f"+{hidden}".rjust(row.left), STYLES.muted)
-        return row.strip()
+            level = int(pixels[place])
+            heat = STYLES.heat[level] if level >= 0 else None
+            is_cursor = unit == self._cursor
+            style = STYLES.title if is_cursor else self._style_of(names.get(unit, ""))
+            sign = _CURSOR if is_cursor and unit not in units else _OVERWRITTEN
+            cells[place[0] // 2, place[1]] = sign, style + _style(None, heat)
+        return cells
 
-    def _sum_up(self, width: int, units: list[StimulatedUnit]) -> Strip:
-        """Return the line that says how many units of each layer are changed, and how far on average."""
+    def _marks(self, width: int, columns: int, places: list[tuple[int, int]]) -> Strip:
         assert self.facts is not None
-        changes: dict[int, list[float]] = {}
-        for view in units:
-            layer = split_flat_index(view.unit, self.facts.layers)[0]
-            changes.setdefault(layer, []).append(abs(view.overwritten - view.natural))
-        row = ScreenRow(width)
-        for layer, sizes in changes.items():
-            mean = format_number(sum(sizes) / len(sizes))
-            text = f"▲ {len(sizes)} units of layer {layer} changed by {mean} on average  "
-            if len(text) <= row.left:
-                row.add(text, STYLES.accent)
-        return row.strip()
+        assert self.snapshot is not None
+        units, layers = self.snapshot.stimulated_units, self.facts.layers
+        if len(units) > MAX_MARKED:
+            return sum_up_stimulation(units, layers, width)
+        names = behaviors_of_units(self.map, self.snapshot.active_behaviors, layers)
 
-    def _column(self, view: StimulatedUnit, columns: int, places: list[tuple[int, int]]) -> int:
+        def column_of(unit: int) -> int:
+            place = self._pixel_of(unit, columns, places)
+            return 0 if place is None else place[1] + _LABEL
+
+        return draw_stimulation_marks(
+            units,
+            layers,
+            width,
+            column_of,
+            lambda unit: self._style_of(names.get(unit, "")),
+            NaturalOutputs(self.facts, self.snapshot),
+        )
+
+    def _style_of(self, behavior: str) -> Style:
+        """Return the style of a behavior's units; those that the operator holds have none."""
+        return STYLES.behavior(self.row_of(behavior)) if behavior else STYLES.accent
+
+    def _pixel_of(self, unit: int, columns: int, places: list[tuple[int, int]]) -> tuple[int, int] | None:
+        """Return row and column of the pixel that shows a unit; None where its layer is not shown."""
         assert self.facts is not None
-        layer, index = split_flat_index(view.unit, self.facts.layers)
-        rows = max(1, places[layer][1])
-        return UnitGrid(self.facts.layers[layer], rows, columns).column_of(index)
+        try:
+            layer, index = split_flat_index(unit, self.facts.layers)
+        except PolicyError:
+            return None
+        top, rows = places[layer]
+        if not rows:
+            return None
+        grid = UnitGrid(self.facts.layers[layer], rows, columns)
+        return top + grid.row_of(index), grid.column_of(index)
+
+    def on_mouse_scroll_down(self) -> None:
+        self.scroll_layers(1)
+
+    def on_mouse_scroll_up(self) -> None:
+        self.scroll_layers(-1)
+
+    def on_click(self, event: events.Click) -> None:
+        """Pick the unit under the mouse; of several in a cell, the strongest, which is the one seen."""
+        offset = event.get_content_offset(self)
+        if offset is None or self.facts is None or self.snapshot is None or offset.x < _LABEL:
+            return
+        columns, layers = self.content_size.width - _LABEL, self.facts.layers
+        first = min(self._first, last_first_layer(layers, self._rows))
+        flat, found = 0, list[int]()
+        for (top, rows), units in zip(allocate_layer_rows(layers, self._rows, first), layers, strict=True):
+            for row in (2 * offset.y, 2 * offset.y + 1):
+                if top <= row < top + rows:
+                    grid = UnitGrid(units, rows, columns)
+                    found += [flat + index for index in grid.units_at(row - top, offset.x - _LABEL)]
+            flat += units
+        if found:
+            values = np.abs(np.nan_to_num(self.snapshot.activations))
+            self.post_message(UnitPicked(max(found, key=lambda unit: values[unit])))
 
 
 @lru_cache(maxsize=1024)
@@ -144,47 +215,3 @@ def _style(upper: Color | None, lower: Color | None) -> Style:
     return Style(
         color=None if upper is None else upper.rich_color, bgcolor=None if lower is None else lower.rich_color
     )
-
-
-def allocate_layer_rows(layers: int, rows: int) -> list[tuple[int, int]]:
-    """Return the first pixel row and the number of pixel rows per layer; layers without room get none."""
-    each = max(1, rows // layers)
-    return [(layer * each, each if (layer + 1) * each <= rows else 0) for layer in range(layers)]
-
-
-@dataclass(frozen=True)
-class UnitGrid:
-    """The places of a layer's units, which run down, then right, on `rows` × `columns` pixels.
-
-    Fewer units than pixels are drawn wider, so that a layer always fills its rows; if there are more units
-    than pixels, neighbours share one.
-    """
-
-    units: int
-    rows: int
-    columns: int
-
-    @property
-    def steps(self) -> int:
-        """Number of different columns."""
-        return min(self.columns, -(-self.units // self.rows))
-
-    def column_of(self, index: int) -> int:
-        """Return the leftmost column that shows a unit."""
-        groups = self.rows * self.steps
-        group = index * groups // self.units if self.units > groups else index
-        return -(-(group // self.rows) * self.columns // self.steps)
-
-    def spread(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the values as pixels, shape (rows, columns): the strongest of several, NaN for none."""
-        groups = self.rows * self.steps
-        if self.units > groups:
-            group = np.arange(self.units) * groups // self.units
-            starts = np.searchsorted(group, np.arange(groups))
-            high, low = np.maximum.reduceat(values, starts), np.minimum.reduceat(values, starts)
-            shown = np.where(high >= -low, high, low)
-        else:
-            shown = np.full(groups, np.nan, np.float32)
-            shown[: self.units] = values
-        pixels: NDArray[np.float32] = shown.reshape(self.steps, self.rows).T
-        return pixels[:, np.arange(self.columns) * self.steps // self.columns]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.driving.drive_snapshot import DriveSnapshot
 
 
 class AttributeHistory:
@@ -16,10 +17,25 @@ class AttributeHistory:
     def __init__(self, length: int, columns: int) -> None:
         self._rows = np.full((length, columns), np.nan)
         self._ghost: Floats | None = None
+        self._ghost_began = -1
         self.total = 0
         """Number of control steps so far."""
+        self.until: int | None = None
+        """Number of control steps with which `means` ends; None for all."""
         self.low = np.full(columns, np.inf)
         self.high = np.full(columns, -np.inf)
+
+    def add_snapshot(self, snapshot: DriveSnapshot) -> None:
+        """Add the history since the last snapshot; `means` ends where a past moment is shown."""
+        self.extend(snapshot.history, snapshot.step)
+        self.until = None if snapshot.past is None else snapshot.step
+        ghost = snapshot.ghost
+        began = -1 if ghost is None else ghost.first
+        if began != self._ghost_began:
+            self.forget_ghost()
+            self._ghost_began = began
+        if ghost is not None and ghost.latest is not None and ghost.history is not None:
+            self.add_ghost(ghost.history, ghost.latest.step)
 
     def extend(self, rows: Floats, total: int | None = None) -> None:
         """Append rows, shape (n, J); if `total` steps are more than are known then, some were lost before."""
@@ -55,7 +71,8 @@ class AttributeHistory:
 
     def cell_of(self, step: int, cells: int, per_cell: int) -> int:
         """Return the cell in which `means` has a control step; less than 0 if it lies before the first."""
-        return cells - 1 - ((self.total - 1) // per_cell - step // per_cell)
+        total = self.total if self.until is None else self.until
+        return cells - 1 - ((total - 1) // per_cell - step // per_cell)
 
     def means(self, cells: int, per_cell: int, *, ghost: bool = False) -> Floats:
         """Return means of the last cells × per_cell rows, shape (cells, J); NaN where there are no values.
@@ -66,7 +83,9 @@ class AttributeHistory:
         rows = self._rows
         if ghost:
             rows = np.full_like(rows, np.nan) if self._ghost is None else self._ghost
-        partial = self.total % per_cell or per_cell
+        total = self.total if self.until is None else min(self.until, self.total)
+        rows = rows[: max(0, len(rows) - (self.total - total))]
+        partial = total % per_cell or per_cell
         wanted = (cells - 1) * per_cell + partial
         tail = rows[-wanted:]
         missing = cells * per_cell - len(tail)
@@ -75,5 +94,5 @@ class AttributeHistory:
         groups = filled.reshape(cells, per_cell, -1)
         known = np.isfinite(groups)
         count = known.sum(axis=1)
-        total = np.where(known, groups, 0.0).sum(axis=1)
-        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+        sums = np.where(known, groups, 0.0).sum(axis=1)
+        return np.where(count > 0, sums / np.maximum(count, 1), np.nan)

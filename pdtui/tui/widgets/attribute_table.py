@@ -15,7 +15,7 @@ from pdtui.core.printable_text import make_printable
 from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.driving.ghost.ghost_snapshot import GhostPose
 from pdtui.tui.cell_text import ScreenRow, format_number, format_signed
-from pdtui.tui.ghost_drawing import describe_ghost
+from pdtui.tui.ghost_drawing import add_ghost_to_title
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 from pdtui.tui.widgets import sparklines
@@ -24,7 +24,13 @@ from pdtui.tui.widgets.key_press_axis import KeyPressAxis
 
 _SECONDS = 12.0  # length of the history that a plot shows
 _ROWS_KEPT = 4096  # control steps
-_VALUE, _UNIT, _TARGET, _END = 8, 6, 10, 7  # widths of the columns with the space beside them, in cells
+_VALUE, _UNIT, _TARGET, _END, _CHANGE = (
+    8,
+    6,
+    10,
+    7,
+    9,
+)  # widths of the columns with the space beside them, in cells
 _CHANGE = 9  # the same of a difference
 _LEAST_NAME, _LEAST_PLOT = 8, 12  # cells
 _WIDE = 50  # cells from which two lines have room for targets
@@ -62,28 +68,17 @@ class AttributeTable(SnapshotWidget):
     """
 
     BORDER_TITLE = "attributes"
-    _history: AttributeHistory | None = None
-    _ghost_began = -1
 
-    def on_mount(self) -> None:
+    def forget(self) -> None:
+        self._history: AttributeHistory | None = None
         self._keys = KeyPressAxis()
 
     def remember(self, snapshot: DriveSnapshot) -> None:
         if self._history is None:
             self._history = AttributeHistory(_ROWS_KEPT, len(snapshot.attributes))
-        self._history.extend(snapshot.history, snapshot.step)
+        self._history.add_snapshot(snapshot)
         self._keys.extend(snapshot.key_presses)
-        ghost = snapshot.ghost
-        began = -1 if ghost is None else ghost.first
-        if began != self._ghost_began:
-            self._history.forget_ghost()
-            self._ghost_began = began
-        if ghost is not None and ghost.latest is not None and ghost.history is not None:
-            self._history.add_ghost(ghost.history, ghost.latest.step)
-        title = self.BORDER_TITLE
-        if ghost is not None:
-            said = describe_ghost(ghost, snapshot.step)
-            title = said if ghost.condition == "failed" else f"{title} · {said}"
+        title = add_ghost_to_title(self.BORDER_TITLE, snapshot.ghost, snapshot.step)
         if self.border_title != title:
             self.border_title = title
 
@@ -154,7 +149,7 @@ class AttributeTable(SnapshotWidget):
 
     def _moment(self) -> GhostPose | None:
         """Return the control step in which drive and ghost are compared, if any."""
-        ghost = None if self.snapshot is None else self.snapshot.ghost
+        ghost = None if self.snapshot is None or self.snapshot.past is not None else self.snapshot.ghost
         return None if ghost is None or ghost.condition == "over" else ghost.latest
 
     def _begin_line(self, index: int, layout: _Layout, targets: _Targets) -> ScreenRow:
@@ -181,7 +176,9 @@ class AttributeTable(SnapshotWidget):
             wraps = self.facts.attributes[index].wraps
             value = format_number(other)
             change = f" Δ{format_signed(wrap_angle(own - other) if wraps else own - other)}"
-        line.add(_WITHOUT if self.snapshot.ghost is not None else "", STYLES.ghost, layout.name)
+        ghost = self.snapshot.ghost
+        said = "" if ghost is None else make_printable(ghost.label) or _WITHOUT
+        line.add(said, STYLES.ghost, layout.name)
         line.add(" " + value, STYLES.ghost, _VALUE, right=True)
         return line.add(change, STYLES.muted, layout.unit + layout.target)
 

@@ -9,14 +9,20 @@ from rich.style import Style
 from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
+from pdtui.stimulation.stack.stack_entry import is_muted
 from pdtui.tui.cell_text import ScreenRow, displayed_key_name, fit_cells, format_number, format_signed
+from pdtui.tui.commands.key_clicked import KeyClicked
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
 if TYPE_CHECKING:
+    from textual import events
+
     from pdtui.core.step_record import ActiveBehavior
+    from pdtui.driving.drive_snapshot import DriveSnapshot
     from pdtui.stimulation.stimulation_map import Behavior
 
+_ECHO_SNAPSHOTS = 12  # after which a key that the drive did not mention is no longer shown as pressed
 _BAR = 10  # length of the bar of the time left, in cells
 _BLOCKS = " ▏▎▍▌▋▊▉"
 
@@ -25,6 +31,31 @@ class BehaviorList(SnapshotWidget):
     """Shows two lines per behavior if there is room, else one; latched behaviors are never hidden."""
 
     BORDER_TITLE = "behaviors"
+    _line_keys: tuple[str, ...] = ()
+
+    def on_click(self, event: events.Click) -> None:
+        """Latch the behavior that was clicked."""
+        place = event.get_content_offset(self)
+        if place is not None and place.y < len(self._line_keys) and self._line_keys[place.y]:
+            self.post_message(KeyClicked(self._line_keys[place.y]))
+
+    def forget(self) -> None:
+        self._echoes: dict[str, int] = {}
+
+    def echo(self, key: str) -> None:
+        """Show a key as pressed at once, until the drive has confirmed or refused it."""
+        self._echoes[key] = _ECHO_SNAPSHOTS
+        self.redraw()
+
+    def remember(self, snapshot: DriveSnapshot) -> None:
+        if self._echoes:
+            latched = {view.name for view in snapshot.active_behaviors}
+            done = {press.key for press in snapshot.key_presses}
+            done |= {self.map.behaviors[name].key for name in latched if name in self.map.behaviors}
+            if not latched:
+                done.add(self.map.default_key)
+            left = {key: count - 1 for key, count in self._echoes.items() if key not in done}
+            self._echoes = {key: count for key, count in left.items() if count and not snapshot.notice}
 
     def paint(self, width: int, height: int) -> list[Strip]:
         active = (
@@ -47,9 +78,12 @@ class BehaviorList(SnapshotWidget):
         ]
         gap = [Strip.blank(width)] if roomy else []
         latched = [behavior.name in active for behavior in behaviors]
-        shown = self._crop(entries, latched, width, height - 1 - len(gap))
+        shown, rows = self._crop(entries, latched, width, height - 1 - len(gap))
+        self._line_keys = (*(behaviors[row].key for row in rows), *("" for _ in shown[len(rows) :]))
+        self._line_keys += (*("" for _ in gap), self.map.default_key)
         default = ScreenRow(width)
-        self._add_cap(default, self.map.default_key, STYLES.key)
+        echoed = self.map.default_key in self._echoes
+        self._add_cap(default, self.map.default_key, STYLES.caps[0] if echoed else STYLES.key)
         default.add("  clears all stimulation", STYLES.good if active else STYLES.muted)
         return [*shown, *gap, default.strip()]
 
@@ -60,9 +94,15 @@ class BehaviorList(SnapshotWidget):
         color = STYLES.behavior(row)
         says = make_printable(behavior.says)
         line = ScreenRow(width)
-        if active is None:
+        if active is None and behavior.key in self._echoes:
+            self._add_cap(line, behavior.key, STYLES.caps[row % len(STYLES.caps)])
+            line.add(" ▌", color).add(make_printable(behavior.name), color, name_width)
+            lines = [line.add("  pressed", color).strip()]
+        elif active is None:
             self._add_cap(line, behavior.key, STYLES.key)
             line.add("  " + make_printable(behavior.name), color, name_width + 2).add("  ", STYLES.text)
+            if self.snapshot is not None and is_muted(behavior.name, self.snapshot.stack):
+                line.add("muted  ", STYLES.warn)
             line.add(self._kind(behavior) if roomy else says, STYLES.muted)
             lines = [line.strip()]
         else:
@@ -126,10 +166,17 @@ class BehaviorList(SnapshotWidget):
         named = {attribute.name: attribute.unit for attribute in self.facts.attributes}
         return make_printable(named.get(behavior.pid.attribute, ""))
 
-    def _crop(self, entries: list[list[Strip]], latched: list[bool], width: int, height: int) -> list[Strip]:
-        """Return as many entries as fit, in the order of the map; latched ones are kept first."""
+    def _crop(
+        self, entries: list[list[Strip]], latched: list[bool], width: int, height: int
+    ) -> tuple[list[Strip], list[int]]:
+        """Return as many entries as fit, in the order of the map, and the number of the entry in each line.
+
+        Latched ones are kept first; the last line then says how many are hidden.
+        """
+        everything = range(len(entries))
         if sum(map(len, entries)) <= height:
-            return [strip for entry in entries for strip in entry]
+            strips = [strip for entry in entries for strip in entry]
+            return strips, [index for index in everything for _ in entries[index]]
         room = height - 1
         chosen = []
         for index in sorted(range(len(entries)), key=lambda index: (not latched[index], index)):
@@ -139,7 +186,7 @@ class BehaviorList(SnapshotWidget):
         strips = [strip for index in sorted(chosen) for strip in entries[index]]
         hidden = len(entries) - len(chosen)
         more = ScreenRow(width).add(f"+{hidden} more: ? lists all", STYLES.muted)
-        return [*strips, more.strip()]
+        return [*strips, more.strip()], [index for index in sorted(chosen) for _ in entries[index]]
 
 
 def _bar(share: float, cells: int) -> str:

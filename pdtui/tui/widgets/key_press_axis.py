@@ -8,12 +8,13 @@ from collections.abc import Callable, Iterable
 from rich.cells import cell_len
 from rich.style import Style
 
+from pdtui.core.drive_edits import EDIT_KEY
 from pdtui.driving.drive_snapshot import KeyPress
 from pdtui.tui.cell_text import ScreenRow, displayed_key_name
 from pdtui.tui.theme import STYLES
 
 _KEPT = 500  # key presses
-_SYMBOLS = {"space": "␣"}
+_SYMBOLS = {"space": "␣", EDIT_KEY: "◆"}
 
 
 class KeyPressAxis:

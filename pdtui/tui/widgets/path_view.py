@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import atan2, ceil, log2, pi
 
 import numpy as np
+from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
@@ -25,7 +26,6 @@ STRETCHES: tuple[float | None, ...] = (5.0, 10.0, 20.0, 40.0, 80.0, None)
 _USUAL = STRETCHES.index(20.0)
 _WITH_GHOST = 20.0  # seconds of path from which the ghost has to be in the picture
 _PAST, _NONE, _MARK, _LABEL, _GHOST, _FIRST_BEHAVIOR = range(6)
-_INKS = (STYLES.faint, STYLES.text, STYLES.accent, STYLES.muted, STYLES.ghost, *STYLES.behaviors)
 
 
 class PathView(SnapshotWidget):
@@ -37,12 +37,20 @@ class PathView(SnapshotWidget):
     BORDER_TITLE = "path · last 20 s"
     stretch: reactive[int] = reactive(_USUAL, init=False, repaint=False)
 
-    def on_mount(self) -> None:
+    def forget(self) -> None:
         self.trail = PathTrail()
         self._ghost_path: Floats = np.empty((0, 2))
         self._ghost_began = -1
         self._heading = 0.0
         self._here = np.zeros(2)
+
+    def on_mouse_scroll_up(self) -> None:
+        """Show less of the path."""
+        self.zoom(-1)
+
+    def on_mouse_scroll_down(self) -> None:
+        """Show more of the path."""
+        self.zoom(1)
 
     def zoom(self, change: int) -> None:
         """Show more of the path for 1, less for −1."""
@@ -100,7 +108,7 @@ class PathView(SnapshotWidget):
             self._mark(canvas, place(ghost[-1]), "◌", _GHOST)
         self._mark(canvas, place(self._here), _ARROWS[round(self._heading / (pi / 4)) % 8], _MARK)
         self._draw_scale(canvas, zoom)
-        return canvas.render_strips(_INKS)
+        return canvas.render_strips(_inks())
 
     def _frame(self, canvas: BrailleCanvas, points: Floats) -> tuple[Floats, float]:
         """Return the middle of the picture in m and the number of dots per m.
@@ -124,3 +132,7 @@ class PathView(SnapshotWidget):
         cells = max(2, round(length * zoom / 2))
         label = format_number(length).removesuffix(".00") + " m"
         canvas.draw_text(0, canvas.rows - 1, "├" + "─" * (cells - 2) + "┤ " + label, _LABEL)
+
+
+def _inks() -> tuple[Style, ...]:
+    return (STYLES.faint, STYLES.text, STYLES.accent, STYLES.muted, STYLES.ghost, *STYLES.behaviors)

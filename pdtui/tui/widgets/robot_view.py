@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+from rich.style import Style
 from textual.reactive import reactive
 from textual.strip import Strip
 
@@ -23,6 +24,7 @@ from pdtui.tui.road_drawing import (
     compute_box_corners,
     draw_box_edges,
     draw_lidar_hits,
+    draw_links_on_road,
     draw_traffic,
 )
 from pdtui.tui.snapshot_widget import SnapshotWidget
@@ -32,11 +34,6 @@ View = Literal["side", "above"]
 _SIDE_ELEVATION = 14.0  # of the camera at the side, degrees
 _GROUND, _AXIS, _SHADOW, _ROBOT, _LABEL, _OBSTACLE = range(6)
 _LANE, _EDGE, _ROUTE, _VEHICLE, _GHOST, _FIRST_SHADE = range(6, 12)
-_INKS = (
-    *(STYLES.faint, STYLES.muted, STYLES.faint, STYLES.accent, STYLES.muted, STYLES.obstacle),
-    *(STYLES.muted, STYLES.text, STYLES.primary, STYLES.warn, STYLES.ghost),
-    *STYLES.depth,
-)
 _LINE_INKS: dict[LineKind, int] = {
     "solid lane line": _LANE,
     "broken lane line": _LANE,
@@ -45,8 +42,10 @@ _LINE_INKS: dict[LineKind, int] = {
 }
 _BOX_INKS: dict[BoxKind, int] = {"vehicle": _VEHICLE, "obstacle": _OBSTACLE}
 _FARTHEST = 0.55  # least magnification of the ground grid that is drawn
-_ARROW = 0.5
-"""Least size of the heading arrow, in extents of the camera."""
+_ARROW = 0.5  # least size of the heading arrow, in extents of the camera
+_REACH, _REACH_AHEAD, _FORWARD = 2.15, 4.2, 0.28
+"""Width of the picture from the side, usually and among boxes, in extents of the robot; how far its middle is
+ahead of the robot then, as a share of the width."""
 
 
 class RobotView(SnapshotWidget):
@@ -58,11 +57,9 @@ class RobotView(SnapshotWidget):
 
     BORDER_TITLE = "robot · side"
     view: reactive[View] = reactive("side", init=False, repaint=False)
-
-    _extent = 0.0
     _scenery: Scenery = NO_SCENERY
     _road_lines = RoadLineDrawing((), _LINE_INKS)
-    _looked = False
+    _extent, _looked = 0.0, False
 
     def on_mount(self) -> None:
         self._view_ahead = ViewAhead()
@@ -71,13 +68,20 @@ class RobotView(SnapshotWidget):
         self.border_title = f"robot · {self.view}"
         self.redraw()
 
+    def toggle_view(self) -> None:
+        """Look from above instead of from the side, or the other way round."""
+        self.view = "above" if self.view == "side" else "side"
+
+    def on_click(self) -> None:
+        self.toggle_view()
+
     def remember(self, snapshot: DriveSnapshot) -> None:
         if snapshot.scenery is not None:
             self._scenery = snapshot.scenery
             self._road_lines = RoadLineDrawing(self._scenery.lines, _LINE_INKS)
             if (len(self._scenery.cylinders) or self._scenery.lines) and not self._looked:
                 self._looked, self.view = True, "above"
-        if self.facts is not None and len(self._scenery.cylinders) and len(snapshot.poses):
+        if self.facts is not None and self._looks_ahead(snapshot) and len(snapshot.poses):
             root = snapshot.poses[root_body_row(self.facts.links)]
             self._view_ahead.follow(root, restarted=snapshot.restarted)
 
@@ -91,13 +95,13 @@ class RobotView(SnapshotWidget):
         ends = capsule_ends(self.facts.links, placed)
         if not np.isfinite(ends).all():
             canvas.draw_text(1, height // 2, "the robot's pose is not finite", _LABEL)
-            return canvas.render_strips(_INKS)
+            return canvas.render_strips(_inks())
         root = self.snapshot.poses[root_body_row(self.facts.links)]
         camera = self._camera(canvas, root, ends)
         if self._shows_road:
             self._draw_surroundings(canvas, camera, self.snapshot.traffic)
             self._draw_ghost(canvas, camera, root)
-            self._draw_links_on_road(canvas, camera, placed, ends)
+            draw_links_on_road(canvas, camera, self.facts.links, placed, ends, _ROBOT)
         else:
             self._draw_ground(canvas, camera, root)
             self._draw_shadow(canvas, camera, ends)
@@ -110,12 +114,16 @@ class RobotView(SnapshotWidget):
         x, y, z = (format_number(float(value)) for value in root[:3])
         place = f"x {x}  y {y}  z {z} m"
         canvas.draw_text(width - len(place), height - 1, place, _LABEL)
-        return canvas.render_strips(_INKS)
+        return canvas.render_strips(_inks())
 
     @property
     def _shows_road(self) -> bool:
         """Whether the picture is the one of a road from above, which is as simple as a map."""
         return self.view == "above" and bool(self._scenery.lines)
+
+    def _looks_ahead(self, snapshot: DriveSnapshot) -> bool:
+        """Return whether there are obstacles but no road, so that the view from above looks ahead."""
+        return bool(len(self._scenery.cylinders) or (snapshot.traffic.kinds and not self._scenery.lines))
 
     def _loading(self, width: int, height: int) -> list[Strip]:
         lines = (("loading the policy…", STYLES.title), ("this takes a few seconds", STYLES.muted))
@@ -132,7 +140,8 @@ class RobotView(SnapshotWidget):
         extent, centre = self._extent, (canvas.width / 2, canvas.height / 2)
         if self._shows_road:
             return frame_road(root, canvas.width, canvas.height)
-        if self.view == "above" and len(self._scenery.cylinders):
+        assert self.snapshot is not None
+        if self.view == "above" and self._looks_ahead(self.snapshot):
             area = self._view_ahead.frame(root[:2], extent, canvas.width, canvas.height)
             x, y = area.middle.tolist()
             return PerspectiveCamera((x, y, 0.0), 90.0, AHEAD / 2 * extent, area.zoom, centre)
@@ -140,8 +149,9 @@ class RobotView(SnapshotWidget):
             zoom = min(canvas.width, canvas.height) / (2.5 * extent)
             middle = (float(root[0]), float(root[1]), 0.0)
             return PerspectiveCamera(middle, 90.0, extent, zoom, centre)
-        zoom = min(canvas.width / (2.15 * extent), canvas.height / (1.5 * extent))
-        middle = (float(root[0]), float(root[1]), 0.45 * extent)
+        reach, forward = (_REACH_AHEAD, _FORWARD) if self.snapshot.traffic.kinds else (_REACH, 0.0)
+        zoom = min(canvas.width / (reach * extent), canvas.height / (1.5 * extent))
+        middle = (float(root[0]) + forward * canvas.width / zoom, float(root[1]), 0.45 * extent)
         centre = canvas.width / 2, canvas.height * 0.47
         return PerspectiveCamera(middle, _SIDE_ELEVATION, extent, zoom, centre)
 
@@ -182,7 +192,8 @@ class RobotView(SnapshotWidget):
     def _draw_ghost(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
         """Draw the ghost beneath the robot, or say where it is."""
         assert self.facts is not None
-        ghost = None if self.snapshot is None else self.snapshot.ghost
+        shown = self.snapshot is not None and self.snapshot.past is None
+        ghost = self.snapshot.ghost if self.snapshot is not None and shown else None
         if ghost is not None and ghost.latest is not None and len(ghost.latest.poses):
             poses = ghost.latest.poses
             draw_ghost(canvas, camera, self.facts.links, poses, _GHOST)
@@ -225,17 +236,10 @@ class RobotView(SnapshotWidget):
             thick = link.size[0] * float(magnification[row].mean()) * camera.zoom
             canvas.draw_capsule(dots[row, 0], dots[row, 1], thick, ink, halo=1.0)
 
-    def _draw_links_on_road(
-        self, canvas: BrailleCanvas, camera: PerspectiveCamera, placed: Floats, ends: Floats
-    ) -> None:
-        """Draw all links in one colour, after the rims of all, so that none cuts into another."""
-        assert self.facts is not None
-        dots, _, _ = camera.project(ends)
-        for halo in (1.0, 0.0):
-            for row, link in enumerate(self.facts.links):
-                if link.shape == "box":
-                    corners, _, _ = camera.project(compute_box_corners(link, placed[row]))
-                    canvas.draw_polygon(corners[:4], _ROBOT, halo=halo)
-                else:
-                    thick = link.size[0] * camera.zoom
-                    canvas.draw_capsule(dots[row, 0], dots[row, 1], thick, _ROBOT, halo=halo)
+
+def _inks() -> tuple[Style, ...]:
+    return (
+        *(STYLES.faint, STYLES.muted, STYLES.faint, STYLES.accent, STYLES.muted, STYLES.obstacle),
+        *(STYLES.muted, STYLES.text, STYLES.primary, STYLES.warn, STYLES.ghost),
+        *STYLES.depth,
+    )

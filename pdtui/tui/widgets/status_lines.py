@@ -7,12 +7,14 @@ from pathlib import PurePath
 from rich import filesize
 from rich.cells import cell_len
 from rich.style import Style
+from textual import events
 from textual.reactive import reactive
 from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
 from pdtui.sessions.episode_statistics import NO_STATISTICS
-from pdtui.tui.cell_text import ScreenRow, fit_cells, format_number
+from pdtui.tui.cell_text import ScreenRow, displayed_key_name, fit_cells, format_number
+from pdtui.tui.commands.key_clicked import KeyClicked
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
@@ -82,6 +84,9 @@ class StatusLine(SnapshotWidget):
     def _pace(self) -> tuple[str, Style]:
         snapshot = self.snapshot
         assert snapshot is not None
+        if snapshot.past is not None:
+            sign = "⏸" if snapshot.paused else f"▶ {snapshot.speed:g}×"
+            return f"{sign} {snapshot.past.present - snapshot.step} steps ago", STYLES.warn
         if snapshot.finished:
             return "■ over", STYLES.bad
         kind = "watching " if self.watching else ""
@@ -100,6 +105,7 @@ class NoticeLine(SnapshotWidget):
 
     notice: reactive[str] = reactive("", init=False, repaint=False)
     hints: reactive[str] = reactive("", init=False, repaint=False)
+    past_hints: reactive[str] = reactive("", init=False, repaint=False)
 
     def watch_notice(self) -> None:
         self.redraw()
@@ -107,7 +113,8 @@ class NoticeLine(SnapshotWidget):
     def paint(self, width: int, height: int) -> list[Strip]:
         del height
         row, counters = ScreenRow(width), self._counters()
-        finished = self.snapshot.finished if self.snapshot is not None else ""
+        past = self.snapshot is not None and self.snapshot.past is not None
+        finished = self.snapshot.finished if self.snapshot is not None and not past else ""
         if finished:
             said, style = f" ■ the drive is over: {make_printable(finished)}   {self.hints} ", STYLES.alert
         elif self.notice:
@@ -133,11 +140,13 @@ class NoticeLine(SnapshotWidget):
         return "with a key or a takeover" if controls else "with a key"
 
     def _counters(self) -> str:
-        """Return distance, collisions and involvement of the episode, for a robot that has them."""
+        """Return distance, collisions, obstacles passed and involvement of an episode with any of them."""
         statistics = self.snapshot.statistics if self.snapshot is not None else NO_STATISTICS
         shown = [] if statistics.distance is None else [f"{format_number(statistics.distance)} m"]
         if statistics.collisions is not None:
             shown.append(f"{statistics.collisions:g} collision{'' if statistics.collisions == 1.0 else 's'}")
+        if statistics.passed:  # none yet, or there is no course
+            shown.append(f"{statistics.passed:g} passed")
         if not shown:
             return ""
         steps = "1 step" if statistics.involvement == 1 else f"{statistics.involvement} steps"
@@ -148,7 +157,9 @@ class NoticeLine(SnapshotWidget):
         """Return the line shown while there is no notice."""
         if self.snapshot is None or self.facts is None:
             return "the drive starts once the policy is loaded"
-        facts = self.facts
+        facts, past = self.facts, self.snapshot.past
+        if past is not None:
+            return f"step {self.snapshot.step} of {past.present}, as it was   {self.past_hints}"
         place = make_printable(facts.recording) or "not recorded"
         if self._counters():
             return f"seed {facts.seed} · {place}"
@@ -159,9 +170,19 @@ class NoticeLine(SnapshotWidget):
 
 
 class KeyLine(SnapshotWidget):
-    """Shows as many of the application's keys as fit."""
+    """Shows as many of the application's keys as fit; a click on one is a press of it.
+
+    `keys` has Textual's name of each key, and what it does in a word.
+    """
 
     keys: reactive[tuple[tuple[str, str], ...]] = reactive((), init=False, repaint=False)
+    _ends: tuple[int, ...] = ()  # columns at which the keys shown end
+
+    def on_click(self, event: events.Click) -> None:
+        """Press the key that was clicked."""
+        number = sum(end <= event.x for end in self._ends)
+        if number < len(self._ends):
+            self.post_message(KeyClicked(self.keys[number][0]))
 
     def watch_keys(self) -> None:
         self.redraw()
@@ -169,10 +190,14 @@ class KeyLine(SnapshotWidget):
     def paint(self, width: int, height: int) -> list[Strip]:
         del height
         row = ScreenRow(width).add(" ", STYLES.text)
+        ends = []
         for key, says in self.keys:
-            if cell_len(key) + cell_len(says) + 3 > row.left:
+            cap = displayed_key_name(key)
+            if cell_len(cap) + cell_len(says) + 3 > row.left:
                 break
-            row.add(key, STYLES.accent).add(f" {says}  ", STYLES.muted)
+            row.add(cap, STYLES.accent).add(f" {says}  ", STYLES.muted)
+            ends.append(width - row.left)
+        self._ends = tuple(ends)
         return [row.strip()]
 
 

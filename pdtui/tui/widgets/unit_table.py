@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rich.cells import cell_len
+from textual import events
 from textual.strip import Strip
 
 from pdtui.core.errors import PolicyError
@@ -14,6 +15,8 @@ from pdtui.core.units import format_unit, parse_unit
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import ScreenRow, format_number
 from pdtui.tui.snapshot_widget import SnapshotWidget
+from pdtui.tui.strip.natural_outputs import NaturalOutputs
+from pdtui.tui.strip.unit_picked import UnitPicked
 from pdtui.tui.theme import STYLES
 
 _NUMBER, _ADDRESS = 8, 8  # widths of the columns, in cells
@@ -33,20 +36,23 @@ class UnitTable(SnapshotWidget):
             .add("unit", STYLES.muted, _ADDRESS)
             .add("natural", STYLES.muted, _NUMBER, right=True)
         )
-        head.add("    overwritten", STYLES.muted)
+        head.add("    overwritten  by itself", STYLES.muted)
         names = behaviors_of_units(self.map, self.snapshot.active_behaviors, self.facts.layers)
         strips = [head.strip()]
         units = self.snapshot.stimulated_units
         room = height - 1 if len(units) < height else height - 2
+        natural = NaturalOutputs(self.facts, self.snapshot)
         for view in units[:room]:
+            has = natural.has(view.unit, view.overwritten)
             name = names.get(view.unit, "")
-            style = STYLES.behavior(self.row_of(name))
+            style = STYLES.behavior(self.row_of(name)) if name else STYLES.accent
             row = (
                 ScreenRow(width)
                 .add(format_unit(view.unit, self.facts.layers), style, _ADDRESS)
                 .add(format_number(view.natural), STYLES.muted, _NUMBER, right=True)
                 .add("  → ", STYLES.faint)
-                .add(format_number(view.overwritten), STYLES.title, _NUMBER)
+                .add(format_number(view.overwritten) + ("" if has else "!"), STYLES.title, _NUMBER)
+                .add(natural.describe_range(view.unit), STYLES.faint if has else STYLES.warn)
             )
             if row.left > cell_len(make_printable(name)):
                 row.add(" " + make_printable(name), style)
@@ -54,6 +60,13 @@ class UnitTable(SnapshotWidget):
         if len(units) > room:
             strips.append(ScreenRow(width).add(f"+{len(units) - room} more", STYLES.faint).strip())
         return strips
+
+    def on_click(self, event: events.Click) -> None:
+        """Pick the unit under the mouse."""
+        offset = event.get_content_offset(self)
+        units = () if self.snapshot is None else self.snapshot.stimulated_units
+        if offset is not None and 1 <= offset.y <= min(len(units), self.content_size.height - 1):
+            self.post_message(UnitPicked(units[offset.y - 1].unit))
 
 
 def behaviors_of_units(

@@ -43,7 +43,7 @@ def test_copies_repeat_the_robots_own_walks(name: str, start: str) -> None:
         copies = robot.make_lockstep_robots(3)
         assert copies is not None
         # Copies share their world: on rough ground, each seed has its own.
-        shared = [row for row in range(3) if copies.world_key(states[row]) == copies.world_key(states[0])]
+        shared = [row for row in range(3) if copies.world_id(states[row]) == copies.world_id(states[0])]
         assert shared == ([0] if start == "rough" else [0, 1, 2])
         for row in shared:
             copies.restore(row, states[row])

@@ -1,0 +1,1 @@
+"""Tasks of robots, with the judges that tell whether they were done."""
