@@ -17,7 +17,7 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.drive_app import DriveApp
 from tests.tui.screens import shown
 
-PATIENCE = 300.0
+PATIENCE = 60.0
 
 
 async def until(pilot: Pilot[str], wanted: Callable[[], bool], what: str) -> None:
@@ -43,8 +43,12 @@ async def test_edits_on_the_screen_are_felt_recorded_and_replayed(
     try:
         async with app.run_test(size=(80, 24)) as pilot:
             await until(pilot, lambda: app.snapshot is not None and app.snapshot.step > 0, "the first step")
+            # Paused, an edit acts at once, and the robot cannot fall before the last one.
+            await pilot.press("p")
+            await until(pilot, lambda: app.snapshot is not None and app.snapshot.paused, "the pause")
             await pilot.press("ctrl+e", "right", "right", "right", "enter", "equals_sign", *"1.25", "enter")
             await until(pilot, lambda: held() == {3: 1.25}, "the unit")
+            await pilot.press("n")
             await until(
                 pilot,
                 lambda: (
@@ -62,6 +66,9 @@ async def test_edits_on_the_screen_are_felt_recorded_and_replayed(
             await until(pilot, lambda: stack() == [("push", True), ("twitch", False)], "the second layer")
             await pilot.press("space")
             await until(pilot, lambda: not held() and not stack(), "the default key")
+            before = 0 if app.snapshot is None else app.snapshot.step
+            await pilot.press("n")  # what was pressed belongs to this control step
+            await until(pilot, lambda: app.snapshot is not None and app.snapshot.step > before, "a step")
     finally:
         connection.close()
     replay = replay_session(session)

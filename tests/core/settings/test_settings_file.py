@@ -38,8 +38,8 @@ def test_a_changed_file_is_read_again(config: Path) -> None:
 
 
 def test_keys_are_those_of_the_table_but_for_the_users_own() -> None:
-    keys = parse_settings('[keys]\npause = "f2"\nfaster = ">"\n', "c").keys()
-    assert (keys["pause"], keys["faster"], keys["slower"]) == ("f2", "greater_than_sign", "comma")
+    keys = parse_settings('[keys]\npause = "f2"\nfaster = "f8"\n', "c").keys()
+    assert (keys["pause"], keys["faster"], keys["slower"]) == ("f2", "f8", "comma")
 
 
 def test_two_keys_can_be_swapped() -> None:
