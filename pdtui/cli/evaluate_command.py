@@ -35,8 +35,9 @@ from pdtui.cli.options.shared_options import (
     map_policy_option,
     overwrite_option,
     start_option,
-    workers_option,
 )
+from pdtui.cli.options.worker_options import workers_option
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.errors import MapError
 from pdtui.policies.weights.import_options import ImportOptions
 
@@ -126,7 +127,7 @@ def evaluate_command(
     experiment: str | None,
     pictures: tuple[Path, ...],
     overwrite: bool,
-    workers: int,
+    workers: Workers,
     as_json: bool,
     **own_options: Any,
 ) -> None:

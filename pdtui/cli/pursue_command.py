@@ -18,8 +18,8 @@ from pdtui.cli.options.shared_options import (
     minutes_option,
     own_policy_option,
     search_seed_option,
-    workers_option,
 )
+from pdtui.cli.options.worker_options import workers_option
 from pdtui.cli.output.command_output import print_result
 from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.settings.settings_file import own_folder

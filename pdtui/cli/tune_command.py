@@ -17,9 +17,10 @@ from pdtui.cli.options.shared_options import (
     json_option,
     map_policy_option,
     minutes_option,
-    workers_option,
 )
+from pdtui.cli.options.worker_options import workers_option
 from pdtui.cli.output.command_output import describe_map_copy, print_result
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.errors import MapError
 from pdtui.core.printable_text import make_printable
@@ -58,7 +59,7 @@ def tune_command(
     force: bool,
     seeds: range,
     dry_run: bool,
-    workers: int,
+    workers: Workers,
     as_json: bool,
     **settings: Any,
 ) -> None:

@@ -68,6 +68,10 @@ class WorkerError(PdtuiError):
     """A worker process died."""
 
 
+class ClusterError(PdtuiError):
+    """A cluster cannot be joined, or a node of it cannot do the work."""
+
+
 def format_error_in_one_line(error: BaseException) -> str:
     """Format an exception and the place where it was raised in one line, for use without a traceback."""
     words = " ".join(traceback.format_exception_only(error)[-1].split())

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from torch import nn
 
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.dissection.steering.steering_comparison import SteeringSettings
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
@@ -158,7 +159,8 @@ class DissectionConfig:
         start_from: A map, or its name or file, whose fixed behaviors the searches also begin from.
         budget_minutes: Time after which the searches end with the best found so far. Every unit is screened
             even if that takes longer.
-        workers: Processes that run roll-outs. A robot or a policy given as an object stays in this process.
+        workers: Number of processes that run roll-outs, or a cluster. A robot or a policy given as an object
+            stays in this process.
         journal: File that keeps every roll-out, so that an interrupted dissection continues where it stopped.
             It is left in place: delete it when the results are saved.
         progress: Called with the stage, the units of work done, and their total; or True for a bar on
@@ -179,7 +181,7 @@ class DissectionConfig:
     seed: int = FIRST_SEARCH_SEED
     start_from: str | Path | StimulationMap | None = None
     budget_minutes: float | None = None
-    workers: int = 2
+    workers: Workers = 2
     journal: Path | None = None
     progress: StageProgress | bool | None = None
 

@@ -11,6 +11,7 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from pdtui.core.atomic_file import check_writable, write_file
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.errors import MapError
 from pdtui.core.reserved_keys import KeyAllocator
 from pdtui.core.units import Stimulation, parse_unit
@@ -89,7 +90,7 @@ def search_task_into_map(
     *,
     import_options: ImportOptions = NO_OPTIONS,
     seed: int,
-    workers: int,
+    workers: Workers,
     minutes: float,
     settings: TaskSearchSettings,
     progress: Callable[[int, int], None] | None = None,

@@ -10,8 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.outcome import count_failures
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
+from pdtui.driving.cluster_drive_config import send_drive_files
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.evaluation.behavior_summary import (
@@ -109,14 +111,14 @@ def count_control_steps(plan: EvaluationPlan) -> int:
 
 
 def evaluate_behaviors(
-    config: DriveConfig, plan: EvaluationPlan, *, workers: int = 1, progress: StepProgress | None = None
+    config: DriveConfig, plan: EvaluationPlan, *, workers: Workers = 1, progress: StepProgress | None = None
 ) -> MapEvaluation:
     """Run an evaluation; `progress` is called with the number of runs done and the total.
 
     Args:
         config: What the plan was made for; worker processes build it again.
         plan: The runs.
-        workers: Number of worker processes.
+        workers: Number of worker processes, or a cluster.
         progress: Called with the number of runs done and of all runs.
     """
     measuring, in_tasks = plan.measuring_runs(), task_measuring_runs(plan)
@@ -128,7 +130,8 @@ def evaluate_behaviors(
         if progress is not None:
             progress(done + finished, total)
 
-    with WorkerPool(f"evaluation of {config.robot}", workers, plan.loop, build_control_loop, config) as pool:
+    sent = send_drive_files(workers, config)
+    with WorkerPool(f"evaluation of {config.robot}", workers, plan.loop, build_control_loop, sent) as pool:
         found = pool.map(measure_intervention, trials, advance)
         measured = _by_behavior(measuring, found[: len(measuring)])
         measured_in_tasks = measured | _by_behavior(in_tasks, found[len(measuring) :])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.errors import MapError
 from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
@@ -18,7 +19,7 @@ def evaluate_target_tracking(
     seeds: Sequence[int],
     *,
     targets: Sequence[float] = (),
-    workers: int = 1,
+    workers: Workers = 1,
     progress: StepProgress | None = None,
 ) -> TrackingSummary:
     """Drive every seed through the targets, 100 control steps each, with the PID behavior and without.

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import pdtui.paper
+from pdtui.core.cluster.ray_cluster import Workers
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -35,7 +36,7 @@ class ExperimentRequest:
 
     configs: Sequence[DriveConfig]
     seeds: range
-    workers: int
+    workers: Workers
     pictures: tuple[Path, ...] = ()
     overwrite: bool = False
     options: Mapping[str, Any] = field(default_factory=dict)

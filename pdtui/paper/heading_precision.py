@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.confidence_intervals import PairedRatio, paired_ratio
 from pdtui.core.errors import MapError
 from pdtui.core.processes.worker_pool import StepProgress
@@ -127,7 +128,7 @@ def compare_heading_precision(
     *,
     targets: Sequence[float] = HEADINGS,
     pushed: bool = False,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: StepProgress | None = None,
 ) -> HeadingPrecisionComparison:
     """Hold headings with every behavior of the maps that has a PID on the yaw angle.

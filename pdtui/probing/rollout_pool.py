@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import TypeVar
 
 from pdtui.core.closable import Closable
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_compatibility import check_policy_fit
+from pdtui.policies.weights.cluster_policy_files import send_policy_files
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.probing.lockstep_rollouts import FEWEST_TOGETHER, make_lockstep_rollouts
@@ -56,9 +58,9 @@ def _run_chunk(pair: _Pair, chunk: _Chunk) -> list[RolloutOutcome]:
 
 
 class RolloutPool(Closable):
-    """Runs roll-outs of one policy on one robot, in a `WorkerPool`.
+    """Runs roll-outs of one policy on one robot, in a `WorkerPool`: in worker processes, or on a cluster.
 
-    The results do not depend on the number of workers, as each roll-out depends on its start and plan only.
+    The results do not depend on the workers, as each roll-out depends on its start and plan only.
     Those in lock step, see `run_rollouts`, also depend on which run together, but not beyond rounding.
 
     Each worker process loads robot and policy by name. If one of the two is given as an object, all roll-outs
@@ -73,7 +75,7 @@ class RolloutPool(Closable):
         self,
         robot: str | RobotSpec | Robot,
         policy: str | Path | Policy,
-        workers: int = 2,
+        workers: Workers = 2,
         import_options: ImportOptions = NO_OPTIONS,
     ) -> None:
         # Also built in this process: callers need both, and errors in them are raised at once.
@@ -85,13 +87,17 @@ class RolloutPool(Closable):
         by_name = isinstance(robot, str | RobotSpec)
         if by_name:
             self.robot.allow_near_restores()
-        named = by_name and not isinstance(policy, Policy)
+        if not by_name or isinstance(policy, Policy):
+            workers = 1
+        name, options = str(policy), import_options
+        if workers != 1:
+            name, options = send_policy_files(workers, name, options)
         self._pool = WorkerPool(
             f"roll-outs of {self.robot.name}",
-            workers if named else 1,
+            workers,
             (self.robot, self.policy),
             _build_pair,
-            *(RobotSpec(self.robot.name, dict(self.robot.build_options)), str(policy), import_options),
+            *(RobotSpec(self.robot.name, dict(self.robot.build_options)), name, options),
         )
         self.rollouts = self.control_steps = 0
 

@@ -17,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.confidence_intervals import PairedRatio, paired_ratio
 from pdtui.core.errors import MapError
 from pdtui.core.outcome import is_failure
@@ -113,7 +114,7 @@ def tune_gains(
     seeds: Sequence[int],
     *,
     settings: TuningSettings | None = None,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Progress | None = None,
 ) -> list[TunedGains]:
     """Choose gains and limits, one behavior after the other; without a time limit, in a repeatable way.
@@ -123,7 +124,7 @@ def tune_gains(
         names: names of behaviors of mode ``pid``; empty for all of the map.
         seeds: at least 2, none for judging; half for the search, half to compare what it found.
         settings: how much to do; None for the usual amount.
-        workers: number of processes.
+        workers: number of processes, or a cluster.
         progress: called with controllers tried, controllers in all, and a note.
 
     Raises:

@@ -9,10 +9,12 @@ import numpy as np
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle, wrap_angles
 from pdtui.core.closable import Closable
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.outcome import Outcome
 from pdtui.core.processes.worker_pool import WorkerPool
 from pdtui.core.step_record import StepRecord
+from pdtui.driving.cluster_drive_config import send_drive_files
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
@@ -79,15 +81,18 @@ class TrackingDriveRunner(Closable):
 
     Args:
         config: robot, map and policy, or a loop of them, which stays in this process; its seed is not used.
-        workers: number of processes; the first call of `run` starts them.
+        workers: number of processes, which the first call of `run` starts, or a cluster.
 
     Raises:
         PdtuiError: the robot, the policy or the map cannot be loaded.
     """
 
-    def __init__(self, config: DriveConfig | ControlLoop, workers: int = 1) -> None:
+    def __init__(self, config: DriveConfig | ControlLoop, workers: Workers = 1) -> None:
         self.loop = build_control_loop(config) if isinstance(config, DriveConfig) else config
-        workers = workers if isinstance(config, DriveConfig) else 1
+        if isinstance(config, DriveConfig):
+            config = send_drive_files(workers, config)
+        else:
+            workers = 1
         name = f"drives of {self.loop.robot.name}"
         self._pool = WorkerPool(name, workers, self.loop, build_control_loop, config)
 

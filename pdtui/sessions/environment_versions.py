@@ -6,15 +6,12 @@ import os
 import platform
 import sys
 from collections.abc import Iterator, Mapping
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 
-PACKAGES = (
-    "pdtui", "mujoco", "pybullet", "box2d", "metadrive-simulator", "panda3d", "gymnasium", "torch", "numpy",
-    "simple-pid", "rerun-sdk",
-)  # fmt: skip
+from pdtui.core.installed_packages import PACKAGES, list_package_versions
+
 COMPUTES_NOTHING = ("system", "rerun-sdk")
 """Entries that may differ without affecting any number of a run."""
 
@@ -24,20 +21,15 @@ def collect_versions() -> dict[str, str]:
 
     Packages that are not installed are left out.
     """
-    found = {
+    return {
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.release()}",
         "machine": platform.machine(),
         "cpu": _cpu_name(),
         "blas": _blas_name(),
         "kernels": _kernels_name(),
+        **list_package_versions(),
     }
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return found
 
 
 def version_differences(a: Mapping[str, str], b: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:

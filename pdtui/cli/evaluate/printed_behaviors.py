@@ -11,6 +11,7 @@ import click
 from pdtui.cli.evaluate.run_watching import watch_runs
 from pdtui.cli.output.command_output import describe_map_copy, print_result
 from pdtui.cli.screen.show_drive import require_terminal
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.console.progress_bar import progress_bar
 from pdtui.core.errors import MapError
 from pdtui.core.printable_text import make_printable
@@ -24,7 +25,7 @@ def print_behaviors(
     config: DriveConfig,
     seeds: range,
     settings: ProtocolSettings,
-    workers: int,
+    workers: Workers,
     drawn: tuple[Path, bool] | None,
     *,
     watch: bool,
@@ -54,7 +55,8 @@ def print_behaviors(
         require_terminal()
     plan = evaluation.plan_evaluation(config, seeds, settings)
     if not as_json:
-        click.echo(f"{evaluation.count_control_steps(plan):,} control steps, {workers} processes", err=True)
+        where = f"{workers} processes" if isinstance(workers, int) else str(workers)
+        click.echo(f"{evaluation.count_control_steps(plan):,} control steps, {where}", err=True)
     with progress_bar("evaluating", quiet=as_json) as advance:
         result = evaluation.evaluate_behaviors(config, plan, workers=workers, progress=advance)
     if update:

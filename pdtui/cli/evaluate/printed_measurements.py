@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from pdtui.cli.output.command_output import print_result
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.console.progress_bar import progress_bar
 
 if TYPE_CHECKING:
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def print_target_tracking(
-    config: DriveConfig, target: str, seeds: range, workers: int, as_json: bool
+    config: DriveConfig, target: str, seeds: range, workers: Workers, as_json: bool
 ) -> None:
     """Measure how precisely targets of an attribute are held, and print it."""
     from pdtui.evaluation.evaluation_tables import tracking_table
@@ -43,7 +44,7 @@ def print_policy_alone(config: DriveConfig, seeds: range, as_json: bool, *, gait
 
 
 def print_key_releases(
-    config: DriveConfig, seeds: range, held: int | None, workers: int, as_json: bool
+    config: DriveConfig, seeds: range, held: int | None, workers: Workers, as_json: bool
 ) -> None:
     """Measure what happens once each behavior is let go, and print it."""
     from pdtui.evaluation.key_release.key_release_evaluation import evaluate_key_releases

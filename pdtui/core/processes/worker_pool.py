@@ -8,7 +8,6 @@ import os
 import signal
 import threading
 import time
-import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache, partial
@@ -18,7 +17,9 @@ from multiprocessing.util import Finalize
 from typing import Any, Generic, TypeVar
 
 from pdtui.core.closable import Closable
-from pdtui.core.errors import PdtuiError, WorkerError, format_error_in_one_line
+from pdtui.core.cluster.ray_cluster import RayCluster, Workers
+from pdtui.core.errors import WorkerError, format_error_in_one_line
+from pdtui.core.processes.call_answer import CallAnswer, answer_call, take_answer
 
 State = TypeVar("State")
 Job = TypeVar("Job")
@@ -69,12 +70,10 @@ class WorkerProcess(Closable):
         The death of the process is a `WorkerError`.
         """
         try:
-            succeeded, answer = self.connection.recv()
+            answer = self.connection.recv()
         except (EOFError, OSError) as error:
             raise self._death() from error
-        if not succeeded:
-            raise answer
-        return answer
+        return take_answer(answer)
 
     def close(self) -> None:
         """Kill the process."""
@@ -89,28 +88,31 @@ class WorkerProcess(Closable):
 
 
 class WorkerPool(Closable, Generic[State]):
-    """Runs jobs in worker processes, or in this process if there is only one worker.
+    """Runs jobs in worker processes, in this process if there is only one worker, or on a cluster.
 
     The first jobs start the processes, which are kept for later jobs. An exception in a job is raised in this
-    process, and the death of a worker is reported at once; both end all workers.
+    process, and the death of a worker is reported at once; both end all workers. On a cluster, jobs whose
+    process or node is lost are run again elsewhere.
 
     Args:
         name: what the workers work on, for error messages.
-        workers: number of processes.
+        workers: number of processes, or a cluster.
         state: state for jobs that run in this process.
         build: function of a module that returns the state of a worker; called in each worker.
         arguments: arguments of `build`.
     """
 
     def __init__(
-        self, name: str, workers: int, state: State, build: Callable[..., State], *arguments: Any
+        self, name: str, workers: Workers, state: State, build: Callable[..., State], *arguments: Any
     ) -> None:
         self._name, self._workers, self._state = name, workers, state
         self._build, self._arguments = build, arguments
         self._processes: list[WorkerProcess] = []
+        self._recipe: list[Any] = []
 
     def close(self) -> None:
-        """Kill the worker processes; later jobs start new ones."""
+        """Kill the worker processes; later jobs start new ones. Those of a cluster belong to Ray."""
+        self._recipe = []
         while self._processes:
             self._processes.pop().close()
 
@@ -141,6 +143,10 @@ class WorkerPool(Closable, Generic[State]):
 
         The death of a worker is a `WorkerError`.
         """
+        if isinstance(self._workers, RayCluster):
+            self._recipe = self._recipe or self._workers.put_recipe(self._build, self._arguments)
+            yield from self._workers.as_completed(self._name, self._recipe, function, jobs)
+            return
         if self._workers <= 1:
             for number, job in enumerate(jobs):
                 yield number, function(self._state, job)
@@ -189,18 +195,14 @@ def _serve_calls(connection: Connection, build: Callable[..., Any], arguments: t
     with suppress(EOFError, OSError):
         while True:
             function, values = connection.recv()
-            answer: tuple[bool, Any]
-            try:
-                answer = True, function(state(), *values)
-            except Exception as error:
-                if not isinstance(error, PdtuiError):
-                    # Tracebacks are not pickled.
-                    error.add_note(f"In a worker process:\n{traceback.format_exc()}")
-                answer = False, error
-            _send_answer(connection, answer)
+            _send_answer(connection, answer_call(_call_with, state, function, values))
 
 
-def _send_answer(connection: Connection, answer: tuple[bool, Any]) -> None:
+def _call_with(state: Callable[[], Any], function: Callable[..., Any], values: tuple[Any, ...]) -> Any:
+    return function(state(), *values)
+
+
+def _send_answer(connection: Connection, answer: CallAnswer) -> None:
     try:
         connection.send(answer)
     except OSError:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
+from pdtui.driving.cluster_drive_config import send_drive_files
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
@@ -71,7 +73,7 @@ def evaluate_key_releases(
     seeds: Sequence[int],
     *,
     held: int | None = None,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: StepProgress | None = None,
 ) -> KeyReleaseEvaluation:
     """Hold each behavior of a map, let it go, and watch for 300 control steps.
@@ -83,7 +85,7 @@ def evaluate_key_releases(
         config: Robot, policy and map; its seed is not used.
         seeds: The seeds.
         held: Control steps for which behaviors without a period are held; None for `HELD_STEPS`.
-        workers: Number of worker processes.
+        workers: Number of worker processes, or a cluster.
         progress: Called with the number of runs done and of all runs.
 
     Raises:
@@ -98,7 +100,8 @@ def evaluate_key_releases(
     # One run without a press per seed, as long as the longest with one.
     longest = [max((times[name, seed] for name in names), key=lambda one: one.steps) for seed in seeds]
     plans += [HeldRunPlan("", seed, one) for seed, one in zip(seeds, longest, strict=True)]
-    with WorkerPool(f"evaluation of {config.robot}", workers, loop, build_control_loop, config) as pool:
+    sent = send_drive_files(workers, config)
+    with WorkerPool(f"evaluation of {config.robot}", workers, loop, build_control_loop, sent) as pool:
         found = pool.map(run_held_behavior, plans, progress or (lambda _done, _all: None))
     traces = {(plan.behavior, plan.seed): trace for plan, trace in zip(plans, found, strict=True)}
     attributes = [attribute.name for attribute in loop.robot.attributes]

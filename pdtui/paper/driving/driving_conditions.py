@@ -11,8 +11,10 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
+from pdtui.driving.cluster_drive_config import send_drive_files
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
@@ -58,7 +60,7 @@ def evaluate_driving(
     left_out: Mapping[str, str] | None = None,
     journal: Path | None = None,
     record: Path | None = None,
-    workers: int = 2,
+    workers: Workers = 2,
     progress: StepProgress | None = None,
 ) -> DrivingExperimentResult:
     """Measure the rows of the table, and score recorded drives.
@@ -88,6 +90,7 @@ def evaluate_driving(
     kept, missing = ScoreJournal(journal), dict(left_out or {})
     effects: dict[str, KeyEffects] = {}
     rows: list[DrivingRow] = []
+    sent = {_name(config): send_drive_files(workers, config) for config in configs}
     with WorkerPool(f"roads of {robot}", workers, _Car(), _Car) as pool:
         if controls:
             usable = []
@@ -99,10 +102,10 @@ def evaluate_driving(
                 except PdtuiError as error:
                     missing[_name(config)] = str(error)
             if "keys" in controls:
-                found = pool.map(_measure_keys, usable)
+                found = pool.map(_measure_keys, [sent[_name(config)] for config in usable])
                 effects = {_name(config): one for config, one in zip(usable, found, strict=True)}
             jobs = list(_plan_jobs(usable, controls, scenes, repeats, effects, record))
-            scores = _run_jobs(pool, jobs, kept, progress)
+            scores = _run_jobs(pool, jobs, sent, kept, progress)
             rows += _summarise(jobs, scores, repeats)
     rows += [
         summarise_row(
@@ -184,11 +187,16 @@ def _plan_jobs(
 
 
 def _run_jobs(
-    pool: WorkerPool[_Car], jobs: Sequence[_DriveJob], kept: ScoreJournal, progress: StepProgress | None
+    pool: WorkerPool[_Car],
+    jobs: Sequence[_DriveJob],
+    sent: Mapping[str, DriveConfig],
+    kept: ScoreJournal,
+    progress: StepProgress | None,
 ) -> dict[str, DrivingScore]:
     scores = {job.key: score for job in jobs if (score := kept.find(job.key)) is not None}
     left = [job for job in jobs if job.key not in scores]
-    for number, score in pool.as_completed(_run_drive, left):
+    work = [replace(job, config=sent[_name(job.config)]) for job in left]
+    for number, score in pool.as_completed(_run_drive, work):
         scores[left[number].key] = score
         kept.keep(left[number].key, score)
         if progress is not None:

@@ -11,8 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.errors import PdtuiError, PolicyError, SessionError
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
+from pdtui.driving.cluster_drive_config import send_drive_files
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
@@ -62,7 +64,7 @@ def evaluate_forest(
     steps: int = STEPS,
     record: Path | None = None,
     tried: tuple[Sequence[int], int] = (TRIED_SEEDS, TRIED_STEPS),
-    workers: int = 2,
+    workers: Workers = 2,
     progress: StepProgress | None = None,
 ) -> ForestExperimentResult:
     """Measure the conditions in the same forests, and score recorded drives.
@@ -105,14 +107,14 @@ def evaluate_forest(
         if progress is not None:
             progress(done + here, total)
 
+    sent = {one: send_drive_files(workers, its_config) for one, its_config in configs.items()}
+    observed = replace(send_drive_files(workers, config), start=ROUGH)
     with WorkerPool(f"forests of {name}", workers, _LoopCache(), _LoopCache) as pool:
-        drives = pool.map(
-            _observe_keys, [(replace(config, start=ROUGH), seed, tried[1]) for seed in fit_seeds], tell
-        )
+        drives = pool.map(_observe_keys, [(observed, seed, tried[1]) for seed in fit_seeds], tell)
         done += len(drives)
         if drives:
             key_models = fit_key_motion_models(drives, keys, dt)
-        for condition, its_config in configs.items():
+        for condition, its_config in sent.items():
             jobs = [_EpisodeJob(its_config, seed, steps) for seed in seeds]
             if condition == "operator":
                 jobs = [replace(job, key_models=key_models, folder=record) for job in jobs]

@@ -10,9 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
+from pdtui.driving.cluster_drive_config import send_drive_files
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
@@ -53,7 +55,7 @@ def evaluate_parkour(
     steps: int = STEPS,
     obstacles: Sequence[ObstacleKind] = OBSTACLE_KINDS,
     record: Path | None = None,
-    workers: int = 2,
+    workers: Workers = 2,
     progress: StepProgress | None = None,
 ) -> CourseExperimentResult:
     """Measure the conditions on the same courses, each kind of obstacle by itself, and recorded drives.
@@ -82,14 +84,15 @@ def evaluate_parkour(
     people = [(path, *read_course_score(path, name, steps)) for path in sessions]
     if record is not None and (present := sorted(record.glob("*.rrd"))):
         raise SessionError(f"{present[0]}: already exists; drives are recorded into a new folder")
+    sent = send_drive_files(workers, config)
     jobs = [
-        _CourseJob(config, seed, steps, one, record if one == "operator" else None)
+        _CourseJob(sent, seed, steps, one, record if one == "operator" else None)
         for one in CONDITIONS
         if one in conditions
         for seed in seeds
     ]
     passages = [
-        _PassageJob(config, seed, one, kind)
+        _PassageJob(sent, seed, one, kind)
         for one in CONDITIONS
         if one in conditions
         for kind in obstacles

@@ -117,7 +117,7 @@ def load_any_network(
         _check_agreement(path, network.spec, import_options)
         return network, hash_file(path)
     digest = found.sha256
-    statistics = _find_statistics(path, import_options, folders)
+    statistics = find_statistics(path, import_options, folders)
     network = import_network(found, import_options, spaces, normaliser=statistics)
     if import_options != NO_OPTIONS:
         statistics_digest = hash_file(statistics) if statistics else ""
@@ -138,8 +138,12 @@ def _check_agreement(path: Path, spec: NetworkSpec, import_options: ImportOption
             raise PolicyError(f"{path}: its {what} is '{stated}' and cannot be chosen, found '{chosen}'")
 
 
-def _find_statistics(path: Path, import_options: ImportOptions, folders: Sequence[Path]) -> Path | None:
-    """Return the statistics file that the options name, in a folder or beside the weights."""
+def find_statistics(path: Path, import_options: ImportOptions, folders: Sequence[Path]) -> Path | None:
+    """Return the statistics file that the options name, in a folder or beside the weights.
+
+    Raises:
+        PolicyError: There is no such file.
+    """
     name = import_options.normaliser
     if not name or name == NO_NORMALISER:
         return None
