@@ -10,6 +10,7 @@ import click
 from pdtui.cli.completion.completed_names import complete_robots
 from pdtui.cli.options.robot_option_flag import parse_robot_options, robot_option_flag
 from pdtui.cli.options.shared_options import FILE_PATH, integer_option
+from pdtui.cli.options.worker_options import cluster_option
 from pdtui.core.console.progress_bar import progress_bar
 
 
@@ -75,6 +76,7 @@ def _parse_layers(text: str | None) -> tuple[int, ...] | None:
     metavar="FOLDER",
     help="Folder of the checkpoints; default: runs/ROBOT-ALGORITHM-SEED.",
 )
+@cluster_option
 def train_command(
     robot: str,
     robot_options: tuple[str, ...],

@@ -14,6 +14,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.core.cluster.ray_cluster import RayCluster
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.outcome import Outcome, is_failure
 from pdtui.policies.weights.policy_network import NetworkSpec
@@ -98,15 +99,23 @@ class PolicyTrainer(ABC, Generic[Config]):
     """One training run in a folder, which continues from its last checkpoint if there is one.
 
     The seed fixes the order of everything: a run that was killed and resumed ends with the same weights as
-    one that was not.
+    one that was not, and one whose robots step on a cluster with the same as one on this machine.
     """
 
     state: Any
     batches: Sequence[RobotBatch]
 
     def __init__(
-        self, robot: str, seed: int, folder: Path, config: Config, command: str, **robot_options: Any
+        self,
+        robot: str,
+        seed: int,
+        folder: Path,
+        config: Config,
+        command: str,
+        cluster: RayCluster | None = None,
+        **robot_options: Any,
     ) -> None:
+        self.cluster = cluster
         self.seed, self.folder, self.config, self.command = seed, folder, config, command
         self.robot, self.robot_options = robot, robot_options
         self.make: Callable[[], Robot] = lambda: make_robot(robot, **robot_options)

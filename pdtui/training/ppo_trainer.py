@@ -22,7 +22,9 @@ from pdtui.training.multilayer_perceptron import MlpParameters
 from pdtui.training.policy_imitation import fit_actor, imitate, make_demonstrator
 from pdtui.training.policy_trainer import PolicyTrainer
 from pdtui.training.ppo_learner import PpoLearner, PpoRollout, PpoState
-from pdtui.training.robot_batch import RemoteRobotBatch, RobotBatch, TransitionBatch
+from pdtui.training.remote.remote_robot_batch import RemoteRobotBatch
+from pdtui.training.remote.spread_robot_batch import SpreadRobotBatch
+from pdtui.training.robot_batch import RobotBatch, TransitionBatch
 from pdtui.training.training_config import PpoConfig
 
 THREADS = 2
@@ -40,6 +42,9 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
         seeds = [self.seed * 10 + 1 + n for n in range(THREADS)]
         if (own := self.make_own_batch(seeds[0])) is not None:
             self.batches = [own]
+        elif self.cluster is not None:
+            worlds, parts = (self.robot, self.robot_options, share), self.cluster.cores // THREADS
+            self.batches = [SpreadRobotBatch(*worlds, seed, self.cluster, parts) for seed in seeds]
         elif self.config.processes:
             self.batches = [RemoteRobotBatch(self.robot, self.robot_options, share, seed) for seed in seeds]
         else:

@@ -1,19 +1,16 @@
-"""Several copies of a robot that are stepped together, in this process or in another."""
+"""Several copies of a robot that are stepped together."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.core.errors import SimulationDiverged, TrainingError, WorkerError
-from pdtui.core.processes.worker_pool import WorkerProcess
+from pdtui.core.errors import SimulationDiverged, TrainingError
 from pdtui.core.robot_links_and_state import RobotState
-from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot, StepResult
 
 
@@ -49,14 +46,16 @@ class RobotBatch:
         make: Builds one robot.
         count: Number of robots.
         seed: Seed of their episodes.
+        first: Number of the first robot, where the batch is a part of a larger one.
     """
 
-    def __init__(self, make: Callable[[], Robot], count: int, seed: int) -> None:
+    def __init__(self, make: Callable[[], Robot], count: int, seed: int, first: int = 0) -> None:
         self.robots = [make() for _ in range(count)]
         self.ages = [0] * count
         self.restarted = np.zeros(count, bool)
         # The factor keeps the seeds of different batches apart.
-        start = [robot.reset(seed=seed * 1_000_003 + index)[0] for index, robot in enumerate(self.robots)]
+        seeds = [seed * 1_000_003 + first + index for index in range(count)]
+        start = [robot.reset(seed=its_own)[0] for robot, its_own in zip(self.robots, seeds, strict=True)]
         self.observations = np.array(start, np.float32)
 
     def step(self, actions: NDArray[np.float32]) -> TransitionBatch:
@@ -105,46 +104,3 @@ class RobotBatch:
         for index, (robot, snapshot) in enumerate(zip(self.robots, state.snapshots, strict=True)):
             robot.restore(snapshot)
             self.observations[index] = robot.observe()
-
-
-class RemoteRobotBatch(RobotBatch):
-    """A `RobotBatch` in a process of its own, with the same results step for step.
-
-    Args:
-        robot: Name of the robot.
-        options: Arguments of the robot's class.
-        count: Number of robots.
-        seed: Seed of their episodes.
-
-    Raises:
-        TrainingError: The process died.
-    """
-
-    def __init__(self, robot: str, options: dict[str, Any], count: int, seed: int) -> None:
-        make = partial(make_robot, robot, **options)
-        self.worker = WorkerProcess(f"worlds of {robot}", RobotBatch, make, count, seed)
-        self._call("")
-
-    def step(self, actions: NDArray[np.float32]) -> TransitionBatch:
-        return cast(TransitionBatch, self._call("step", actions))
-
-    def state(self) -> RobotBatchState:
-        return cast(RobotBatchState, self._call("state"))
-
-    def restore(self, state: RobotBatchState) -> None:
-        self._call("restore", state)
-
-    def _call(self, name: str, *arguments: Any) -> Any:
-        try:
-            self.worker.send(_call_batch, name, *arguments)
-            answer, self.observations, self.restarted = self.worker.receive()
-        except WorkerError as error:
-            raise TrainingError(
-                f"{error}; give the same command again to continue the run from its last checkpoint"
-            ) from error
-        return answer
-
-
-def _call_batch(batch: RobotBatch, name: str, *arguments: Any) -> tuple[Any, Any, Any]:
-    answer = getattr(batch, name)(*arguments) if name else None
-    return answer, batch.observations, batch.restarted

@@ -14,6 +14,7 @@ from pdtui.training.actor_conversion import Actor, make_numpy_actor
 from pdtui.training.multilayer_perceptron import MlpParameters
 from pdtui.training.policy_imitation import fit_gaussian_actor, imitate, make_demonstrator
 from pdtui.training.policy_trainer import PolicyTrainer
+from pdtui.training.remote.spread_robot_batch import SpreadRobotBatch
 from pdtui.training.robot_batch import RobotBatch, TransitionBatch
 from pdtui.training.sac_learner import SacLearner
 from pdtui.training.training_config import SacConfig
@@ -67,7 +68,13 @@ class SacTrainer(PolicyTrainer[SacConfig]):
     def build(self) -> None:
         config = self.config
         own = self.make_own_batch(self.seed)
-        self.batches = [own or RobotBatch(self.make, config.worlds, self.seed)]
+        if own is not None:
+            self.batches = [own]
+        elif self.cluster is not None:
+            worlds, cores = (self.robot, self.robot_options, config.worlds), self.cluster.cores
+            self.batches = [SpreadRobotBatch(*worlds, self.seed, self.cluster, cores)]
+        else:
+            self.batches = [RobotBatch(self.make, config.worlds, self.seed)]
         self.learner = SacLearner(config, self.observations, self.actions)
         self.state = self.learner.init(self.seed)
         self.replay = ReplayBuffer(config.capacity, self.observations, self.actions)

@@ -7,10 +7,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pdtui.core.errors import TrainingError
+from pdtui.core.cluster.ray_cluster import RayCluster
+from pdtui.core.errors import TrainingError, WorkerError
 from pdtui.robots import list_robot_names, make_robot
 from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions, format_option_value
+from pdtui.training.remote.spread_robot_batch import SpreadRobotBatch
 from pdtui.training.training_config import PpoConfig, SacConfig
+
+LEAST_CORES = 2
+"""Cores of a cluster that a run needs: PPO has two batches of robots."""
+_LOSSES_SURVIVED = 20
+"""Lost nodes after which a run ends; the same command continues it."""
 
 
 def train_policy(
@@ -28,14 +35,18 @@ def train_policy(
     initial_policy: str | None = None,
     imitation_rounds: int | None = None,
     robot_options: RobotOptions = NO_ROBOT_OPTIONS,
+    cluster: RayCluster | None = None,
 ) -> Path:
     """Train a policy in a folder, or continue there, and return the path of the best weights.
 
-    The robot is built with the options of its recipe, except for those that are given.
+    The robot is built with the options of its recipe, except for those that are given. On a cluster, the
+    robots step there, and this process learns and evaluates. Where a node is lost, the run goes on from its
+    last checkpoint with the nodes that are left.
 
     Raises:
         TrainingError: The extra ``train`` is not installed, the robot is an environment of Gymnasium or has
-            no choice of a forward reward, the algorithm has no such choice, or the folder holds another run.
+            no choice of a forward reward, the algorithm has no such choice, the folder holds another run, or
+            a cluster has too few cores or nothing to do for the robot.
     """
     if robot not in list_robot_names():
         raise TrainingError(
@@ -43,6 +54,10 @@ def train_policy(
             f"found '{robot}'"
         )
     recipe = make_robot(robot).training_recipe
+    if cluster is not None and recipe.robot_batch:
+        raise TrainingError(
+            f"--cluster: all robots of a run for '{robot}' step in one process, which a cluster cannot divide"
+        )
     if forward is not None and "forward" not in recipe.options:
         raise TrainingError(f"--forward chooses the Ant's reward; '{robot}' has only one")
     try:
@@ -84,9 +99,31 @@ def train_policy(
             note = f"best return {best.mean_return:.0f}, {best.mean_speed:.2f} m/s" if best else ""
             progress(taken, config.total_steps, note)
 
-    trainer: PolicyTrainer[PpoConfig] | PolicyTrainer[SacConfig]
-    if isinstance(config, PpoConfig):
-        trainer = PpoTrainer(robot, seed, folder, config, command, **options)
-    else:
-        trainer = SacTrainer(robot, seed, folder, config, command, **options)
-    return trainer.run(report)
+    def train() -> Path:
+        trainer: PolicyTrainer[PpoConfig] | PolicyTrainer[SacConfig]
+        if isinstance(config, PpoConfig):
+            trainer = PpoTrainer(robot, seed, folder, config, command, cluster, **options)
+        else:
+            trainer = SacTrainer(robot, seed, folder, config, command, cluster, **options)
+        try:
+            return trainer.run(report)
+        finally:
+            for batch in trainer.batches:
+                if isinstance(batch, SpreadRobotBatch):
+                    batch.close()
+
+    return train() if cluster is None else _survive_losses(train, cluster)
+
+
+def _survive_losses(train: Callable[[], Path], cluster: RayCluster) -> Path:
+    """Train, and continue from the last checkpoint where a process or a node is lost."""
+    losses = 0
+    while True:
+        if cluster.cores < LEAST_CORES:
+            raise TrainingError(f"--cluster: expected at least {LEAST_CORES} cores, found {cluster.cores}")
+        try:
+            return train()
+        except TrainingError as error:
+            losses += 1
+            if losses > _LOSSES_SURVIVED or not isinstance(error.__cause__, WorkerError):
+                raise

@@ -12,7 +12,8 @@ from pdtui.robots import make_robot
 
 pytest.importorskip("jax", reason="the extra 'train' is not installed")
 
-from pdtui.training.robot_batch import RemoteRobotBatch, RobotBatch
+from pdtui.training.remote.remote_robot_batch import RemoteRobotBatch
+from pdtui.training.robot_batch import RobotBatch
 
 
 def test_they_step_alike_and_go_on_from_a_kept_state() -> None:

@@ -37,6 +37,8 @@ class RayCluster(Closable):
     Everything on a cluster trusts everything else: Ray's processes send each other pickled objects. What
     comes from outside, such as files of weights, is sent as bytes and read there as it is here.
 
+    It is joined when it is first used.
+
     Args:
         address: Address of the cluster's head node, ``HOST:PORT``; or ``auto`` for the cluster that this
             machine has joined, or else a cluster of this machine alone, which binds to 127.0.0.1 and ends
@@ -50,9 +52,9 @@ class RayCluster(Closable):
         if find_spec("ray") is None:
             raise ClusterError("a cluster needs the extra: pip install 'pdtui[cluster]'")
         self.address = address
+        self._host = _LOOPBACK[0] if address == AUTO else _check_address(address)
         self._files: dict[str, Any] = {}
-        self._connected = False
-        self._connect()
+        self._joined = False
 
     def __str__(self) -> str:
         return f"a cluster of {self.cores} cores"
@@ -60,18 +62,15 @@ class RayCluster(Closable):
     @property
     def cores(self) -> int:
         """Number of cores that the cluster has now."""
-        import ray
-
-        resources: dict[str, float] = ray.cluster_resources()  # type: ignore[no-untyped-call]
+        ray = self.join()
+        resources: dict[str, float] = ray.cluster_resources()
         return int(resources.get("CPU", 0))
 
     def close(self) -> None:
         """Leave the cluster; one of this machine alone ends."""
-        import ray
-
-        if self._connected:
-            ray.shutdown()
-        self._connected = False
+        if self._joined:
+            self.join().shutdown()
+        self._joined = False
 
     def add_file(self, path: Path) -> str:
         """Send a file to the cluster, and return its name in the working directory of the processes there.
@@ -81,15 +80,13 @@ class RayCluster(Closable):
         Raises:
             ClusterError: The file cannot be read.
         """
-        import ray
-
         try:
             content = path.read_bytes()
         except OSError as error:
             raise ClusterError(f"{path}: cannot be read: {error.strerror}") from error
         name = f"./{sha256(content).hexdigest()}/{path.name}"
         if name not in self._files:
-            self._files[name] = ray.put(content)
+            self._files[name] = self.join().put(content)
         return name
 
     def start_worker(self, name: str, build: Callable[..., Any], *arguments: Any) -> RayWorker:
@@ -98,12 +95,10 @@ class RayCluster(Closable):
 
     def put_recipe(self, build: Callable[..., Any], arguments: tuple[Any, ...]) -> list[Any]:
         """Send what processes need to build a state, and return the reference to it, in a list."""
-        import ray
-
         recipe = StateRecipe(
             build, arguments, describe_installation(), collect_environment(), dict(self._files)
         )
-        return [ray.put(recipe)]
+        return [self.join().put(recipe)]
 
     def as_completed(
         self, name: str, recipe: list[Any], function: Callable[..., Any], jobs: Sequence[Any]
@@ -120,8 +115,7 @@ class RayCluster(Closable):
             WorkerError: A job lost its process or its node `RUNS_PER_JOB` times.
             ClusterError: A node has other versions.
         """
-        import ray
-
+        ray = self.join()
         remote = ray.remote(run_job).options(num_cpus=1, max_retries=RUNS_PER_JOB - 1, name=f"pdtui {name}")
         waiting = iter(enumerate(jobs))
         most = max(_LEAST_WAITING, _WAITING_PER_CORE * self.cores)
@@ -141,31 +135,37 @@ class RayCluster(Closable):
             for reference in running:
                 ray.cancel(reference, force=True)
 
-    def _connect(self) -> None:
-        host = "127.0.0.1" if self.address == AUTO else _check_address(self.address)
-        if host in _LOOPBACK and "ray" not in sys.modules:
+    def join(self) -> Any:
+        """Join the cluster if this process has not yet, and return the module of Ray.
+
+        Raises:
+            ClusterError: There is no cluster, or no node of it has cores.
+        """
+        if self._host in _LOOPBACK and "ray" not in sys.modules:
             os.environ[_BIND_TO_LOOPBACK] = "0"
         os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # silences a warning
         import ray
 
-        if not ray.is_initialized():
-            try:
-                ray.init(
-                    address=None if self.address == AUTO else self.address,
-                    include_dashboard=False,
-                    log_to_driver=False,
-                    logging_level=logging.ERROR,
-                )
-            except (ConnectionError, RuntimeError, ValueError) as error:
-                reason = str(error).strip().partition("\n")[0]
-                raise ClusterError(
-                    f"cluster {self.address}: {reason}; this machine has to be one of its nodes, "
-                    "which `ray start --address=HOST:PORT` makes it"
-                ) from error
-            self._connected = True
+        if ray.is_initialized():
+            return ray
+        try:
+            ray.init(
+                address=None if self.address == AUTO else self.address,
+                include_dashboard=False,
+                log_to_driver=False,
+                logging_level=logging.ERROR,
+            )
+        except (ConnectionError, RuntimeError, ValueError) as error:
+            reason = str(error).strip().partition("\n")[0]
+            raise ClusterError(
+                f"cluster {self.address}: {reason}; this machine has to be one of its nodes, "
+                "which `ray start --address=HOST:PORT` makes it"
+            ) from error
+        self._joined = True
         if self.cores == 0:
             self.close()
             raise ClusterError(f"cluster {self.address}: expected a node with cores, found none")
+        return ray
 
 
 def _check_address(address: str) -> str:

@@ -1,0 +1,1 @@
+"""Batches of robots in other processes, of this machine or of a cluster."""
