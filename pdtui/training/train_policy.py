@@ -14,8 +14,6 @@ from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions, fo
 from pdtui.training.remote.spread_robot_batch import SpreadRobotBatch
 from pdtui.training.training_config import PpoConfig, SacConfig
 
-LEAST_CORES = 2
-"""Cores of a cluster that a run needs: PPO has two batches of robots."""
 _LOSSES_SURVIVED = 20
 """Lost nodes after which a run ends; the same command continues it."""
 
@@ -46,7 +44,7 @@ def train_policy(
     Raises:
         TrainingError: The extra ``train`` is not installed, the robot is an environment of Gymnasium or has
             no choice of a forward reward, the algorithm has no such choice, the folder holds another run, or
-            a cluster has too few cores or nothing to do for the robot.
+            the robots cannot be spread over a cluster.
     """
     if robot not in list_robot_names():
         raise TrainingError(
@@ -112,15 +110,13 @@ def train_policy(
                 if isinstance(batch, SpreadRobotBatch):
                     batch.close()
 
-    return train() if cluster is None else _survive_losses(train, cluster)
+    return train() if cluster is None else _survive_losses(train)
 
 
-def _survive_losses(train: Callable[[], Path], cluster: RayCluster) -> Path:
+def _survive_losses(train: Callable[[], Path]) -> Path:
     """Train, and continue from the last checkpoint where a process or a node is lost."""
     losses = 0
     while True:
-        if cluster.cores < LEAST_CORES:
-            raise TrainingError(f"--cluster: expected at least {LEAST_CORES} cores, found {cluster.cores}")
         try:
             return train()
         except TrainingError as error:

@@ -148,6 +148,7 @@ class RayCluster(Closable):
 
         if ray.is_initialized():
             return ray
+        _silence_standard_output()
         try:
             ray.init(
                 address=None if self.address == AUTO else self.address,
@@ -166,6 +167,17 @@ class RayCluster(Closable):
             self.close()
             raise ClusterError(f"cluster {self.address}: expected a node with cores, found none")
         return ray
+
+
+def _silence_standard_output() -> None:
+    """Keep Ray from printing what nodes report to standard output, where ``--json`` writes.
+
+    It has no setting for that. What matters of it comes as an exception.
+    """
+    from ray._private import worker
+
+    if hasattr(worker, "print_to_stdstream"):
+        worker.print_to_stdstream = lambda *_, **__: None
 
 
 def _check_address(address: str) -> str:

@@ -30,9 +30,9 @@ class CallServer:
 
 
 class RayWorker(Closable):
-    """A process on some node of a cluster, with one core, that answers function calls, one at a time.
+    """A process on some node of a cluster that answers function calls, one at a time.
 
-    It is not started again when it is lost: its state is gone.
+    Several are spread over the nodes. It is not started again when it is lost: its state is gone.
 
     Args:
         name: What it works on, for error messages.
@@ -43,7 +43,7 @@ class RayWorker(Closable):
         import ray
 
         self.name = name
-        self._actor: Any = ray.remote(CallServer).options(num_cpus=1, max_restarts=0).remote(recipe)
+        self._actor: Any = ray.remote(CallServer).options(scheduling_strategy="SPREAD").remote(recipe)
         self._answer: Any = None
 
     def send(self, function: Callable[..., Any], *arguments: Any) -> None:

@@ -21,7 +21,7 @@ class SpreadRobotBatch(RobotBatch):
         count: Number of robots.
         seed: Seed of their episodes.
         cluster: The cluster.
-        parts: Number of parts, each of which takes a core; never more than there are robots.
+        parts: Number of parts, one for each core that is to work; never more than there are robots.
 
     Raises:
         TrainingError: A process or a node was lost.

@@ -8,13 +8,21 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pdtui.core.cluster.ray_cluster import RayCluster
 from pdtui.core.errors import ClusterError, RobotError, WorkerError
 from pdtui.core.processes.worker_pool import WorkerPool
+from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.rollout_pool import RolloutPool
+from pdtui.probing.start_states import collect_start_states
+from pdtui.robots import make_robot
+from pdtui.training.remote.spread_robot_batch import SpreadRobotBatch
+from pdtui.training.robot_batch import RobotBatch
 from tests.core.processes.test_worker_pool import count_calls, divide, fail_on_three, fail_to_build
 from tests.local_cluster import local_cluster
 
@@ -142,6 +150,41 @@ def test_other_versions_on_a_node_are_refused(cluster: RayCluster, monkeypatch: 
         pytest.raises(ClusterError, match=r"numpy 0\.1 as on"),
     ):
         pool.map(multiply, [1])
+
+
+def test_roll_outs_are_those_of_one_machine_though_the_file_is_only_there(
+    cluster: RayCluster, policy_file: Path, tmp_path: Path
+) -> None:
+    own = tmp_path / "own.safetensors"
+    own.write_bytes(policy_file.read_bytes())
+    found = []
+    for workers in (1, cluster):
+        with RolloutPool("ant", own, workers) as pool:
+            if workers is cluster:
+                own.unlink()
+            starts = collect_start_states(pool.robot, pool.policy, 1000, 2, at=20)
+            found.append(EffectProbe(pool).measure_units(range(3), (-3.0, 3.0), starts, steps=60))
+            assert pool.rollouts == 14
+    np.testing.assert_array_equal(found[0].effects, found[1].effects)
+    np.testing.assert_array_equal(found[0].unperturbed, found[1].unperturbed)
+
+
+def test_worlds_on_a_cluster_step_alike_and_go_on_from_a_kept_state(cluster: RayCluster) -> None:
+    here = RobotBatch(partial(make_robot, "ant"), 3, 5)
+    there = SpreadRobotBatch("ant", {}, 3, 5, cluster, 2)
+    actions = np.random.default_rng(0).uniform(-1, 1, (12, 3, 8)).astype(np.float32)
+    for action in actions[:6]:
+        for mine, theirs in zip(here.step(action), there.step(action), strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+    kept = there.state()
+    first = [there.step(action) for action in actions[6:]]
+    there.restore(kept)
+    for action, expected in zip(actions[6:], first, strict=True):
+        for again, rows, local in zip(there.step(action), expected, here.step(action), strict=True):
+            np.testing.assert_array_equal(again, rows)
+            np.testing.assert_array_equal(local, rows)
+    np.testing.assert_array_equal(here.observations, there.observations)
+    there.close()
 
 
 @pytest.mark.parametrize("address", ["nowhere", "127.0.0.1:1", "ray://127.0.0.1:10001", "127.0.0.1:99999999"])
