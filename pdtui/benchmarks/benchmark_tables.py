@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.console import Group
 from rich.table import Table
 
+from pdtui.benchmarks.cluster_benchmark import BYTES_PER_SECOND, NODES, ClusterBenchmark
 from pdtui.benchmarks.control_loop_benchmark import ControlLoopBenchmark
 from pdtui.benchmarks.dissection_benchmark import DissectionBenchmark
 from pdtui.benchmarks.recording_benchmark import MemoryBenchmark, RecordingBenchmark
@@ -79,6 +80,39 @@ def rollout_benchmark_table(result: RolloutBenchmark) -> Table:
         f"Places in the order of the roll-outs by an attribute that are the same: {result.same_order:.0%}."
     )
     return table
+
+
+def cluster_benchmark_tables(result: ClusterBenchmark) -> Group:
+    """Return the measured cost of roll-outs on a cluster, and the simulated times on larger ones."""
+    title = f"Roll-outs of {result.robot}, {result.steps} control steps each, on {result.cores} cores"
+    measured = new_table(f"{title}: measured", "measure", "value")
+    for name, seconds in (
+        ("core time of a roll-out in this process", result.alone),
+        ("in worker processes", result.processes),
+        ("on the cluster", result.cluster),
+        ("overhead of a roll-out on the cluster", result.overhead),
+    ):
+        measured.add_row(name, f"{1000 * seconds:.2f} ms")
+    for size, cost in ((1, result.single), (result.per_chunk, result.usual)):
+        measured.add_row(f"time for a chunk of {size} that takes no time", f"{1000 * cost.latency:.2f} ms")
+        measured.add_row(
+            f"processor time of this process for a chunk of {size}", f"{1000 * cost.driver:.2f} ms"
+        )
+        measured.add_row(f"bytes of a chunk of {size}, sent and answered", f"{cost.bytes:,}")
+    measured.add_row("bytes per roll-out", f"{result.bytes:.0f}")
+    measured.add_row("bytes of the policy, once per node", f"{result.file_bytes:,}")
+    batches = [f"{one.batch}: {one.rollouts} roll-outs" for one in result.simulated]
+    simulated = new_table("Larger clusters: simulated, not measured", "nodes", "cores", *batches)
+    for index, nodes in enumerate(NODES):
+        cells = (
+            f"{1000 * one.seconds[index]:.0f} ms, × {one.speedup(index):.1f}" for one in result.simulated
+        )
+        simulated.add_row(str(nodes), str(nodes * result.cores_per_node), *cells)
+    simulated.caption = (
+        "From what was measured, with one driver, equal nodes that have built their robots, a network of "
+        f"{8 * BYTES_PER_SECOND / 1e9:g} Gbit/s and no failure."
+    )
+    return Group(measured, simulated)
 
 
 def recording_benchmark_table(result: RecordingBenchmark) -> Table:

@@ -17,7 +17,9 @@ from pdtui.cli.options.shared_options import (
     own_policy_option,
     record_activations_option,
 )
+from pdtui.cli.options.worker_options import cluster_option
 from pdtui.cli.output.command_output import print_result
+from pdtui.core.cluster.ray_cluster import RayCluster
 from pdtui.core.console.progress_bar import progress_bar
 from pdtui.sessions.session_schema import ActivationsKept
 
@@ -98,6 +100,35 @@ def bench_rollouts_command(
     with progress_bar("measuring", quiet=as_json) as advance:
         result = bench_rollouts(world, policy or robot, progress=advance, **sizes)
     print_result(asdict(result), as_json, lambda: rollout_benchmark_table(result))
+
+
+@bench_command.command("cluster")
+@click.argument("robot", default="ant", shell_complete=complete_robots)
+@robot_option_flag
+@own_policy_option
+@cluster_option
+@integer_option("--rollouts", least=40, default=480, help="Number of roll-outs per round.")
+@integer_option("--steps", least=10, default=60, help="Number of control steps per roll-out.")
+@integer_option("--rounds", default=3, help="Number of rounds to measure.")
+@integer_option("--cores-per-node", default=16, help="Number of cores of each simulated node.")
+@json_option
+def bench_cluster_command(
+    robot: str,
+    robot_options: tuple[str, ...],
+    policy: str,
+    cluster: RayCluster | None,
+    as_json: bool,
+    **sizes: int,
+) -> None:
+    """Measure what roll-outs cost on a cluster (by default this machine's), and simulate larger ones."""
+    from pdtui.benchmarks.benchmark_tables import cluster_benchmark_tables
+    from pdtui.benchmarks.cluster_benchmark import bench_cluster
+    from pdtui.robots import RobotSpec
+
+    world = RobotSpec(robot, parse_robot_options(robot, robot_options))
+    with cluster or RayCluster() as joined, progress_bar("measuring", quiet=as_json) as advance:
+        result = bench_cluster(world, policy or robot, joined, progress=advance, **sizes)
+    print_result(asdict(result), as_json, lambda: cluster_benchmark_tables(result))
 
 
 @bench_command.command("record")

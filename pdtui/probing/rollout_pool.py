@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from pdtui.core.closable import Closable
-from pdtui.core.cluster.ray_cluster import Workers
+from pdtui.core.cluster.ray_cluster import RayCluster, Workers
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_compatibility import check_policy_fit
@@ -28,11 +28,12 @@ from pdtui.robots.robot import Robot
 _STEPS_PER_CHUNK = 1200
 # Long roll-outs in lock step are worth a longer wait: this many together, in no fewer chunks than that.
 _LARGEST_BATCH, _LEAST_CHUNKS = 16, 4
+_CHUNKS_PER_CORE = 2
 
 WorkItem = TypeVar("WorkItem")
 WorkResult = TypeVar("WorkResult")
 _Pair = tuple[Robot, Policy]
-_Chunk = tuple[Sequence[RolloutJob], dict[int, StartState], int, int]
+RolloutChunk = tuple[Sequence[RolloutJob], dict[int, StartState], int, int]
 """Jobs, their starts by index, the steps of each roll-out, and the first step that is measured."""
 
 
@@ -52,9 +53,27 @@ def _apply(work: Callable[[Robot, Policy, WorkItem], WorkResult], pair: _Pair, i
     return work(*pair, item)
 
 
-def _run_chunk(pair: _Pair, chunk: _Chunk) -> list[RolloutOutcome]:
+def _run_chunk(pair: _Pair, chunk: RolloutChunk) -> list[RolloutOutcome]:
     jobs, starts, steps, measure_from = chunk
     return run_rollouts(*pair, starts, jobs, steps, measure_from)
+
+
+def choose_chunk_size(rollouts: int, steps: int, *, lockstep: bool, cores: int = 1) -> int:
+    """Return how many roll-outs a worker is sent at once.
+
+    On a cluster, they are few enough for all cores to have work. Those in lock step do not depend on the
+    cluster, so that neither do their results, to the last bit.
+
+    Args:
+        rollouts: Number of roll-outs.
+        steps: Control steps of each.
+        lockstep: Whether they run in lock step.
+        cores: Cores of the cluster; 1 for worker processes.
+    """
+    size = max(1, _STEPS_PER_CHUNK // steps)
+    if lockstep:
+        return max(size, min(_LARGEST_BATCH, rollouts // _LEAST_CHUNKS))
+    return size if cores == 1 else max(1, min(size, rollouts // (_CHUNKS_PER_CORE * cores)))
 
 
 class RolloutPool(Closable):
@@ -92,6 +111,7 @@ class RolloutPool(Closable):
         name, options = str(policy), import_options
         if workers != 1:
             name, options = send_policy_files(workers, name, options)
+        self._workers = workers
         self._pool = WorkerPool(
             f"roll-outs of {self.robot.name}",
             workers,
@@ -121,21 +141,32 @@ class RolloutPool(Closable):
         Raises:
             WorkerError: a worker process died.
         """
-        size = max(1, _STEPS_PER_CHUNK // steps)
-        if self.offers_lockstep:
-            size = max(size, min(_LARGEST_BATCH, len(jobs) // _LEAST_CHUNKS))
-        # Roll-outs from one start follow each other, because some robots return to the last start quickly.
-        order = sorted(range(len(jobs)), key=lambda number: jobs[number][1])
-        numbers = [order[low : low + size] for low in range(0, len(jobs), size)]
-        parts = [[jobs[number] for number in few] for few in numbers]
-        chunks = [(part, {index: starts[index] for _, index in part}, steps, measure_from) for part in parts]
+        divided = self.divide(jobs, starts, steps, measure_from)
         results: dict[int, RolloutOutcome] = {}
-        for chunk, outcomes in self._pool.as_completed(_run_chunk, chunks):
-            results |= zip(numbers[chunk], outcomes, strict=True)
+        for index, outcomes in self._pool.as_completed(_run_chunk, [chunk for _, chunk in divided]):
+            numbers = divided[index][0]
+            results |= zip(numbers, outcomes, strict=True)
             self.count_rollouts(outcomes)
             if keep is not None:
-                keep(numbers[chunk], outcomes)
+                keep(numbers, outcomes)
         return [results[number] for number in range(len(jobs))]
+
+    def divide(
+        self, jobs: Sequence[RolloutJob], starts: Sequence[StartState], steps: int, measure_from: int
+    ) -> list[tuple[list[int], RolloutChunk]]:
+        """Return the parts that workers are sent at once, each with the indices of its jobs."""
+        cores = self._workers.cores if isinstance(self._workers, RayCluster) else 1
+        size = choose_chunk_size(len(jobs), steps, lockstep=self.offers_lockstep, cores=cores)
+        # Roll-outs from one start follow each other, because some robots return to the last start quickly.
+        order = sorted(range(len(jobs)), key=lambda number: jobs[number][1])
+        divided: list[tuple[list[int], RolloutChunk]] = []
+        for low in range(0, len(jobs), size):
+            numbers = order[low : low + size]
+            part = [jobs[number] for number in numbers]
+            divided.append(
+                (numbers, (part, {index: starts[index] for _, index in part}, steps, measure_from))
+            )
+        return divided
 
     def map(
         self,

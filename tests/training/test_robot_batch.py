@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.errors import RobotError, TrainingError
+from pdtui.core.processes.worker_pool import WorkerProcess
 from pdtui.robots import make_robot
 
 pytest.importorskip("jax", reason="the extra 'train' is not installed")
@@ -37,6 +38,7 @@ def test_what_goes_wrong_there_is_heard_here() -> None:
     with pytest.raises(RobotError, match="unknown robot 'nobody'"):
         RemoteRobotBatch("nobody", {}, 1, 0)
     worlds = RemoteRobotBatch("ant", {}, 1, 0)
+    assert isinstance(worlds.worker, WorkerProcess)
     worlds.worker.process.kill()
     worlds.worker.process.join()
     with pytest.raises(

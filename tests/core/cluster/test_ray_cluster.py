@@ -146,7 +146,7 @@ def test_a_worker_keeps_its_state_between_calls(cluster: RayCluster) -> None:
 def test_other_versions_on_a_node_are_refused(cluster: RayCluster, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pdtui.core.cluster.ray_cluster.describe_installation", lambda: {"numpy": "0.1"})
     with (
-        WorkerPool("numbers", cluster, "", str) as pool,
+        WorkerPool("numbers", cluster, 0, int) as pool,
         pytest.raises(ClusterError, match=r"numpy 0\.1 as on"),
     ):
         pool.map(multiply, [1])
