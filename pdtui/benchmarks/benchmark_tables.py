@@ -90,7 +90,6 @@ def cluster_benchmark_tables(result: ClusterBenchmark) -> Group:
         ("core time of a roll-out in this process", result.alone),
         ("in worker processes", result.processes),
         ("on the cluster", result.cluster),
-        ("overhead of a roll-out on the cluster", result.overhead),
     ):
         measured.add_row(name, f"{1000 * seconds:.2f} ms")
     for size, cost in ((1, result.single), (result.per_chunk, result.usual)):
@@ -99,7 +98,10 @@ def cluster_benchmark_tables(result: ClusterBenchmark) -> Group:
             f"processor time of this process for a chunk of {size}", f"{1000 * cost.driver:.2f} ms"
         )
         measured.add_row(f"bytes of a chunk of {size}, sent and answered", f"{cost.bytes:,}")
-    measured.add_row("bytes per roll-out", f"{result.bytes:.0f}")
+    measured.add_row(
+        f"overhead per roll-out, {result.per_chunk} in a chunk", f"{1000 * result.overhead:.2f} ms"
+    )
+    measured.add_row("bytes per roll-out, sent and answered", f"{result.bytes:.0f}")
     measured.add_row("bytes of the policy, once per node", f"{result.file_bytes:,}")
     batches = [f"{one.batch}: {one.rollouts} roll-outs" for one in result.simulated]
     simulated = new_table("Larger clusters: simulated, not measured", "nodes", "cores", *batches)

@@ -61,10 +61,7 @@ class ClusterBenchmark:
         alone: Core time of a roll-out in this process, s; median over rounds.
         processes: Core time of a roll-out in as many worker processes as the cluster has cores, s.
         cluster: The same on the cluster, s.
-        overhead: Core time that a roll-out takes on the cluster beyond that in worker processes, s; median
-            over rounds.
         single, usual: What a chunk of one roll-out and the usual chunk cost.
-        bytes: Bytes per roll-out that are sent and answered, in the usual chunk.
         file_bytes: Bytes of the policy, which are sent to each node once.
         cores_per_node: Cores of each simulated node.
         simulated: What larger clusters would take.
@@ -77,13 +74,21 @@ class ClusterBenchmark:
     alone: float
     processes: float
     cluster: float
-    overhead: float
     single: ChunkCost
     usual: ChunkCost
-    bytes: float
     file_bytes: int
     cores_per_node: int
     simulated: tuple[SimulatedScaling, ...]
+
+    @property
+    def overhead(self) -> float:
+        """Time that an idle cluster adds to a roll-out of the usual chunk, s."""
+        return self.usual.latency / self.per_chunk
+
+    @property
+    def bytes(self) -> float:
+        """Bytes per roll-out that are sent and answered, in the usual chunk."""
+        return self.usual.bytes / self.per_chunk
 
 
 def bench_cluster(
@@ -126,7 +131,7 @@ def bench_cluster(
             rates.append(np.array(seconds) * (1, cores, cores) / rollouts)
         lockstep, per_chunk = alone.offers_lockstep, len(alone.divide(jobs, starts, steps, 0)[0][0])
     table = np.array(rates)
-    compute = float(np.median(table[:, 1]))
+    compute, in_processes, on_cluster = np.median(table, axis=0).tolist()
     single, usual = (
         _measure_chunk(cluster, (jobs[:size], dict(enumerate(starts)), steps, 0), outcomes[:size], compute)
         for size in (1, per_chunk)
@@ -146,13 +151,11 @@ def bench_cluster(
         cores=cores,
         steps=steps,
         per_chunk=per_chunk,
-        alone=float(np.median(table[:, 0])),
-        processes=compute,
-        cluster=float(np.median(table[:, 2])),
-        overhead=float(np.median(table[:, 2] - table[:, 1])),
+        alone=compute,
+        processes=in_processes,
+        cluster=on_cluster,
         single=single,
         usual=usual,
-        bytes=usual.bytes / per_chunk,
         file_bytes=find_weights_file(policy).stat().st_size,
         cores_per_node=cores_per_node,
         simulated=tuple(simulate(batch, size) for batch, size in _plan_batches(units)),

@@ -144,6 +144,9 @@ def evaluate_command(
         {"--update": update, "--quick": quick, "--strip": strip, "--watch": watch}
         | ({} if let_go else {"--hold": hold}),
     )
+    _check_cluster(
+        workers, {"--policy-only": policy_only, "--gait": gait, "--record": own_options.get("record")}
+    )
     if experiment is None and (others or pictures):
         raise click.UsageError(f"{'more than one map' if others else '-o'} needs --experiment")
     without_map = policy_only or gait
@@ -200,6 +203,12 @@ def evaluate_command(
         settings, drawn = choose_protocol(quick=quick, hold=hold), (strip, overwrite) if strip else None
         seeds = seeds[:QUICK_SEEDS] if quick else seeds
         print_behaviors(config, seeds, settings, workers, drawn, watch=watch, update=update, as_json=as_json)
+
+
+def _check_cluster(workers: Workers, on_one_machine: Mapping[str, Any]) -> None:
+    given = [flag for flag, on in on_one_machine.items() if on]
+    if given and not isinstance(workers, int):
+        raise click.UsageError(f"{given[0]} and --cluster are mutually exclusive")
 
 
 def _check_modes(modes: Mapping[str, Any], behaviors_only: Mapping[str, Any]) -> None:

@@ -19,6 +19,7 @@ TOPICS = (
     "interventions",
     "dissecting",
     "evaluating",
+    "clusters",
     "your-policy",
     "your-world",
     "results",

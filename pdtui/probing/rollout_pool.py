@@ -28,7 +28,8 @@ from pdtui.robots.robot import Robot
 _STEPS_PER_CHUNK = 1200
 # Long roll-outs in lock step are worth a longer wait: this many together, in no fewer chunks than that.
 _LARGEST_BATCH, _LEAST_CHUNKS = 16, 4
-_CHUNKS_PER_CORE = 2
+# On a cluster, this many chunks per core keep all cores busy; but one process sends about 1000 per second.
+_CHUNKS_PER_CORE, _MOST_CHUNKS = 2, 512
 
 WorkItem = TypeVar("WorkItem")
 WorkResult = TypeVar("WorkResult")
@@ -73,7 +74,8 @@ def choose_chunk_size(rollouts: int, steps: int, *, lockstep: bool, cores: int =
     size = max(1, _STEPS_PER_CHUNK // steps)
     if lockstep:
         return max(size, min(_LARGEST_BATCH, rollouts // _LEAST_CHUNKS))
-    return size if cores == 1 else max(1, min(size, rollouts // (_CHUNKS_PER_CORE * cores)))
+    chunks = min(_CHUNKS_PER_CORE * cores, _MOST_CHUNKS)
+    return size if cores == 1 else max(1, min(size, rollouts // chunks))
 
 
 class RolloutPool(Closable):

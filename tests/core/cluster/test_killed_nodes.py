@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
 from pdtui.core.cluster.ray_cluster import RayCluster
 from pdtui.core.processes.worker_pool import WorkerPool
+from pdtui.policies.weights.weights_file import load_network
 from pdtui.probing.measured_effects import UnitEffects
 from pdtui.probing.rollout_journal import RolloutJournal
 from tests.core.cluster.cluster_driver import ROLLOUTS, probe_units
@@ -114,3 +116,28 @@ def test_a_killed_driver_goes_on_from_its_journal(
     assert_same(found, expected)
     assert told[0] > kept  # what the journal held was not run again
     assert count_rows(journal) == ROLLOUTS
+
+
+def test_training_goes_on_without_a_killed_node(three_nodes: tuple[RayCluster, Any], tmp_path: Path) -> None:
+    pytest.importorskip("jax", reason="the extra 'train' is not installed")
+    from pdtui.training.train_policy import train_policy
+
+    cluster, nodes = three_nodes
+    victims = list(nodes.worker_nodes)[:1]
+    told = list[int]()
+
+    def kill_a_node(steps: int, _total: int, _note: str) -> None:
+        told.append(steps)
+        if victims and steps < 4000:
+            nodes.remove_node(victims.pop(), allow_graceful=False)
+
+    for folder, where in (("here", None), ("there", cluster)):
+        told.clear()
+        progress = None if where is None else kill_a_node
+        arguments = ("ant", "sac", 0, 4000, None, None, tmp_path / folder, progress)
+        train_policy(*arguments, layers=(8, 8), cluster=where)
+    assert not victims
+    assert len(set(told)) < len(told)  # there was no checkpoint yet, so the run began again
+    here, there = (load_network(tmp_path / one / "best.safetensors") for one in ("here", "there"))
+    for name, tensor in here.state_dict().items():
+        assert torch.equal(tensor, there.state_dict()[name])
