@@ -24,11 +24,13 @@ RUNS_PER_JOB = 4
 """Times that a job is run whose process or node is lost, before the loss is an error."""
 _LEAST_WAITING, _WAITING_PER_CORE = 64, 4
 """Jobs that are handed to Ray at a time: enough for all cores to stay busy."""
-_CONNECT_SECONDS = 5.0
+_CONNECT_SECONDS, _CANCEL_SECONDS = 5.0, 2.0
+_AUTH_MODE = "RAY_AUTH_MODE"
 _LOOPBACK = ("127.0.0.1", "localhost")
 # Ray calls itself by the machine's outer address, except where this variable says that there is no cluster
 # to join, as on macOS. It then binds to 127.0.0.1.
-_BIND_TO_LOOPBACK = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
+_BIND_TO_AUTH_MODE = "RAY_AUTH_MODE"
+_LOOPBACK = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
 
 
 class RayCluster(Closable):
@@ -41,8 +43,8 @@ class RayCluster(Closable):
 
     Args:
         address: Address of the cluster's head node, ``HOST:PORT``; or ``auto`` for the cluster that this
-            machine has joined, or else a cluster of this machine alone, which binds to 127.0.0.1 and ends
-            with this process.
+            machine has joined, or else a cluster of this machine alone, which binds to 127.0.0.1 (unless Ray
+            was imported before) and ends with this process.
 
     Raises:
         ClusterError: The extra ``cluster`` is not installed, or there is no cluster at the address.
@@ -134,6 +136,8 @@ class RayCluster(Closable):
         finally:
             for reference in running:
                 ray.cancel(reference, force=True)
+            if running:  # the end of this process may follow, and Ray does not like to be interrupted
+                ray.wait(list(running), num_returns=len(running), timeout=_CANCEL_SECONDS)
 
     def join(self) -> Any:
         """Join the cluster if this process has not yet, and return the module of Ray.
@@ -159,8 +163,8 @@ class RayCluster(Closable):
         except (ConnectionError, RuntimeError, ValueError) as error:
             reason = str(error).strip().partition("\n")[0]
             raise ClusterError(
-                f"cluster {self.address}: {reason}; this machine has to be one of its nodes, "
-                "which `ray start --address=HOST:PORT` makes it"
+                f"cluster {self.address}: {reason}; this machine has to be one of its nodes (`ray start "
+                f"--address=HOST:PORT`), and {_AUTH_MODE}=token has to be set if the cluster asks for a token"
             ) from error
         self._joined = True
         if self.cores == 0:
