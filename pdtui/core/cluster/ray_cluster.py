@@ -29,8 +29,7 @@ _AUTH_MODE = "RAY_AUTH_MODE"
 _LOOPBACK = ("127.0.0.1", "localhost")
 # Ray calls itself by the machine's outer address, except where this variable says that there is no cluster
 # to join, as on macOS. It then binds to 127.0.0.1.
-_BIND_TO_AUTH_MODE = "RAY_AUTH_MODE"
-_LOOPBACK = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
+_BIND_TO_LOOPBACK = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
 
 
 class RayCluster(Closable):
@@ -47,16 +46,16 @@ class RayCluster(Closable):
             was imported before) and ends with this process.
 
     Raises:
-        ClusterError: The extra ``cluster`` is not installed, or there is no cluster at the address.
+        ClusterError: The extra ``cluster`` is not installed, or the address is none.
     """
 
     def __init__(self, address: str = AUTO) -> None:
         if find_spec("ray") is None:
             raise ClusterError("a cluster needs the extra: pip install 'pdtui[cluster]'")
         self.address = address
-        self._host = _LOOPBACK[0] if address == AUTO else _check_address(address)
+        self._place = (_LOOPBACK[0], 0) if address == AUTO else _parse_address(address)
         self._files: dict[str, Any] = {}
-        self._joined = False
+        self._found = self._joined = False
 
     def __str__(self) -> str:
         return f"a cluster of {self.cores} cores"
@@ -72,7 +71,8 @@ class RayCluster(Closable):
         """Leave the cluster; one of this machine alone ends."""
         if self._joined:
             self.join().shutdown()
-        self._joined = False
+        self._files.clear()
+        self._found = self._joined = False
 
     def add_file(self, path: Path) -> str:
         """Send a file to the cluster, and return its name in the working directory of the processes there.
@@ -145,13 +145,24 @@ class RayCluster(Closable):
         Raises:
             ClusterError: There is no cluster, or no node of it has cores.
         """
-        if self._host in _LOOPBACK and "ray" not in sys.modules:
+        if self._place[0] in _LOOPBACK and "ray" not in sys.modules:
             os.environ[_BIND_TO_LOOPBACK] = "0"
         os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # silences a warning
         import ray
 
-        if ray.is_initialized():
+        if self._found and ray.is_initialized():
             return ray
+        if self.address != AUTO:
+            self._check_listener()
+        if not ray.is_initialized():
+            self._start_ray(ray)
+        self._found = True
+        if self.cores == 0:
+            self.close()
+            raise ClusterError(f"cluster {self.address}: expected a node with cores, found none")
+        return ray
+
+    def _start_ray(self, ray: Any) -> None:
         _silence_standard_output()
         try:
             ray.init(
@@ -167,10 +178,16 @@ class RayCluster(Closable):
                 f"--address=HOST:PORT`), and {_AUTH_MODE}=token has to be set if the cluster asks for a token"
             ) from error
         self._joined = True
-        if self.cores == 0:
-            self.close()
-            raise ClusterError(f"cluster {self.address}: expected a node with cores, found none")
-        return ray
+
+    def _check_listener(self) -> None:
+        """Refuse an address at which nothing listens at once; Ray would try for a long time."""
+        try:
+            socket.create_connection(self._place, _CONNECT_SECONDS).close()
+        except OSError as error:
+            raise ClusterError(
+                f"no cluster at {self.address}: {error}; `ray start --head` starts one, "
+                "--cluster auto needs none"
+            ) from error
 
 
 def _silence_standard_output() -> None:
@@ -184,18 +201,11 @@ def _silence_standard_output() -> None:
         worker.print_to_stdstream = lambda *_, **__: None
 
 
-def _check_address(address: str) -> str:
-    """Return the host of an address at which something listens."""
+def _parse_address(address: str) -> tuple[str, int]:
     host, colon, port = address.rpartition(":")
-    if not (colon and host and port.isdecimal() and "/" not in host):
+    if not (colon and host and port.isdecimal() and int(port) < 1 << 16 and "/" not in host):
         raise ClusterError(f"expected a cluster's address HOST:PORT or auto, found '{address}'")
-    try:
-        socket.create_connection((host, int(port)), _CONNECT_SECONDS).close()
-    except (OSError, OverflowError) as error:
-        raise ClusterError(
-            f"no cluster at {address}: {error}; `ray start --head` starts one, --cluster auto needs none"
-        ) from error
-    return host
+    return host, int(port)
 
 
 def _take_result(name: str, reference: Any) -> Any:

@@ -122,6 +122,7 @@ def test_a_job_whose_process_is_killed_is_run_again(cluster: RayCluster, tmp_pat
     assert Path(mark).exists()
 
 
+@pytest.mark.slow  # a process starts four times
 def test_a_job_that_always_kills_its_process_is_an_error(cluster: RayCluster) -> None:
     with (
         WorkerPool("numbers", cluster, "", str) as pool,
@@ -190,7 +191,7 @@ def test_worlds_on_a_cluster_step_alike_and_go_on_from_a_kept_state(cluster: Ray
 @pytest.mark.parametrize("address", ["nowhere", "127.0.0.1:1", "ray://127.0.0.1:10001", "127.0.0.1:99999999"])
 def test_an_address_without_a_cluster_is_told_in_one_line(address: str) -> None:
     with pytest.raises(ClusterError, match="cluster") as caught:
-        RayCluster(address)
+        RayCluster(address).join()
     assert "\n" not in str(caught.value)
 
 
