@@ -7,7 +7,7 @@ the names that `RayCluster.add_file` returned.
 
 from __future__ import annotations
 
-import atexit
+import fcntl
 import os
 import platform
 import shutil
@@ -25,8 +25,10 @@ from pdtui.core.processes.call_answer import CallAnswer, answer_call
 
 _STATES_KEPT = 2
 """States that a process keeps: jobs of two pools may alternate."""
-PREFIX = "PDTUI_"
+_PREFIX = "PDTUI_"
 """What the names of pdtui's own environment variables begin with."""
+_FOLDER = "pdtui-node-"
+"""What the names of the processes' folders begin with."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ def describe_installation() -> dict[str, str]:
 
 def collect_environment() -> dict[str, str]:
     """Return pdtui's own environment variables."""
-    return {name: value for name, value in os.environ.items() if name.startswith(PREFIX)}
+    return {name: value for name, value in os.environ.items() if name.startswith(_PREFIX)}
 
 
 def run_job(recipe: list[Any], function: Callable[..., Any], *arguments: Any) -> CallAnswer:
@@ -107,9 +109,30 @@ def _check_versions(wanted: Mapping[str, str]) -> None:
 
 @cache
 def _own_folder() -> Path:
-    folder = Path(tempfile.mkdtemp(prefix="pdtui-node-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
+    """Return a new folder of this process, and remove those of dead ones, which Ray killed."""
+    for old in Path(tempfile.gettempdir()).glob(f"{_FOLDER}*"):
+        if (descriptor := lock_folder(old)) is not None:
+            shutil.rmtree(old, ignore_errors=True)
+            os.close(descriptor)
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=_FOLDER))
+        # The lock is held for as long as this process lives. Another might have removed the folder before.
+        if lock_folder(folder) is not None and folder.exists():
+            return folder
+
+
+def lock_folder(folder: Path) -> int | None:
+    """Lock a folder and return the descriptor that holds the lock, or None if another process holds it."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:  # somebody else's, or just removed
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor
 
 
 def _put_file(path: Path, reference: Any) -> None:

@@ -118,22 +118,22 @@ def test_a_killed_driver_goes_on_from_its_journal(
     assert count_rows(journal) == ROLLOUTS
 
 
-def test_training_goes_on_without_a_killed_node(three_nodes: tuple[RayCluster, Any], tmp_path: Path) -> None:
+def test_training_goes_on_without_killed_nodes(three_nodes: tuple[RayCluster, Any], tmp_path: Path) -> None:
     pytest.importorskip("jax", reason="the extra 'train' is not installed")
     from pdtui.training.train_policy import train_policy
 
     cluster, nodes = three_nodes
-    victims = list(nodes.worker_nodes)[:1]
+    victims = list(nodes.worker_nodes)  # Ray may have left one of them idle
     told = list[int]()
 
-    def kill_a_node(steps: int, _total: int, _note: str) -> None:
+    def kill_nodes(steps: int, _total: int, _note: str) -> None:
         told.append(steps)
-        if victims and steps < 4000:
+        while victims:
             nodes.remove_node(victims.pop(), allow_graceful=False)
 
     for folder, where in (("here", None), ("there", cluster)):
         told.clear()
-        progress = None if where is None else kill_a_node
+        progress = None if where is None else kill_nodes
         arguments = ("ant", "sac", 0, 4000, None, None, tmp_path / folder, progress)
         train_policy(*arguments, layers=(8, 8), cluster=where)
     assert not victims

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pdtui.core.cluster.node_worker import lock_folder
 from pdtui.core.cluster.ray_cluster import RayCluster
 from pdtui.core.errors import ClusterError, RobotError, WorkerError
 from pdtui.core.processes.worker_pool import WorkerPool
@@ -42,7 +43,7 @@ def multiply(factor: int, job: int) -> tuple[int, int]:
     return factor * job, os.getpid()
 
 
-def read_text(name: str, _job: int) -> tuple[str, str]:
+def read_text(_state: str, name: str) -> tuple[str, str]:
     return Path(name).read_text(), str(Path(name).resolve())
 
 
@@ -107,12 +108,31 @@ def test_a_file_is_there_by_its_hash_wherever_it_was_here(cluster: RayCluster, t
     assert names[0] == names[1] != names[2]
     for path in (first, second, other):
         path.unlink()
-    with WorkerPool("texts", cluster, "", str, names[2]) as pool:
-        ((text, place),) = pool.map(read_text, [0])
+    with WorkerPool("texts", cluster, "", str) as pool:
+        ((text, place),) = pool.map(read_text, names[2:])
     assert text == "two"
     assert not place.startswith(str(tmp_path))
     with pytest.raises(ClusterError, match=r"a\.txt: cannot be read"):
         cluster.add_file(first)
+
+
+def test_the_folders_of_dead_processes_are_removed(cluster: RayCluster, tmp_path: Path) -> None:
+    (tmp_path / "own.txt").write_text("one")
+    name = cluster.add_file(tmp_path / "own.txt")
+    with cluster.start_worker("texts", str) as worker:
+        worker.send(read_text, name)
+        folder = Path(worker.receive()[1]).parents[1]
+        assert lock_folder(folder) is None
+    for _ in range(100):
+        if (descriptor := lock_folder(folder)) is not None:
+            os.close(descriptor)
+            break
+        time.sleep(0.1)
+    assert folder.exists()
+    with cluster.start_worker("texts", str) as worker:
+        worker.send(read_text, name)
+        worker.receive()
+    assert not folder.exists()
 
 
 def test_a_job_whose_process_is_killed_is_run_again(cluster: RayCluster, tmp_path: Path) -> None:
