@@ -139,8 +139,9 @@ def tune_gains(
         behaviors = _find_pid_behaviors(runner.loop.map, names)
         results = []
         for number, behavior in enumerate(behaviors):
-            deadline = budget.share(len(behaviors) - number)
-            results.append(_tune_behavior(runner, behavior, seeds, settings, deadline, progress))
+            left = 2 * (len(behaviors) - number)
+            deadlines = budget.share(left), budget.share(left // 2)
+            results.append(_tune_behavior(runner, behavior, seeds, settings, deadlines, progress))
         return results
 
 
@@ -174,7 +175,7 @@ def _tune_behavior(
     behavior: Behavior,
     seeds: Sequence[int],
     settings: TuningSettings,
-    deadline: Deadline,
+    deadlines: tuple[Deadline, Deadline],
     progress: Progress | None,
 ) -> TunedGains:
     assert behavior.pid is not None
@@ -201,10 +202,10 @@ def _tune_behavior(
             progress(search.tried + 1, 2 * total + 2, f"{behavior.name}: {best[0]:.3g} {attribute.unit}")
         return costs
 
-    search = GainSearch(old, step, seeds[:half], costs_of, settings, deadline)
+    search = GainSearch(old, step, seeds[:half], costs_of, settings)
     plain = [replace(old, ki=0.0, kd=0.0)] if old.kp else []
-    proportional = search.run(plain, proportional=True)
-    found = search.run([old, proportional])
+    proportional = search.run(plain, deadlines[0], proportional=True)
+    found = search.run([old, proportional], deadlines[1])
     pids: dict[GainsOrigin, PidGains] = {"map": old, "proportional": proportional, "found": found}
     jobs = [
         TrackingDriveJob(old.attribute, behavior.name, seed, targets[seed], pid)
