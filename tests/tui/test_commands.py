@@ -12,6 +12,7 @@ from textual.widgets import Input
 
 from pdtui.core.errors import SettingsError
 from pdtui.core.reserved_keys import KEY_TABLE
+from pdtui.core.settings.settings_file import read_settings
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, PastPosition
 from pdtui.tui.commands.palette_commands import list_palette_commands
 from pdtui.tui.drive_app import DriveApp
@@ -207,6 +208,22 @@ def test_everything_can_be_read_in_every_theme(name: str) -> None:
         assert contrast_ratio(zero, cold) >= 2.0
     finally:
         STYLES.adopt(THEME)
+
+
+async def test_a_theme_is_saved_by_the_palette(
+    make_app: MakeApp, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    app, connection = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await played(pilot, connection)
+        for command in ("themenord", "savetheme"):
+            await pilot.press("ctrl+p", *command)
+            await pilot.pause(0.5)
+            await pilot.press("enter")
+            await pilot.pause(0.2)
+        assert "theme nord is in" in notice(app)
+    assert read_settings().theme == "nord"
 
 
 def test_a_theme_that_does_not_exist_is_refused(make_app: MakeApp) -> None:

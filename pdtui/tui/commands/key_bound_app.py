@@ -10,8 +10,10 @@ from textual.binding import Binding
 from textual.command import CommandPalette
 from textual.reactive import reactive
 
+from pdtui.core.errors import PdtuiError
 from pdtui.core.reserved_keys import KEY_TABLE
 from pdtui.core.settings.settings_file import ALWAYS_QUITS
+from pdtui.core.settings.settings_writer import save_setting
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import displayed_key_name
 from pdtui.tui.commands.key_clicked import KeyClicked
@@ -131,6 +133,15 @@ class KeyBoundApp(ThemedApp[str], inherit_bindings=False):
             self.say(f"{name}: {error.strerror}")
         else:
             self.say(f"wrote {path}")
+
+    def save_theme(self) -> None:
+        """Write the present theme into the user's settings."""
+        try:
+            path = save_setting("theme", self.theme)
+        except PdtuiError as error:
+            self.say(str(error))
+        else:
+            self.say(f"theme {self.theme} is in {path}")
 
     def say(self, notice: str) -> None:
         """Show a notice for a few seconds."""
