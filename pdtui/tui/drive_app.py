@@ -11,6 +11,7 @@ from textual import events
 from textual.app import ComposeResult
 from textual.containers import Container
 from textual.reactive import reactive
+from textual.widget import Widget
 
 from pdtui.core.errors import PdtuiError
 from pdtui.driving.drive_client import DriveConnection
@@ -19,6 +20,8 @@ from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import displayed_key_name
 from pdtui.tui.commands.key_bound_app import HINTS, NO_KEYMAP, KeyBoundApp
+from pdtui.tui.graphics.graphics_pane import GraphicsPane
+from pdtui.tui.graphics.terminal_graphics import TerminalGraphics
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.spectra.spectra_pane import SpectraPane
 from pdtui.tui.strip.unit_picked import UnitPicked
@@ -54,6 +57,7 @@ class DriveApp(KeyBoundApp):
         theme: name of the theme.
         keymap: the user's keys, by the bindings' ids.
         tuning: tunes gains beside the drive; None where nothing can.
+        graphics: how the terminal shows pictures; None for half blocks.
     """
 
     CSS = DRIVE
@@ -74,23 +78,25 @@ class DriveApp(KeyBoundApp):
         theme: str = THEME.name,
         keymap: Mapping[str, str] = NO_KEYMAP,
         tuning: GainTuner | None = None,
+        graphics: TerminalGraphics | None = None,
     ) -> None:
         super().__init__(stimulation_map, theme, keymap)
         self.connection, self.fps, self.watching = connection, fps, watching
-        self._keymap_at_first, self._could_go_back = keymap, False
+        self._keymap_at_first, self._graphics, self._could_go_back = keymap, graphics, False
         self._spectra = SpectraPane(self.map, connection, id="spectra")
         self._timeline = TimelineBar(self.map, connection, id="timeline")
         self._bench = BenchPane(self.map, self.action_run_key, connection.search_units, self.say, tuning)
 
     def compose(self) -> ComposeResult:
-        def bound(panel: SnapshotWidget) -> SnapshotWidget:
+        def bound(panel: SnapshotWidget | GraphicsPane) -> Widget:
             return panel.data_bind(DriveApp.facts, DriveApp.snapshot)
 
         yield bound(StatusLine(self.map, id="status"))
         with Container(id="body"):
             with Container(id="left"):
                 yield bound(RobotView(self.map, id="robot"))
-                yield bound(WorldPicture(self.map, id="world"))
+                world = GraphicsPane(self._graphics, id="world") if self._graphics else None
+                yield bound(world or WorldPicture(self.map, id="world"))
                 with Container(id="below"):
                     yield bound(PathView(self.map, id="path"))
                     yield bound(UnitTable(self.map, id="units"))

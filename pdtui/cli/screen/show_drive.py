@@ -37,6 +37,7 @@ def run_drive_screen(config: DriveConfig, settings: UserSettings, *, watching: b
     tuning = GainTuningProcess(config)
     try:
         from pdtui.tui.drive_app import DriveApp
+        from pdtui.tui.graphics.terminal_graphics import find_terminal_graphics
 
         if not watching:
             click.echo(make_printable(f"starting {config.robot} …"), err=True)
@@ -49,6 +50,7 @@ def run_drive_screen(config: DriveConfig, settings: UserSettings, *, watching: b
             theme=settings.theme,
             keymap=settings.keymap,
             tuning=tuning,
+            graphics=find_terminal_graphics() if connection.is_pictured else None,
         )
         message = app.run()
     finally:
