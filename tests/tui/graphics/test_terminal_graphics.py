@@ -36,7 +36,7 @@ PICTURES = {
 )
 def test_pictures_come_by_what_the_terminal_can(kind: str, tmp_path: Path) -> None:
     environment = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES")}
-    child = pexpect.spawn(
+    child: pexpect.spawn[bytes] = pexpect.spawn(
         sys.executable,
         ["-m", "pdtui", "drive", "Pendulum-v1", "--policy", str(POLICY), "--no-record"],
         dimensions=(40, 120),
@@ -48,7 +48,7 @@ def test_pictures_come_by_what_the_terminal_can(kind: str, tmp_path: Path) -> No
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline and len(re.findall(PICTURES[kind], got)) < 2:
         try:
-            got += bytes(child.read_nonblocking(65536, 0.2))
+            got += child.read_nonblocking(65536, 0.2)
         except pexpect.TIMEOUT:
             continue
         for asked in [one for one in answers if one in got]:
