@@ -77,7 +77,7 @@ def judge_stand_up(trace: TaskRunTrace) -> TaskVerdict:
 BIPEDAL_WALKER_TASKS = (
     Task(
         name="jump",
-        key="j",
+        key="i",
         says="jumps, lands and walks on",
         wanted="both feet up for 0.3 s, hull 0.5 m over its usual height, then walks on",
         walk=(60, 120),
