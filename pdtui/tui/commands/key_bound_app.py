@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime
 from time import monotonic
+from typing import cast
 
 from textual._context import active_message_pump
+from textual.app import App
 from textual.binding import Binding
 from textual.command import CommandPalette
 from textual.message_pump import MessagePump
@@ -116,7 +118,7 @@ class KeyBoundApp(ThemedApp[str], inherit_bindings=False):
 
     def action_command_palette(self) -> None:
         """Open the command palette; without an id, since the one before may still be closing."""
-        if not CommandPalette.is_open(self):
+        if not CommandPalette.is_open(cast("App[object]", self)):
             self.push_screen(CommandPalette())
 
     def _handle_exception(self, error: Exception) -> None:

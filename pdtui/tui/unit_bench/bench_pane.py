@@ -73,11 +73,8 @@ class BenchPane(Vertical):
         self._page = 0
         self._entry = BenchEntry(say, self._focus_page)
         self._saved_keys: dict[str, tuple[str, ...]] = {}
-
-    @property
-    def is_open(self) -> bool:
+        self.is_open = False
         """Whether the pane is shown."""
-        return bool(self.screen.has_class("-bench"))
 
     def compose(self) -> ComposeResult:
         for page in self.pages:
@@ -104,7 +101,7 @@ class BenchPane(Vertical):
 
     def open(self) -> None:
         """Show the pane and give it the keys."""
-        self.disabled = False
+        self.disabled, self.is_open = False, True
         self.screen.add_class("-bench")
         self._focus_page()
         self.pages[self._page].row_was_marked()
@@ -115,7 +112,7 @@ class BenchPane(Vertical):
             self._entry.action_leave()
         self.screen.remove_class("-bench")
         self.screen.set_focus(None)
-        self.disabled = True
+        self.disabled, self.is_open = True, False
         self.point_to(-1)
 
     def action_turn(self, direction: int) -> None:
