@@ -195,7 +195,7 @@ async def test_gains_are_tuned_taken_and_saved_with_the_maps_comments(
         await played(pilot, connection)
         assert "in the map 2" in shown(app.query_one("#bench-pid"))
         await pilot.press("ctrl+s")
-        assert f"the gains of 'hold heading' are in {path}"[:40] in notice(app)
+        assert f"gains saved in {path}"[:40] in notice(app)
         connection.messages.append(latched(4, 5.0, 0.0, 0.05, 2.0))
         await played(pilot, connection)
         assert "in the map" not in shown(app.query_one("#bench-pid"))

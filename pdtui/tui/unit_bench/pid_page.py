@@ -145,7 +145,7 @@ class PidPage(BenchPage):
             return True
         behaviors = {**bench.target.behaviors, name: replace(behavior, pid=pid)}
         bench.target = replace(bench.target, source=str(path), behaviors=behaviors)
-        bench.say(f"the gains of '{name}' are in {path}; latched anew, this drive has its old ones")
+        bench.say(f"gains saved in {path}; latched anew in this drive, it has the old ones")
         return True
 
     def _set(self, row: int, value: float) -> None:
