@@ -95,7 +95,7 @@ def test_a_notebook_shows_a_drive_as_curves_and_a_frame() -> None:
 
 def test_a_notebook_shows_a_dissection_as_a_table_and_a_frame(dissection: Dissection) -> None:
     html = ElementTree.fromstring(f"<div>{dissection._repr_html_()}</div>")
-    pairs = len(dissection.judgement.confirmations)
+    pairs = len(dissection.judgment.confirmations)
     assert len(html.findall(".//tbody/tr")) == pairs > 0
     pytest.importorskip("pandas")
     frame = dissection.to_pandas()

@@ -124,7 +124,7 @@ def replay_session(
         description = describe_info_differences(loop.info, header.info, exact=not elsewhere)
         end = math.inf if minutes is None else time.monotonic() + 60.0 * minutes
         stopped = "" if description else _compare_steps(header, loop, comparison, progress, end)
-    first, deviations = comparison.difference, comparison.deviations.summarise()
+    first, deviations = comparison.difference, comparison.deviations.summarize()
     state_differs = first is not None and comparison.first_digest == first.step
     return ReplayResult(
         steps=comparison.steps,
