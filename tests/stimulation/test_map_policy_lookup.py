@@ -137,3 +137,10 @@ def test_a_map_that_needs_nothing_stays_as_it_is(folder: Path) -> None:
 def test_mistakes_in_the_choices_name_line_and_field(old: str, new: str, message: str) -> None:
     with pytest.raises(MapError, match=message):
         parse_map(MAP.format(sha256="0", choices=CHOICES).replace(old, new), "m.toml")
+
+
+def test_the_spelling_of_earlier_maps_is_read() -> None:
+    text = MAP.format(sha256="0", choices=CHOICES)
+    earlier = parse_map(text.replace("normalizer", "normaliser"), "m.toml")
+    assert earlier.import_options == parse_map(text, "m.toml").import_options
+    assert earlier.import_options.normalizer == "stats.npz"
