@@ -34,5 +34,5 @@ def send_policy_files(
     path = find_weights_file(policy, folders)
     statistics = find_statistics(path, import_options, folders)
     if statistics is not None:
-        import_options = replace(import_options, normaliser=workers.add_file(statistics))
+        import_options = replace(import_options, normalizer=workers.add_file(statistics))
     return workers.add_file(path), import_options
