@@ -49,7 +49,7 @@ def test_dissect(cluster: RayCluster, policy_file: Path, dissection: Dissection)
     assert found.rollouts == dissection.rollouts
     for name in ("screen", "refined"):
         np.testing.assert_array_equal(getattr(found, name).effects, getattr(dissection, name).effects)
-    for name in ("judgement", "attribute_movers", "steering", "behaviors", "controllers", "tasks"):
+    for name in ("judgment", "attribute_movers", "steering", "behaviors", "controllers", "tasks"):
         assert repr(getattr(found, name)) == repr(getattr(dissection, name))
 
 
