@@ -123,8 +123,7 @@ def dissect(config: DissectionConfig) -> Dissection:
 
     The arguments are the fields of `pdtui.dissection.dissection_config.DissectionConfig`. `workers` processes
     (or those of a `pdtui.core.cluster.ray_cluster.RayCluster`) load a robot and a policy given by name; an
-    object stays in this process, with the same result. A notebook shows the result as a table that can be
-    sorted; `Dissection.to_pandas` gives a data frame.
+    object stays in this process. A notebook shows a table; `Dissection.to_pandas` gives a data frame.
 
     >>> import dataclasses, pdtui
     >>> from torch import nn

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.outcome import count_failures
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
-from pdtui.driving.cluster_drive_config import send_drive_files
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_control_loop
+from pdtui.driving.loop_builder import build_control_loop, send_drive_files
 from pdtui.evaluation.behavior_summary import (
     BehaviorEvaluation,
     BehaviorRuns,

@@ -14,10 +14,9 @@ from pdtui.core.drive_events import DriveEvent
 from pdtui.core.outcome import Outcome
 from pdtui.core.processes.worker_pool import WorkerPool
 from pdtui.core.step_record import StepRecord
-from pdtui.driving.cluster_drive_config import send_drive_files
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_control_loop
+from pdtui.driving.loop_builder import build_control_loop, send_drive_files
 from pdtui.search.step_response import StepResponse, measure_step_response
 from pdtui.stimulation.stimulation_map import PidGains
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pdtui.core.installed_packages import PACKAGES, list_package_versions
+from pdtui.core.processes.installed_packages import PACKAGES, list_package_versions
 
 COMPUTES_NOTHING = ("system", "rerun-sdk")
 """Entries that may differ without affecting any number of a run."""

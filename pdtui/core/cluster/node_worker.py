@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from pdtui.core.errors import ClusterError
-from pdtui.core.installed_packages import list_package_versions
 from pdtui.core.processes.call_answer import CallAnswer, answer_call
+from pdtui.core.processes.installed_packages import list_package_versions
 
 _STATES_KEPT = 2
 """States that a process keeps: jobs of two pools may alternate."""

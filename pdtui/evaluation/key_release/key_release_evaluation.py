@@ -9,10 +9,9 @@ import numpy as np
 
 from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
-from pdtui.driving.cluster_drive_config import send_drive_files
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_control_loop
+from pdtui.driving.loop_builder import build_control_loop, send_drive_files
 from pdtui.evaluation.held_run import HeldRunPlan, HeldRunTrace, run_held_behavior
 from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.evaluation.protocol_settings import ProtocolSettings, RunTimes, plan_run_times

@@ -14,10 +14,9 @@ from pathlib import Path
 from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.errors import PdtuiError, SessionError
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
-from pdtui.driving.cluster_drive_config import send_drive_files
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.driving.loop_builder import build_control_loop
+from pdtui.driving.loop_builder import build_control_loop, send_drive_files
 from pdtui.paper.driving.drive_operators import SharedControl, make_operator
 from pdtui.paper.driving.driving_episode import (
     TEST_STARTS,

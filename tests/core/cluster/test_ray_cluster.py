@@ -217,7 +217,6 @@ def test_an_address_without_a_cluster_is_told_in_one_line(address: str) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_only_this_machine_can_reach_it(cluster: RayCluster) -> None:
-    """Every port that a process of Ray listens at is bound to 127.0.0.1."""
     tables = [Path(f"/proc/net/{name}").read_text().splitlines()[1:] for name in ("tcp", "tcp6")]
     listening = {
         row.split()[9]: row.split()[1] for table in tables for row in table if row.split()[3] == "0A"
