@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from pdtui.core.errors import StudyError
-from pdtui.policies.weights.weights_file import hash_weights_file
+from pdtui.policies.weights.weights_file import hash_file
 from pdtui.study.matching.matching_study_plan import MatchingStudyPlan, StudiedPolicy
 from pdtui.study.matching.policy_measurement import measure_studied_policy
 from pdtui.study.matching.study_data import (
@@ -93,7 +93,7 @@ def _read_part(path: Path, plan: MatchingStudyPlan, weights: Path) -> MatchingSt
         part = read_study_data(path)
     except StudyError:
         return None
-    same = part.plan == plan and [one.sha256 for one in part.policies] == [hash_weights_file(weights)]
+    same = part.plan == plan and [one.sha256 for one in part.policies] == [hash_file(weights)]
     return part if same else None
 
 

@@ -21,6 +21,8 @@ class StudiedPolicy:
 
     Attributes:
         robot, algorithm, activation, layers, seed, steps: The options of `pdtui train`.
+        imitation_rounds: Rounds in which it first imitates the shipped policy of its robot; 0 for a policy
+            that is trained from random actions.
     """
 
     robot: str
@@ -29,6 +31,7 @@ class StudiedPolicy:
     layers: tuple[int, ...]
     seed: int
     steps: int
+    imitation_rounds: int
 
     @property
     def setting(self) -> str:
@@ -44,6 +47,8 @@ class StudiedPolicy:
         """Return the command line that trains it below a folder."""
         # SAC has no choice of an activation function.
         chosen = f" --activation {self.activation}" if self.algorithm == "ppo" else ""
+        if self.imitation_rounds:
+            chosen += f" --initial-policy {self.robot} --imitation-rounds {self.imitation_rounds}"
         return (
             f"pdtui train {self.robot} --algorithm {self.algorithm}{chosen} "
             f"--layers {','.join(map(str, self.layers))} --seed {self.seed} --steps {self.steps} "
@@ -199,7 +204,5 @@ _PROBING = (
 _STATISTICS = ("quantile", "level", "enough", "resamples")
 
 
-def _policies_of_setting(
-    robot: str, algorithm: str, activation: str, layers: list[int], seeds: list[int], steps: int
-) -> list[StudiedPolicy]:
-    return [StudiedPolicy(robot, algorithm, activation, tuple(layers), seed, steps) for seed in seeds]
+def _policies_of_setting(seeds: list[int], layers: list[int], **options: Any) -> list[StudiedPolicy]:
+    return [StudiedPolicy(**options, layers=tuple(layers), seed=seed) for seed in seeds]

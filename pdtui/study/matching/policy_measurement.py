@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,7 @@ def measure_studied_policy(
             policy.name,
             policy.setting,
             policy.command("FOLDER"),
+            policy.imitation_rounds > 0,
             pool.policy.sha256,
             score.mean_return,
             speed,
@@ -91,8 +93,8 @@ def measure_studied_policy(
         measured = describe_measured_units(
             plan, policy.name, episodes, pool, matchings, columns, roles, (choosing, held_out)
         )
-        counted = {"units": pool.policy.units, "rollouts": pool.rollouts}
-        return MatchingStudyData(plan, (PolicyFacts(**{**facts.__dict__, **counted}),), measured)
+        counted = replace(facts, units=pool.policy.units, rollouts=pool.rollouts)
+        return MatchingStudyData(plan, (counted,), measured)
 
 
 def choose_studied_units(
