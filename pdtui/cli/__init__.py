@@ -30,6 +30,7 @@ COMMANDS = {
     "figure": "Draw figures.",
     "convert": "Convert a policy to safetensors.",
     "train": "Train a policy.",
+    "study": "Test a hypothesis on many policies.",
     "bench": "Measure speed and memory.",
 }
 """The summary of each command in `pdtui --help`; `pdtui.cli.NAME_command` has the command."""
