@@ -34,7 +34,11 @@ def study_command() -> None:
     help="Folder of the measurements.",
 )
 @click.option(
-    "--plan", "plan_path", type=FILE_PATH, metavar="FILE", help="Plan of the study; default: that of the guide."
+    "--plan",
+    "plan_path",
+    type=FILE_PATH,
+    metavar="FILE",
+    help="Plan of the study; default: that of the guide.",
 )
 @click.option("--data", type=FILE_PATH, metavar="FILE", help="Analyze these data instead of measuring.")
 @click.option(
@@ -57,8 +61,8 @@ def study_matching_command(
 ) -> None:
     """Test whether the unit that matches an attribute steers it.
 
-    A plan says which policies are wanted, and how they are measured and judged. A study that was interrupted goes on
-    when the same command is run again.
+    A plan says which policies are wanted, and how they are measured and judged. A study that was interrupted
+    goes on when the same command is run again.
     """
     from pdtui.study.matching.matching_study import find_trained_policies, run_matching_study
     from pdtui.study.matching.matching_study_plan import MATCHING_STUDY_PLAN, load_matching_study_plan

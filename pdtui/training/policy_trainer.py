@@ -30,7 +30,7 @@ from pdtui.training.training_config import TrainingConfig
 SELECTION_SEEDS, REPORT_SEEDS = 1_000_000, 2_000_000
 _ITERATIONS_PER_REPORT = 16
 CHECKPOINT_FOLDER = "checkpoints"
-"""Folder of the policies that are kept on request, beside the best one; each is named by its control steps."""
+"""Folder of the policies that are kept on request, named by their control steps; the best is beside it."""
 _CHECKPOINTS = 50
 """Parts of a run after each of which the policy is kept on request."""
 Config = TypeVar("Config", bound=TrainingConfig)

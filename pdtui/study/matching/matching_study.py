@@ -64,7 +64,9 @@ def run_matching_study(
     trained, missing = find_trained_policies(plan, policies)
     if not trained:
         example = missing[0].command(str(policies)) if missing else "a plan with policies"
-        raise StudyError(f"{policies}: expected trained policies of the plan, found none; train one: {example}")
+        raise StudyError(
+            f"{policies}: expected trained policies of the plan, found none; train one: {example}"
+        )
     parts: list[MatchingStudyData] = []
     for number, (policy, weights) in enumerate(trained.items()):
         path = folder / f"{policy.name}.parquet"

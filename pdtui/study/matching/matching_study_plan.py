@@ -1,4 +1,4 @@
-"""The plan of the matching study: what is measured and how it is judged, written down before it is measured."""
+"""The plan of the matching study: what is measured, and how it is judged, written down beforehand."""
 
 from __future__ import annotations
 
@@ -187,9 +187,7 @@ def parse_matching_study_plan(text: str, source: str) -> MatchingStudyPlan:
     except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
         raise StudyError(f"{source}: expected the plan of a matching study: {error!r}") from error
     if plan.primary not in variants:
-        raise StudyError(
-            f"{source}: primary: expected one of {', '.join(variants)}, found '{plan.primary}'"
-        )
+        raise StudyError(f"{source}: primary: expected one of {', '.join(variants)}, found '{plan.primary}'")
     if plan.settings.held_out_starts % 2:
         raise StudyError(f"{source}: held_out_starts: expected an even number, to compare halves")
     require_search_seeds(plan.settings.monitored, f"{source}: monitoring")

@@ -28,13 +28,7 @@ from pdtui.spectra.matching import UnitDiscrepancies, match_units
 from pdtui.spectra.phase_correlation import correlate_phases
 from pdtui.stimulation.map_library import map_without_behaviors
 from pdtui.study.matching.matching_study_plan import MatchingStudyPlan, MatchingStudySettings, StudiedPolicy
-from pdtui.study.matching.study_data import (
-    NO_RANK,
-    ROLES,
-    MatchingStudyData,
-    MeasuredUnits,
-    PolicyFacts,
-)
+from pdtui.study.matching.study_data import NO_RANK, ROLES, MatchingStudyData, MeasuredUnits, PolicyFacts
 
 PartProgress = Callable[[str, int, int], None]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +67,7 @@ class MeasuredUnits:
         units: Flat indices, shape (N,).
         roles: Indices into `ROLES`, shape (N,).
         effects: Mean change of the attribute in standard deviations of its monitored walk, for each group of
-            starts and each value at which the unit was held, shape (groups, values, N). A fall counts as none.
+            starts and value at which the unit was held, shape (groups, values, N). A fall counts as none.
         ranks: Rank of each unit among all units of the policy by discrepancy, from 0, for each variant, shape
             (variants, N); `NO_RANK` for none.
         correlations: Correlation ρ of phases for each variant, shape (variants, N); NaN for none.
@@ -178,7 +179,7 @@ def _from_table(table: pa.Table, plan: MatchingStudyPlan) -> Iterable[MeasuredUn
         (names["policy"][1:] != names["policy"][:-1]) | (names["attribute"][1:] != names["attribute"][:-1])
     )
     bounds = [0, *(changes + 1).tolist(), len(table)]
-    for low, high in zip(bounds[:-1], bounds[1:], strict=True):
+    for low, high in pairwise(bounds):
         effects = np.array([arrays[name][low:high] for name in _effect_columns(plan)], np.float64)
         yield MeasuredUnits(
             str(names["policy"][low]),

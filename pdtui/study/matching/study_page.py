@@ -23,6 +23,7 @@ from pdtui.study.matching.study_statistics import (
 )
 
 PAGE = "matching-study.md"
+_TEMPLATE = Path(__file__).with_name("study_page_template.md")
 HITS_FIGURE, AGREEMENT_FIGURE = "matching-study-hits.png", "matching-study-agreement.png"
 
 
@@ -30,13 +31,11 @@ def answer_in_one_sentence(data: MatchingStudyData, result: StudyResult) -> str:
     """Return the answer to the title of the page."""
     count = len(result.figures)
     if result.answer is StudyAnswer.UNKNOWN:
-        return (
-            f"Unknown: {count} policies that walk are too few for the test to pass, whatever they show."
-        )
+        return f"Unknown: {count} policies that walk are too few for the test to pass, whatever they show."
     first = result.variants[data.plan.primary][MEASURES.index("first")]
     means = (
-        f"on {count} policies, the first match is among the strongest tenth of all units for {first.mean:.0%} "
-        f"of the attributes, and a random unit for {result.random.mean:.0%} (p = {format_p_value(first.p)})"
+        f"on {count} policies, the first match is among the strongest tenth of units for {first.mean:.0%} of "
+        f"the attributes, and a random unit for {result.random.mean:.0%} (p {_equals(first.p)})"
     )
     words = {
         StudyAnswer.YES: "Yes, matching finds what steers",
@@ -109,60 +108,28 @@ def compose_study_page(data: MatchingStudyData, result: StudyResult) -> str:
         "imitated a shipped policy first": [one.name for one in data.policies if one.imitates],
         "trained from random actions": [one.name for one in data.policies if not one.imitates],
     }
-    return f"""# Does matching find what steers?
-
-{answer_in_one_sentence(data, result)}
-
-The paper's hypothesis is that the unit whose spectrum is nearest to that of an attribute steers it. This page tests it on {count} of the
-{len(plan.policies)} policies wanted.{dropped} `pdtui study matching` measured it by a [plan](#how-it-was-measured) that was written down before, and wrote this page. Nothing in
-it was edited by hand.
-
-![Hit rates of the first and the best {best} matches](images/{HITS_FIGURE})
-
-![Rank correlations and agreement of signs](images/{AGREEMENT_FIGURE})
-
-{rows_to_markdown(variant_headers(best), variant_rows(result))}
-
-Means over policies with 95 % intervals. A unit *hits* if it moves the attribute further than nine tenths of {settings.reference_units} units drawn at random do. *Rank correlation* is
-between small discrepancies and strengths of {settings.reference_units + settings.random_units} random units; strength repeats itself with a correlation of {_short(result.ceiling)}. *Sign agrees* where ρ, the
-correlation of phases, has the sign of the measured direction; 0.5 is chance. p-values are of the difference from random units, from 0 and from 0.5; those in the table are corrected for all {len(plan.variants) * len(MEASURES)} tests.
-
-## Kinds of policies
-
-{_group_table(data, result, by_kind)}
-
-## Settings
-
-{_group_table(data, result, _settings(data.policies))}
-
-## The policies
-
-{rows_to_markdown(["policy", "net speed", "return", "episodes failed", "units", "roll-outs", "in the study"], [_policy_row(one) for one in data.policies])}
-
-Their weights are not shipped. These commands train them:
-
-```sh
-{chr(10).join(one.command for one in data.policies)}
-```
-
-## How it was measured
-
-This is the plan, as it is in the data. Matching uses episodes of seeds {settings.monitored[0]}–{settings.monitored[-1]}, and effects come from walks of seeds from {settings.held_out_seed} on, which chose nothing.
-
-```toml
-{plan.text.strip()}
-```
-
-```sh
-pdtui study matching --policies FOLDER        # measure what is trained below FOLDER; run it again to go on
-pdtui study matching --list                   # which policies are trained, and the commands for the others
-pdtui study matching --data FILE --guide DIR  # analyze the data again, and write this page
-```
-"""
-
-
-def _short(one: TestedMean) -> str:
-    return format_mean_with_interval(one.mean, one.low, one.high)
+    listed = ["policy", "net speed", "return", "episodes failed", "units", "roll-outs", "in the study"]
+    return _TEMPLATE.read_text().format(
+        answer=answer_in_one_sentence(data, result),
+        count=count,
+        wanted=len(plan.policies),
+        dropped=dropped,
+        hits_figure=HITS_FIGURE,
+        agreement_figure=AGREEMENT_FIGURE,
+        best=best,
+        variants=rows_to_markdown(variant_headers(best), variant_rows(result)),
+        reference_units=settings.reference_units,
+        drawn_units=settings.reference_units + settings.random_units,
+        ceiling=format_mean_with_interval(*_ends(result.ceiling)),
+        tests=len(plan.variants) * len(MEASURES),
+        kinds=_group_table(data, result, by_kind),
+        settings=_group_table(data, result, _settings(data.policies)),
+        policies=rows_to_markdown(listed, [_policy_row(one) for one in data.policies]),
+        commands="\n".join(one.command for one in data.policies),
+        plan=plan.text.strip(),
+        monitored=f"{settings.monitored[0]}–{settings.monitored[-1]}",
+        held_out=settings.held_out_seed,
+    )
 
 
 def _settings(policies: Sequence[PolicyFacts]) -> dict[str, list[str]]:
