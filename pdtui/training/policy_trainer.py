@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.outcome import Outcome, is_failure
 from pdtui.policies.weights.policy_network import NetworkSpec
-from pdtui.policies.weights.weights_file import save_network
+from pdtui.policies.weights.weights_file import CHECKPOINT_FOLDER, save_network
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot
 from pdtui.training.actor_conversion import Actor, actor_to_network, make_numpy_actor
@@ -29,8 +29,6 @@ from pdtui.training.training_config import TrainingConfig
 # First seeds of the episodes that select the best weights, and of those that its published score comes from.
 SELECTION_SEEDS, REPORT_SEEDS = 1_000_000, 2_000_000
 _ITERATIONS_PER_REPORT = 16
-CHECKPOINT_FOLDER = "checkpoints"
-"""Folder of the policies that are kept on request, named by their control steps; the best is beside it."""
 _CHECKPOINTS = 50
 """Parts of a run after each of which the policy is kept on request."""
 Config = TypeVar("Config", bound=TrainingConfig)

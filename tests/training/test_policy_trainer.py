@@ -11,13 +11,13 @@ import torch
 
 from pdtui.core.errors import TrainingError
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
-from pdtui.policies.weights.weights_file import load_network, save_network
+from pdtui.policies.weights.weights_file import CHECKPOINT_FOLDER, load_network, save_network
 
 pytest.importorskip("jax", reason="the extra 'train' is not installed")
 
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.training.actor_conversion import make_numpy_actor
-from pdtui.training.policy_trainer import CHECKPOINT_FOLDER, ActorScore, PolicyTrainer
+from pdtui.training.policy_trainer import ActorScore, PolicyTrainer
 from pdtui.training.ppo_trainer import PpoTrainer
 from pdtui.training.robot_batch import TransitionBatch
 from pdtui.training.sac_learner import SacLearner, run_actor

@@ -20,6 +20,8 @@ from pdtui.policies.weights.policy_file_lookup import find_file_beside, find_pac
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork, check_tensor_shapes
 
 WEIGHTS = Path(__file__).parent / "shipped"
+CHECKPOINT_FOLDER = "checkpoints"
+"""Folder of the policies that a training run keeps on request, each named by its control steps."""
 _KEY = "pdtui"
 _MAX_HEADER = 1 << 20
 """Bytes of a file's header, which is read at once; that of a network of 100 layers has 20,000."""
