@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -156,15 +157,15 @@ class _MeasurementJournal:
         self._path = path
         self._known: dict[str, CheckpointMeasurement] = {}
         try:
-            text = path.read_text() if path.exists() else ""
-            # A run that was killed may have left a part of a line.
-            for line in text.split("\n")[:-1]:
-                data = json.loads(line)
-                fields = {
-                    name: tuple(value) if isinstance(value, list) else value
-                    for name, value in data["measured"].items()
-                }
-                self._known[data["key"]] = CheckpointMeasurement(**fields)
+            content = path.read_bytes() if path.exists() else b""
+            whole = content[: content.rfind(b"\n") + 1]
+            if whole != content:  # a run that was killed left a part of a line
+                path.write_bytes(whole)
+            for line in whole.splitlines():
+                data: dict[str, Any] = json.loads(line)
+                measured: dict[str, Any] = data["measured"]
+                lists = {name: tuple(value) for name, value in measured.items() if isinstance(value, list)}
+                self._known[data["key"]] = CheckpointMeasurement(**{**measured, **lists})
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise StudyError(f"{path}: expected measurements of checkpoints: {error}") from error
 

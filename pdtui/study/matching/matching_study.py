@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from pdtui.core.errors import StudyError
-from pdtui.policies.weights.weights_file import hash_file
+from pdtui.policies.weights.weights_file import find_weights_file, hash_file
 from pdtui.study.matching.matching_study_plan import MatchingStudyPlan, StudiedPolicy
 from pdtui.study.matching.policy_measurement import measure_studied_policy
 from pdtui.study.matching.study_data import (
@@ -24,8 +24,10 @@ def find_trained_policies(
     plan: MatchingStudyPlan, folder: Path
 ) -> tuple[dict[StudiedPolicy, Path], list[StudiedPolicy]]:
     """Return the weights of the plan's policies that were trained to the end, and the other policies."""
-    weights = {one: folder / one.name / "best.safetensors" for one in plan.policies}
-    found = {one: path for one, path in weights.items() if _is_trained(path, one.steps)}
+    own = {one: folder / one.name / "best.safetensors" for one in plan.policies if not one.shipped}
+    found = {one: path for one, path in own.items() if _is_trained(path, one.steps)}
+    found |= {one: find_weights_file(one.robot) for one in plan.policies if one.shipped}
+    found = {one: found[one] for one in plan.policies if one in found}
     return found, [one for one in plan.policies if one not in found]
 
 

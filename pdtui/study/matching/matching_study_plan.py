@@ -23,6 +23,7 @@ class StudiedPolicy:
         robot, algorithm, activation, layers, seed, steps: The options of `pdtui train`.
         imitation_rounds: Rounds in which it first imitates the shipped policy of its robot; 0 for a policy
             that is trained from random actions.
+        shipped: Whether it is the shipped policy of its robot, which need not be trained.
     """
 
     robot: str
@@ -32,6 +33,14 @@ class StudiedPolicy:
     seed: int
     steps: int
     imitation_rounds: int
+    shipped: bool = False
+
+    @property
+    def kind(self) -> str:
+        """How it came about."""
+        if self.shipped:
+            return "shipped"
+        return "imitated a shipped policy first" if self.imitation_rounds else "trained from random actions"
 
     @property
     def setting(self) -> str:

@@ -61,7 +61,7 @@ def measure_studied_policy(
             policy.name,
             policy.setting,
             policy.command("FOLDER"),
-            policy.imitation_rounds > 0,
+            policy.kind,
             pool.policy.sha256,
             score.mean_return,
             speed,

@@ -36,7 +36,7 @@ class PolicyFacts:
     Attributes:
         name, setting: Those of the plan.
         command: Command line that trains it.
-        imitates: Whether it first imitated a shipped policy.
+        kind: How it came about.
         sha256: Hash of its weights.
         mean_return, net_speed: Means over the episodes of the walking rule; m/s.
         failures: Share of these episodes that ended in a failure.
@@ -48,7 +48,7 @@ class PolicyFacts:
     name: str
     setting: str
     command: str
-    imitates: bool
+    kind: str
     sha256: str
     mean_return: float
     net_speed: float

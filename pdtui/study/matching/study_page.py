@@ -104,10 +104,6 @@ def compose_study_page(data: MatchingStudyData, result: StudyResult) -> str:
         f" {len(left_out)} more were trained, but do not walk by the rule of the plan." if left_out else ""
     )
     best, settings = plan.settings.best, plan.settings
-    by_kind = {
-        "imitated a shipped policy first": [one.name for one in data.policies if one.imitates],
-        "trained from random actions": [one.name for one in data.policies if not one.imitates],
-    }
     listed = ["policy", "net speed", "return", "episodes failed", "units", "roll-outs", "in the study"]
     return _TEMPLATE.read_text().format(
         answer=answer_in_one_sentence(data, result),
@@ -122,27 +118,22 @@ def compose_study_page(data: MatchingStudyData, result: StudyResult) -> str:
         drawn_units=settings.reference_units + settings.random_units,
         ceiling=format_mean_with_interval(*_ends(result.ceiling)),
         tests=len(plan.variants) * len(MEASURES),
-        kinds=_group_table(data, result, by_kind),
-        settings=_group_table(data, result, _settings(data.policies)),
+        kinds=_group_table(data, result, lambda one: one.kind),
+        settings=_group_table(data, result, lambda one: one.setting),
         policies=rows_to_markdown(listed, [_policy_row(one) for one in data.policies]),
-        commands="\n".join(one.command for one in data.policies),
+        commands="\n".join(one.command for one in data.policies if one.kind != "shipped"),
         plan=plan.text.strip(),
         monitored=f"{settings.monitored[0]}–{settings.monitored[-1]}",
         held_out=settings.held_out_seed,
     )
 
 
-def _settings(policies: Sequence[PolicyFacts]) -> dict[str, list[str]]:
-    groups: dict[str, list[str]] = defaultdict(list)
-    for one in policies:
-        groups[one.setting].append(one.name)
-    return groups
-
-
-def _group_table(data: MatchingStudyData, result: StudyResult, groups: dict[str, list[str]]) -> str:
+def _group_table(data: MatchingStudyData, result: StudyResult, group: Callable[[PolicyFacts], str]) -> str:
     """Return the figures of the primary variant by groups of policies, as Markdown."""
     place = list(data.plan.variants).index(data.plan.primary)
-    rows = []
+    rows, groups = [], defaultdict[str, list[str]](list)
+    for one in data.policies:
+        groups[group(one)].append(one.name)
     for name, members in groups.items():
         figures = [one for one in result.figures if one.policy in members]
         if not figures:
