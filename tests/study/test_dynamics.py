@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -50,12 +51,14 @@ def _run(*arguments: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def summary(run_folder: Path) -> dict[str, object]:
-    [run] = json.loads(_run("dynamics", "walker", str(run_folder), "--every", "2", "--json"))["runs"]
-    return run
+def summary(run_folder: Path) -> dict[str, Any]:
+    printed = _run("dynamics", "walker", str(run_folder), "--every", "2", "--json")
+    runs: list[dict[str, Any]] = json.loads(printed)["runs"]
+    assert len(runs) == 1
+    return runs[0]
 
 
-def test_the_course_ends_with_the_shipped_policy(summary: dict[str, object]) -> None:
+def test_the_course_ends_with_the_shipped_policy(summary: dict[str, Any]) -> None:
     first, *_, last = summary["checkpoints"]
     assert [one["steps"] for one in summary["checkpoints"]] == [0, 2000, 4000]
     assert last["success"] == 1.0
@@ -66,7 +69,7 @@ def test_the_course_ends_with_the_shipped_policy(summary: dict[str, object]) -> 
 
 
 def test_what_was_measured_is_not_measured_again_and_is_drawn(
-    run_folder: Path, summary: dict[str, object], tmp_path: Path
+    run_folder: Path, summary: dict[str, Any], tmp_path: Path
 ) -> None:
     journal = run_folder / "dynamics.jsonl"
     before = journal.read_bytes()

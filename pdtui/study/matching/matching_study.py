@@ -67,7 +67,7 @@ def run_matching_study(
     if not trained:
         example = missing[0].command(str(policies)) if missing else "a plan with policies"
         raise StudyError(
-            f"{policies}: expected trained policies of the plan, found none; train one: {example}"
+            f"{policies}: expected trained policies of the plan, found none; begin with {example}"
         )
     parts: list[MatchingStudyData] = []
     for number, (policy, weights) in enumerate(trained.items()):
