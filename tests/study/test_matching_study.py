@@ -1,4 +1,4 @@
-"""The matching study: it says yes where matching steers, no where it does not, and its page comes from data."""
+"""The matching study: it says yes where matching steers, no where it does not, and writes its page itself."""
 
 from __future__ import annotations
 

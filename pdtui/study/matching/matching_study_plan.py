@@ -53,7 +53,9 @@ class StudiedPolicy:
         return f"{self.setting}-{self.seed}"
 
     def command(self, folder: str) -> str:
-        """Return the command line that trains it below a folder."""
+        """Return the command line that trains it below a folder; nothing for a shipped policy."""
+        if self.shipped:
+            return ""
         # SAC has no choice of an activation function.
         chosen = f" --activation {self.activation}" if self.algorithm == "ppo" else ""
         if self.imitation_rounds:

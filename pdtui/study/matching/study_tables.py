@@ -67,7 +67,7 @@ class ListedPolicies:
         """Return them as a table."""
         table = new_table("", "policy", "trained", "command", left=("policy", "trained", "command"))
         for name, trained, command in self.rows:
-            table.add_row(name, "yes" if trained else "no", command)
+            table.add_row(name, "yes" if trained else "no", command or "it comes with pdtui")
         return table
 
     def as_list(self) -> list[dict[str, Any]]:
