@@ -108,6 +108,8 @@ def test_data_are_read_as_they_were_written(tmp_path: Path) -> None:
     assert [one.effects.tolist() for one in read_study_data(path).measured] == [
         one.effects.tolist() for one in read.measured
     ]
+    with pytest.raises(StudyError, match="expected the data of a matching study, found no file"):
+        read_study_data(tmp_path / "none.parquet")
     path.write_bytes(b"PAR1")
     with pytest.raises(StudyError, match="expected the data of a matching study"):
         read_study_data(path)
@@ -175,7 +177,7 @@ def test_a_small_study_from_policies_to_the_page(trained: Path, tmp_path: Path) 
     first = _run(*options, "--guide", guide)
     assert first.exit_code == 0, first.output
     assert "Matching and steering: 1 of the 3 policies wanted" in first.stdout
-    assert "Unknown: 1 policies that walk are too few" in first.stdout
+    assert "Unknown: one policy that walks is too few" in first.stdout
     page = (guide / "matching-study.md").read_text()
     assert "1 more were trained, but do not walk by the rule of the plan" in page
     assert "pdtui train walker --algorithm ppo --activation tanh --layers 256,256 --seed 1001" in page

@@ -132,6 +132,8 @@ def read_study_data(path: Path) -> MatchingStudyData:
         plan = parse_matching_study_plan(note["plan"], f"{path}: plan")
         policies = tuple(PolicyFacts(**one) for one in note["policies"])
         return MatchingStudyData(plan, policies, tuple(_from_table(table, plan)))
+    except FileNotFoundError:
+        raise StudyError(f"{path}: expected the data of a matching study, found no file") from None
     except (OSError, pa.ArrowException, KeyError, TypeError, ValueError) as error:
         raise StudyError(f"{path}: expected the data of a matching study: {error}") from error
 

@@ -31,7 +31,8 @@ def answer_in_one_sentence(data: MatchingStudyData, result: StudyResult) -> str:
     """Return the answer to the title of the page."""
     count = len(result.figures)
     if result.answer is StudyAnswer.UNKNOWN:
-        return f"Unknown: {count} policies that walk are too few for the test to pass, whatever they show."
+        walking = "one policy that walks is" if count == 1 else f"{count} policies that walk are"
+        return f"Unknown: {walking} too few for the test to pass, whatever they show."
     first = result.variants[data.plan.primary][MEASURES.index("first")]
     means = (
         f"on {count} policies, the first match is among the strongest tenth of units for {first.mean:.0%} of "
