@@ -128,3 +128,20 @@ def test_the_interval_of_a_course_holds_for_independent_noise_and_is_wide_for_a_
     trend = np.arange(30.0)
     falling = correlate_course(-trend + rng.normal(size=30), trend)
     assert falling.high < 0.0
+
+
+@pytest.mark.slow  # trains for about a minute
+def test_a_training_run_is_followed_from_its_start(tmp_path: Path) -> None:
+    pytest.importorskip("jax", reason="the extra 'train' is not installed")
+    folder = tmp_path / "walker-32"
+    _run(
+        *("train", "walker", "--layers", "32,32", "--seed", "1000", "--steps", "102400"),
+        *("--checkpoints", "--folder", str(folder)),
+    )
+    printed = _run("dynamics", "walker", str(folder), "--every", "10", "--json")
+    [run] = json.loads(printed)["runs"]
+    steps = [one["steps"] for one in run["checkpoints"]]
+    assert (steps[0], steps[-1], len(steps)) == (0, 102400, 6)
+    assert run["checkpoints"][-1]["mean_return"] > 2 * run["checkpoints"][0]["mean_return"]
+    found = run["correlations"]["discrepancy and return"]
+    assert found["low"] <= found["value"] <= found["high"]
