@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from pdtui.core.errors import StudyError
@@ -99,9 +99,3 @@ def _read_part(path: Path, plan: MatchingStudyPlan, weights: Path) -> MatchingSt
         return None
     same = part.plan == plan and [one.sha256 for one in part.policies] == [hash_file(weights)]
     return part if same else None
-
-
-def count_missing(data: MatchingStudyData) -> Sequence[StudiedPolicy]:
-    """Return the policies of the plan that the data lack."""
-    names = {one.name for one in data.policies}
-    return [one for one in data.plan.policies if one.name not in names]

@@ -18,6 +18,8 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import StudyError
 from pdtui.study.matching.matching_study_plan import MatchingStudyPlan, parse_matching_study_plan
 
+SHIPPED_STUDY_DATA = Path(__file__).with_name("matching_study.parquet")
+"""The data of the page in the guide."""
 _KEY = b"pdtui-matching-study"
 NO_RANK = 65535
 """Rank of a unit that a variant leaves out."""
