@@ -44,6 +44,7 @@ def study_command() -> None:
 @click.option(
     "--guide", type=FILE_PATH, metavar="FOLDER", help="Write the page and its figures into this folder."
 )
+@click.option("--so-far", is_flag=True, help="Analyze the policies measured so far; measure no other.")
 @click.option("--list", "only_list", is_flag=True, help="List the policies of the plan; measure nothing.")
 @workers_option
 @overwrite_option
@@ -54,6 +55,7 @@ def study_matching_command(
     plan_path: Path | None,
     data: Path | None,
     guide: Path | None,
+    so_far: bool,
     only_list: bool,
     workers: int,
     overwrite: bool,
@@ -85,7 +87,9 @@ def study_matching_command(
     else:
         plan = load_matching_study_plan(plan_path or MATCHING_STUDY_PLAN)
         with progress_bar("policies", quiet=as_json) as advance:
-            measured = run_matching_study(plan, policies, folder, workers=workers, progress=advance)
+            measured = run_matching_study(
+                plan, policies, folder, workers=workers, only_finished=so_far, progress=advance
+            )
         written.append(folder / "matching-study.parquet")
         write_study_data(written[0], measured)
     result = analyze_study(measured)

@@ -190,6 +190,12 @@ def test_a_small_study_from_policies_to_the_page(trained: Path, tmp_path: Path) 
         assert sum(one.roles == ROLES.index("random")) == 6
         assert (np.sort(one.ranks, axis=1)[:, :2] == [0, 1]).all()
 
+    # What is measured so far can be analyzed before the rest is.
+    (folder / "walker-ppo-tanh-256x256-1001.parquet").rename(tmp_path / "kept.parquet")
+    so_far = _run(*options, "--so-far", "--json")
+    assert [one["name"] for one in json.loads(so_far.stdout)["policies"]] == ["walker-ppo-tanh-256x256-1000"]
+    (tmp_path / "kept.parquet").rename(folder / "walker-ppo-tanh-256x256-1001.parquet")
+
     # It goes on where it was, and the page is the same when it is drawn again from the data.
     parts = {path: path.stat().st_mtime_ns for path in folder.glob("walker*.parquet")}
     again = _run(*options, "--json")

@@ -46,6 +46,7 @@ def run_matching_study(
     folder: Path,
     *,
     workers: int = 1,
+    only_finished: bool = False,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> MatchingStudyData:
     """Measure the policies of a plan that were trained below a folder, one after the other.
@@ -57,10 +58,11 @@ def run_matching_study(
         policies: Folder in which the folder of each policy is.
         folder: Folder of the parts and of the journal.
         workers: Number of worker processes.
+        only_finished: Measure nothing, and return what earlier runs measured.
         progress: Is told the policies measured, those to measure, and what is done now.
 
     Raises:
-        StudyError: There is no trained policy.
+        StudyError: There is no trained policy, or none was measured and nothing shall be.
         PdtuiError: A policy cannot be measured.
     """
     trained, missing = find_trained_policies(plan, policies)
@@ -74,6 +76,8 @@ def run_matching_study(
         path = folder / f"{policy.name}.parquet"
         part = _read_part(path, plan, weights)
         if part is None:
+            if only_finished:
+                continue
 
             def report(stage: str, done: int, total: int, at: int = number, name: str = policy.name) -> None:
                 if progress is not None:
@@ -86,6 +90,8 @@ def run_matching_study(
         parts.append(part)
         if progress is not None:
             progress(number + 1, len(trained), policy.name)
+    if not parts:
+        raise StudyError(f"{folder}: expected policies that were measured by this plan, found none")
     return merge_study_data(parts)
 
 
