@@ -122,7 +122,7 @@ def compose_study_page(data: MatchingStudyData, result: StudyResult) -> str:
         kinds=_group_table(data, result, lambda one: one.kind),
         settings=_group_table(data, result, lambda one: one.setting),
         policies=rows_to_markdown(listed, [_policy_row(one) for one in data.policies]),
-        commands="\n".join(one.command for one in data.policies if one.command),
+        commands="\n".join(one.command("FOLDER") for one in plan.policies if not one.shipped),
         plan=plan.text.strip(),
         monitored=f"{settings.monitored[0]}–{settings.monitored[-1]}",
         held_out=settings.held_out_seed,
