@@ -54,7 +54,7 @@ class TrainingConfig:
 
 @dataclass(frozen=True)
 class PpoConfig(TrainingConfig):
-    """Settings of Proximal Policy Optimisation.
+    """Settings of Proximal Policy Optimization.
 
     Attributes:
         processes: Whether the robots run in processes of their own, which simulators need that hold Python's
@@ -64,7 +64,7 @@ class PpoConfig(TrainingConfig):
         divergence: Mean divergence per gradient step that the learning rate is adapted to.
         final_divergence: Share of `divergence` to which it falls, linearly, in the second half of the run.
         clip: Range of the probability ratio around 1 in the clipped surrogate.
-        gae: λ of the generalised advantage estimation.
+        gae: λ of the generalized advantage estimation.
         entropy: Weight of the entropy bonus.
         log_std: Initial log standard deviation of the actions.
         critic_iterations: Iterations at the start in which only the critic learns, so that an untrained one

@@ -19,7 +19,7 @@ from pdtui.paper.driving.maneuver import (
     roll,
     sideways_past_standing,
 )
-from pdtui.paper.driving.operator_memory import REACTION_TIME, JudgementErrors, OperatorMemory
+from pdtui.paper.driving.operator_memory import REACTION_TIME, JudgmentErrors, OperatorMemory
 from pdtui.paper.driving.road_sight import RoadSight
 
 PRESSES_PER_SECOND = 3
@@ -54,12 +54,12 @@ class KeyOperator:
     Args:
         effects: What the keys do.
         dt: Duration of a control step, s.
-        judgement: How it judges what it sees.
+        judgment: How it judges what it sees.
     """
 
-    def __init__(self, effects: KeyEffects, dt: float, judgement: JudgementErrors | None = None) -> None:
-        self._effects, self._dt, self._judgement = effects, dt, judgement or JudgementErrors()
-        self._memory = OperatorMemory(dt, self._judgement)
+    def __init__(self, effects: KeyEffects, dt: float, judgment: JudgmentErrors | None = None) -> None:
+        self._effects, self._dt, self._judgment = effects, dt, judgment or JudgmentErrors()
+        self._memory = OperatorMemory(dt, self._judgment)
         self._second = math.ceil(1.0 / dt - 1e-9)
         self._step, self._rolled = -1, 0
         self._presses: list[tuple[int, str]] = []
@@ -109,7 +109,7 @@ class KeyOperator:
         return max((go_on, slower, *lanes), key=lambda one: predict_times_to_conflict(seen, one).first).name
 
     def _must_act(self, seen: RoadSight, expected: TimesToConflict) -> bool:
-        patience = self._judgement.patience
+        patience = self._judgment.patience
         return (
             expected.standing < PATIENCE_STANDING * patience
             or expected.moving < PATIENCE_MOVING * patience
@@ -123,7 +123,7 @@ class KeyOperator:
         room = float(np.interp(seen.speed, [_SLOW, _FAST], [CREEPING_ROOM, STOPPING_ROOM]))
         if self._time_since(LEFT, RIGHT) < _LANE_KEY_TIME:
             room = CREEPING_ROOM
-        patience = self._judgement.patience
+        patience = self._judgment.patience
         return (
             distance_to_standing(seen) < stopping + room * patience
             or expected.moving < PATIENCE_MOVING * patience
