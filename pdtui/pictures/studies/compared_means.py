@@ -11,7 +11,7 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.pictures.matplotlib_page import open_figure_page
-from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, color_to_hex
+from pdtui.pictures.plot_colors import CYCLE, GRAY, RgbColor, color_to_hex
 
 _ROW_HEIGHT, _PANEL_HEIGHT = 0.2, 0.75
 
@@ -75,7 +75,7 @@ def _draw_panel(plot: Any, panel: ComparisonPanel) -> None:
         plot.plot([row.low, row.high], [place, place], color=color, linewidth=1.6)
         plot.plot([row.mean], [place], "o", color=color, markersize=4)
     if panel.chance is not None:
-        plot.axvline(panel.chance, color=color_to_hex(GREY), linestyle="--", linewidth=0.8, zorder=0)
+        plot.axvline(panel.chance, color=color_to_hex(GRAY), linestyle="--", linewidth=0.8, zorder=0)
     plot.set_yticks(range(len(panel.rows)), [row.name for row in panel.rows])
     plot.set_ylim(len(panel.rows) - 0.4, -0.6)
     plot.set_xlim(*panel.limits)

@@ -16,7 +16,7 @@ from rich.table import Table
 from pdtui.core.attributes import Floats
 from pdtui.core.printable_text import to_json
 from pdtui.pictures.matplotlib_page import FIGURE_SUFFIXES, open_figure_page
-from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, color_to_hex
+from pdtui.pictures.plot_colors import CYCLE, GRAY, RgbColor, color_to_hex
 from pdtui.pictures.rerun_report_file import TIME, open_report_file, table_to_markdown
 
 APP = "pdtui-dynamics"
@@ -98,7 +98,7 @@ def _draw_figure(path: Path, shown: LearningCourse) -> None:
 
 
 def _draw_curve(plot: Any, curve: CourseCurve, steps: Floats, color: RgbColor, label: bool) -> None:
-    shade = color_to_hex(GREY if curve.compared else color)
+    shade = color_to_hex(GRAY if curve.compared else color)
     for part in curve.parts.values():
         plot.plot(steps, part, color=shade, linewidth=0.5, alpha=0.35)
     style = "--" if curve.compared else "-"
@@ -121,7 +121,7 @@ def _write_recording(path: Path, shown: LearningCourse) -> None:
             for run, (curves, color) in enumerate(zip(panel.curves, cycle(CYCLE), strict=False)):
                 for curve in curves:
                     entity = f"/{number}/{run}/{rr.escape_entity_path_part(curve.name)}"
-                    shade = GREY if curve.compared else color
+                    shade = GRAY if curve.compared else color
                     _log_curve(recording, entity, curve.name, shown.steps[run], curve.values, shade, 2.0)
                     for name, part in curve.parts.items():
                         own = f"{entity}/{rr.escape_entity_path_part(name)}"
