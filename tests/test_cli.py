@@ -315,6 +315,7 @@ def test_optional_rooms_can_be_deleted(map_path: Path, tmp_path: Path) -> None:
         ("paper", ("evaluate", "ant", "--map", map_path, "--experiment", "forest")),
         ("training", ("train", "ant")),
         ("benchmarks", ("bench", "loop", "ant", "--map", map_path)),
+        ("study", ("study", "matching", "--list")),
     ]
     for room, line in refused:
         done = run_copy(*line)

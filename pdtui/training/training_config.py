@@ -30,6 +30,7 @@ class TrainingConfig:
             recipe's. PPO imitates one with other layers first, and SAC imitates any.
         imitation_rounds: Rounds of imitation at the start, of 500 control steps of every robot each.
         reward_scale: Factor on rewards, which brings the values to the order of 1.
+        keeps_checkpoints: Whether the policy is kept at the start and after each 2 % of the steps.
     """
 
     total_steps: int
@@ -48,6 +49,7 @@ class TrainingConfig:
     initial_policy: str = ""
     imitation_rounds: int = 3
     reward_scale: float = 1.0
+    keeps_checkpoints: bool = False
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ from pdtui.policies.weights.policy_file_lookup import find_file_beside, find_pac
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork, check_tensor_shapes
 
 WEIGHTS = Path(__file__).parent / "shipped"
+CHECKPOINT_FOLDER = "checkpoints"
+"""Folder of the policies that a training run keeps on request, each named by its control steps."""
 _KEY = "pdtui"
 _NORMALIZER, _NORMALIZER_IN_FILES = "normalizer.", "normaliser."
 """How the names of its tensors begin; files have kept the spelling with which the format began."""
