@@ -6,8 +6,10 @@ from pathlib import Path
 
 import click
 
-from pdtui.cli.options.shared_options import FILE_PATH, json_option, overwrite_option, workers_option
+from pdtui.cli.options.shared_options import FILE_PATH, json_option, overwrite_option
+from pdtui.cli.options.worker_options import workers_option
 from pdtui.cli.output.command_output import print_result
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.console.progress_bar import progress_bar
 
 
@@ -57,7 +59,7 @@ def study_matching_command(
     guide: Path | None,
     so_far: bool,
     only_list: bool,
-    workers: int,
+    workers: Workers,
     overwrite: bool,
     as_json: bool,
 ) -> None:

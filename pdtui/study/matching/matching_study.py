@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.errors import StudyError
 from pdtui.policies.weights.weights_file import find_weights_file, hash_file
 from pdtui.study.matching.matching_study_plan import MatchingStudyPlan, StudiedPolicy
@@ -45,7 +46,7 @@ def run_matching_study(
     policies: Path,
     folder: Path,
     *,
-    workers: int = 1,
+    workers: Workers = 1,
     only_finished: bool = False,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> MatchingStudyData:
@@ -57,7 +58,7 @@ def run_matching_study(
         plan: The plan.
         policies: Folder in which the folder of each policy is.
         folder: Folder of the parts and of the journal.
-        workers: Number of worker processes.
+        workers: Number of worker processes, or a cluster.
         only_finished: Measure nothing, and return what earlier runs measured.
         progress: Is told the policies measured, those to measure, and what is done now.
 

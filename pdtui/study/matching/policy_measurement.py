@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.outcome import count_failures
 from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.dissection.attribute_movers import movable_attribute_columns
@@ -39,7 +40,7 @@ def measure_studied_policy(
     weights: Path,
     journal: Path,
     *,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: PartProgress | None = None,
 ) -> MatchingStudyData:
     """Measure one policy by a plan. Roll-outs that the journal holds are not run again.
