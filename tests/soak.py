@@ -215,8 +215,10 @@ def soak(
                 last.append(size)
             else:
                 sent = draw_input(drawn)
-                if find_mouse_row(sent) in rows:  # on the line of keys, where one quits and one branches off
-                    continue
+                while (
+                    find_mouse_row(sent) in rows
+                ):  # on the line of keys, where one quits and one branches off
+                    sent = draw_input(drawn)
                 last.append(sent)
                 terminal.send(sent)
             due = max(due + 1.0 / rate, time.monotonic() - 1.0)

@@ -76,8 +76,8 @@ def tune_command(
     if force and not dry_run:
         raise MapError("--force needs --dry-run: the map would get gains tuned for another policy")
     from pdtui.evaluation.evaluation_tables import tuning_table
-    from pdtui.search.gain_search import TuningSettings
-    from pdtui.search.gain_tuning import tune_gains
+    from pdtui.search.gains.gain_search import TuningSettings
+    from pdtui.search.gains.gain_tuning import tune_gains
     from pdtui.stimulation.map_library import find_map, user_map_path
     from pdtui.stimulation.map_writer import add_seeds, replace_gains, rewrite_map
 

@@ -11,9 +11,9 @@ from pdtui.core.confidence_intervals import PairedRatio
 from pdtui.core.console.text_tables import format_mean_with_interval, format_seed_range, new_table
 from pdtui.core.outcome import Outcome, count_failures, describe_outcomes, failure_noun
 from pdtui.evaluation.policy_evaluation import PolicyEvaluation
-from pdtui.search.gain_tuning import TunedGains
-from pdtui.search.step_response import StepResponseSummary
-from pdtui.search.tracking_summary import TrackingSummary
+from pdtui.search.gains.gain_tuning import TunedGains
+from pdtui.search.gains.step_response import StepResponseSummary
+from pdtui.search.gains.tracking_summary import TrackingSummary
 
 
 def policy_evaluation_table(result: PolicyEvaluation) -> Table:

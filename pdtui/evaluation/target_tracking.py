@@ -8,8 +8,8 @@ from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.errors import MapError
 from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveRunner
-from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarize_tracking
+from pdtui.search.gains.tracking_drives import TrackingDriveJob, TrackingDriveRunner
+from pdtui.search.gains.tracking_summary import TrackingSummary, choose_tracking_targets, summarize_tracking
 from pdtui.stimulation.stimulation_map import Behavior
 
 

@@ -20,14 +20,19 @@ from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.disturbance_conditions import find_condition, plan_pushes
 from pdtui.evaluation.target_tracking import find_pid_behaviors
-from pdtui.search.tracking_drives import (
+from pdtui.search.gains.tracking_drives import (
     STEPS_EACH,
     STEPS_UNTOUCHED,
     TrackingDriveJob,
     TrackingDriveResult,
     TrackingDriveRunner,
 )
-from pdtui.search.tracking_summary import HEADINGS, TrackingSummary, mean_errors_by_seed, summarize_tracking
+from pdtui.search.gains.tracking_summary import (
+    HEADINGS,
+    TrackingSummary,
+    mean_errors_by_seed,
+    summarize_tracking,
+)
 from pdtui.stimulation.stimulation_map import Behavior
 
 ATTRIBUTE = "yaw"

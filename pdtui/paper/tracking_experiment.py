@@ -41,7 +41,7 @@ def build_heading_figure(result: HeadingPrecisionComparison) -> HeadingFigure:
     import numpy as np
 
     from pdtui.pictures.heading_figures import HeadingFigure, TrackedHeading
-    from pdtui.search.tracking_drives import STEPS_EACH
+    from pdtui.search.gains.tracking_drives import STEPS_EACH
 
     several = len({row.map for row in result.rows}) > 1
     headings = []
@@ -66,7 +66,7 @@ def heading_precision_table(result: HeadingPrecisionComparison) -> Table:
     """Return a table with one column per behavior, map by map."""
     from pdtui.core.console.text_tables import format_seed_range, new_table
     from pdtui.evaluation.evaluation_tables import add_tracking_figures, format_ratio
-    from pdtui.search.tracking_drives import STEPS_EACH
+    from pdtui.search.gains.tracking_drives import STEPS_EACH
 
     table = new_table(
         f"Holding headings: {format_seed_range(result.seeds)}",

@@ -16,8 +16,8 @@ from pdtui.evaluation.evaluation_plan import EvaluationPlan
 from pdtui.evaluation.evaluation_tables import policy_evaluation_table, tracking_table
 from pdtui.evaluation.policy_evaluation import evaluate_policy
 from pdtui.evaluation.protocol_settings import ProtocolSettings
-from pdtui.search.step_response import StepResponseSummary
-from pdtui.search.tracking_summary import TrackingSummary
+from pdtui.search.gains.step_response import StepResponseSummary
+from pdtui.search.gains.tracking_summary import TrackingSummary
 from tests.road import road_loop
 
 SEEDS = range(100, 103)

@@ -20,7 +20,7 @@ from pdtui.paper.heading_precision import compare_heading_precision, paired_erro
 from pdtui.paper.tracking_experiment import heading_precision_table
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.policies.weights.policy_loading import load_any_network
-from pdtui.search.tracking_drives import (
+from pdtui.search.gains.tracking_drives import (
     STEPS_EACH,
     TrackingDriveJob,
     TrackingDriveResult,

@@ -10,10 +10,15 @@ import pytest
 from pdtui.core.errors import MapError
 from pdtui.core.outcome import Outcome
 from pdtui.driving.control_loop import ControlLoop
-from pdtui.search.gain_search import TuningSettings, gains_from_point, point_from_gains, sample_gain_points
-from pdtui.search.gain_tuning import ANGLE_STEPS, FARTHEST_ANGLE, draw_angle_targets, tune_gains
-from pdtui.search.tracking_drives import TrackingDriveRunner
-from pdtui.search.tracking_summary import choose_tracking_targets
+from pdtui.search.gains.gain_search import (
+    TuningSettings,
+    gains_from_point,
+    point_from_gains,
+    sample_gain_points,
+)
+from pdtui.search.gains.gain_tuning import ANGLE_STEPS, FARTHEST_ANGLE, draw_angle_targets, tune_gains
+from pdtui.search.gains.tracking_drives import TrackingDriveRunner
+from pdtui.search.gains.tracking_summary import choose_tracking_targets
 from pdtui.stimulation.stimulation_map import PidGains
 from tests.turning_robot import turning_loop
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.search.gain_tuning_process import GainTuningProcess, GainTuningState
+from pdtui.search.gains.gain_tuning_process import GainTuningProcess, GainTuningState
 from pdtui.stimulation.stimulation_map import StimulationMap
 
 PATIENCE = 240.0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from pdtui.search.step_response import StepResponse, StepResponseSummary, measure_step_response
+from pdtui.search.gains.step_response import StepResponse, StepResponseSummary, measure_step_response
 
 DT = 0.02
 

@@ -14,7 +14,7 @@ from pdtui.core.errors import MapError, SeedError
 from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.robots.task import Task
-from pdtui.search.gain_tuning import tune_gains
+from pdtui.search.gains.gain_tuning import tune_gains
 from pdtui.search.task_search import TaskSearch
 from pdtui.search.task_search_settings import QUICK_TASK_SEARCH
 from pdtui.stimulation.map_reader import load_map, parse_map

@@ -14,7 +14,7 @@ from pdtui.core.units import parse_unit
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUnit
 from pdtui.driving.unit_bench.natural_ranges import NaturalRanges
 from pdtui.driving.unit_bench.unit_search_snapshot import FoundUnit, UnitSearchRequest, UnitSearchSnapshot
-from pdtui.search.gain_tuning_process import TUNING_SEEDS, GainTuningState, OfferedGains
+from pdtui.search.gains.gain_tuning_process import TUNING_SEEDS, GainTuningState, OfferedGains
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stack.stack_entry import PidTuning, StackEntry
 from pdtui.tui.drive_app import DriveApp

@@ -31,7 +31,7 @@ def show_drive(config: DriveConfig, settings: UserSettings | None = None, *, wat
 def run_drive_screen(config: DriveConfig, settings: UserSettings, *, watching: bool = False) -> str:
     """Start the simulation's process, show it on the screen, and return one line on how the drive ended."""
     from pdtui.driving.drive_client import DriveClient
-    from pdtui.search.gain_tuning_process import GainTuningProcess
+    from pdtui.search.gains.gain_tuning_process import GainTuningProcess
 
     connection = DriveClient(config)
     tuning = GainTuningProcess(config)

@@ -11,7 +11,7 @@ from textual.binding import Binding
 from textual.strip import Strip
 
 from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchRequest
-from pdtui.search.gain_tuning_process import GainTuningState
+from pdtui.search.gains.gain_tuning_process import GainTuningState
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import ScreenRow, format_signed
 from pdtui.tui.snapshot_widget import SnapshotWidget

@@ -15,7 +15,7 @@ from pdtui.core.errors import PdtuiError
 from pdtui.core.printable_text import make_printable
 from pdtui.core.reserved_keys import EventKind
 from pdtui.driving.drive_snapshot import DriveSnapshot
-from pdtui.search.gain_tuning_process import TUNING_MINUTES, TUNING_SEEDS, GainTuningState, OfferedGains
+from pdtui.search.gains.gain_tuning_process import TUNING_MINUTES, TUNING_SEEDS, GainTuningState, OfferedGains
 from pdtui.stimulation.pid_magnitude import GainName
 from pdtui.stimulation.stack.stack_entry import PidTuning
 from pdtui.tui.cell_text import ScreenRow, format_number

@@ -119,8 +119,8 @@ class _TuningJobs:
     def run(self, behavior: str, minutes: float) -> GainTuningState:
         """Tune a behavior, and return the result."""
         from pdtui.core.outcome import is_failure
-        from pdtui.search.gain_search import TuningSettings
-        from pdtui.search.gain_tuning import tune_gains
+        from pdtui.search.gains.gain_search import TuningSettings
+        from pdtui.search.gains.gain_tuning import tune_gains
 
         def tell(tried: int, total: int, _: str) -> None:
             self._progress.send((tried, total))

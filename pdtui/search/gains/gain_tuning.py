@@ -24,9 +24,9 @@ from pdtui.core.outcome import is_failure
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.search.evolutionary_search import Deadline, SharedTimeBudget
-from pdtui.search.gain_search import GainSearch, TuningSettings
-from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveResult, TrackingDriveRunner
-from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarize_tracking
+from pdtui.search.gains.gain_search import GainSearch, TuningSettings
+from pdtui.search.gains.tracking_drives import TrackingDriveJob, TrackingDriveResult, TrackingDriveRunner
+from pdtui.search.gains.tracking_summary import TrackingSummary, choose_tracking_targets, summarize_tracking
 from pdtui.stimulation.seed_ranges import require_search_seeds
 from pdtui.stimulation.stimulation_map import Behavior, PidGains, StimulationMap
 

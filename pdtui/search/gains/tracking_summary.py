@@ -11,8 +11,8 @@ from pdtui.core.attributes import Floats
 from pdtui.core.confidence_intervals import confidence_interval
 from pdtui.core.errors import MapError
 from pdtui.core.outcome import Outcome, OutcomeCounts, count_outcomes
-from pdtui.search.step_response import StepResponseSummary
-from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveResult, TrackingDriveRunner
+from pdtui.search.gains.step_response import StepResponseSummary
+from pdtui.search.gains.tracking_drives import TrackingDriveJob, TrackingDriveResult, TrackingDriveRunner
 from pdtui.stimulation.stimulation_map import Behavior
 
 HEADINGS = (0.0, 0.4, 0.9, 1.2, 0.9, 0.4, 0.0, -0.4, -0.9, -1.2, -0.9, -0.4, 0.0)

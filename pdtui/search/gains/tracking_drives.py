@@ -17,7 +17,7 @@ from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop, send_drive_files
-from pdtui.search.step_response import StepResponse, measure_step_response
+from pdtui.search.gains.step_response import StepResponse, measure_step_response
 from pdtui.stimulation.stimulation_map import PidGains
 
 STEPS_UNTOUCHED = 100

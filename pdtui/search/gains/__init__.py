@@ -1,0 +1,1 @@
+"""Search for the gains of a controller, and the drives that compare them."""
