@@ -10,7 +10,7 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.paper.driving.key_operator import (
     IMPROVEMENT,
-    NEAR_STANDING,
+    PATIENCE_CROSSING,
     PATIENCE_EDGE,
     PATIENCE_MOVING,
     PATIENCE_STANDING,
@@ -18,11 +18,11 @@ from pdtui.paper.driving.key_operator import (
 from pdtui.paper.driving.maneuver import (
     HORIZON,
     TIMES,
+    WEAVING,
     Maneuver,
-    distance_to_standing,
-    drift,
     predict_times_to_conflict,
     roll,
+    swerve,
 )
 from pdtui.paper.driving.operator_memory import JudgementErrors, OperatorMemory
 from pdtui.paper.driving.road_sight import CAR_HALF_LENGTH, CAR_HALF_WIDTH, LANE_WIDTH, ROAD_STEP, RoadSight
@@ -39,6 +39,8 @@ _WHEELBASE, _LARGEST_ANGLE = 2.47, math.radians(40.0)
 """Distance between the axles, m, and the angle of the wheels at full steering, rad."""
 _BRAKING, _HEADWAY, _STANDSTILL_GAP = 3.0, 1.2, 4.0
 """How hard it plans to brake, m/s², and its distance from who is in front: per speed, s, and at rest, m."""
+_SOON = 0.5
+"""Time over which it judges how fast others get away, s."""
 _THROTTLE_GAIN = 0.3
 """Throttle per error of the speed, s/m."""
 _HANDS_OFF_AFTER = 5
@@ -90,13 +92,16 @@ class SteeringOperator:
         return self._drive(seen)
 
     def _must_act(self, seen: RoadSight) -> bool:
-        expected = predict_times_to_conflict(seen, Maneuver("", roll(seen.speed, 0.0), drift(seen)))
+        ahead = roll(seen.speed, 0.0)
+        expected = predict_times_to_conflict(
+            seen, Maneuver("", ahead, swerve(seen, ahead, np.zeros_like(TIMES)))
+        )
         patience = self._judgement.patience
         return (
             expected.standing < PATIENCE_STANDING * patience
             or expected.moving < PATIENCE_MOVING * patience
-            or expected.edge < PATIENCE_EDGE * patience
-            or distance_to_standing(seen) < NEAR_STANDING * patience
+            or expected.crossing < PATIENCE_CROSSING * patience
+            or (expected.edge < PATIENCE_EDGE * patience and abs(seen.heading) > WEAVING)
             or self._halted * self._dt > 2.0
         )
 
@@ -125,11 +130,12 @@ class SteeringOperator:
         return predict_times_to_conflict(seen, Maneuver("", roll(speed, 0.0), beside)).first
 
     def _drive(self, seen: RoadSight) -> ManualControlValues:
-        beside = seen.to_middle_of(self._target) + _middle(seen)
+        road = seen.road_ahead()
+        beside = seen.to_middle_of(self._target) + seen.beside
         distance = _LOOK_AHEAD + _LOOK_AHEAD_TIME * seen.speed
-        x, y = _place_ahead(seen.road, distance, beside)
+        x, y = _place_ahead(road, distance, beside)
         angle = math.atan(2.0 * _WHEELBASE * y / max(x * x + y * y, 1.0))
-        speed = min(CRUISING_SPEED, _bend_speed(seen.road), self._following_speed(seen))
+        speed = min(CRUISING_SPEED, _bend_speed(road), self._following_speed(seen))
         throttle = _THROTTLE_GAIN * (speed - seen.speed)
         return ManualControlValues(
             float(np.clip(angle / _LARGEST_ANGLE, -1.0, 1.0)), float(np.clip(throttle, -1.0, 1.0))
@@ -137,7 +143,9 @@ class SteeringOperator:
 
     def _following_speed(self, seen: RoadSight) -> float:
         """Return the speed at which the car does not run into what is in front of it on its way, m/s."""
-        ahead, beside, half_length, half_width, speed, _ = seen.others.T
+        now, soon = np.moveaxis(seen.foresee(np.array([0.0, _SOON])), 1, 0)
+        ahead, beside, half_length, half_width = now.T
+        speed = (soon[:, 0] - ahead) / _SOON
         gaps = ahead - half_length - CAR_HALF_LENGTH
         to = seen.to_middle_of(self._target)
         reach = half_width + CAR_HALF_WIDTH + 0.3
@@ -152,11 +160,6 @@ class SteeringOperator:
         return float(
             np.min(np.minimum(np.sqrt(ahead_speed**2 + 2 * _BRAKING * room), ahead_speed + room / _HEADWAY))
         )
-
-
-def _middle(seen: RoadSight) -> float:
-    """Return how far the car's middle is to the left of the road's, m."""
-    return (seen.right - seen.left) / 2
 
 
 def _place_ahead(road: Floats, distance: float, beside: float) -> tuple[float, float]:
