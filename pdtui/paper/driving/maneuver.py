@@ -122,7 +122,8 @@ def predict_times_to_conflict(sight: RoadSight, maneuver: Maneuver, doubt: float
     close &= ~follower | (np.abs(maneuver.beside) > _LANE_LEFT)
     stands = sight.others[:, 5] < STANDING
     kinds = stands, sight.followers, ~stands & ~sight.followers
-    return TimesToConflict(*(_first_time(close[kind].any(axis=0)) for kind in kinds), _first_time(out))
+    standing, along, across = (_first_time(close[kind].any(axis=0)) for kind in kinds)
+    return TimesToConflict(standing, along, across, _first_time(out))
 
 
 def next_standing(sight: RoadSight) -> tuple[float, float]:

@@ -47,8 +47,8 @@ class RoadSight:
         heading: Its heading relative to the line's, to the left, rad.
         yaw_rate: How fast it turns to the left, rad/s.
         left, right: Distances of its middle from the edges of the road, m.
-        others: Cars and obstacles within `SIGHT`: x, y (m), yaw (rad), half the length and the width (m), speed
-            (m/s) and yaw rate (rad/s), shape (N, 7).
+        others: Cars and obstacles within `SIGHT`: x, y (m), yaw (rad), half the length and the width (m),
+            speed (m/s) and yaw rate (rad/s), shape (N, 7).
         age: How long ago the others were there, s.
     """
 
@@ -144,14 +144,15 @@ class RoadSight:
 
     @cached_property
     def _places(self) -> tuple[Floats, Floats]:
-        """Where the others were, as `RouteLine.locate` does, and their headings relative to the road's, rad."""
+        """Where the others were, as `RouteLine.locate`, and their headings relative to the road's, rad."""
         places = self._locate(self.others[:, :2])
         apart = self.others[:, 2] - places[:, 2]
-        return places, (apart + math.pi) % (2.0 * math.pi) - math.pi
+        return places, np.asarray((apart + math.pi) % (2.0 * math.pi) - math.pi)
 
     def standing(self) -> Floats:
         """Return what stands, as `foresee` does, shape (N, 4)."""
-        return self.foresee(np.zeros(1))[self.others[:, 5] < STANDING, 0]
+        now: Floats = self.foresee(np.zeros(1))[self.others[:, 5] < STANDING, 0]
+        return now
 
     def _locate(self, places: Floats) -> Floats:
         return self.line.locate(places, self.along - _ROAD_BEHIND, self.along + SIGHT + 30.0)

@@ -7,7 +7,6 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError
 
-
 _LEAST_LENGTH = 0.01
 """Distance of two points, m, that counts as none."""
 
