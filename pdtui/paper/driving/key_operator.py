@@ -8,11 +8,13 @@ from pdtui.paper.driving.key_effects import ACCELERATE, BRAKE, DEFAULT, LEFT, RI
 from pdtui.paper.driving.key_maneuvers import KeyManeuvers
 from pdtui.paper.driving.maneuver import (
     HORIZON,
+    INWARDS,
     WEAVING,
     Maneuver,
     TimesToConflict,
     next_standing,
     predict_times_to_conflict,
+    slips_off,
 )
 from pdtui.paper.driving.operator_memory import JudgementErrors, OperatorMemory
 from pdtui.paper.driving.road_sight import LANE_WIDTH, RoadSight
@@ -34,13 +36,12 @@ _SLOW = 2.0
 """Speed up to which a car turns back from an edge by itself, m/s."""
 _HALTED, _HALTED_TIME = 0.5, 2.0
 """Speed of a car that has halted, m/s, and the time after which it should have gone on, s."""
-_NEAR_EDGE, _SLIPPING_TIME, _INWARDS = 0.6, 0.4, 0.1
-"""Distance from an edge of the road that is too small now or after some time, m and s, and the angle by which
-the car must at least turn away from it, rad."""
 _NEAR_ENOUGH, _TOO_FAR = 0.3, 0.8
 """How far from the middle of a lane a lane change may end, before it and beyond it, m."""
 _ASKEW = 0.3
 """Angle to the road up to which a lane key may turn the car, rad."""
+_SIDEWAYS_ACCELERATION, _BEND_AHEAD = 5.5, (2.0, 5.0, 8.0)
+"""Acceleration to the side in a bend above which it brakes, m/s², and where it looks for one, m ahead."""
 _SETTLING = 0.6
 """Time after a lane key in which the car settles in its lane, s."""
 _BRAKE_TIME, _BRAKED_TIME = 0.5, 4.0
@@ -96,10 +97,12 @@ class KeyOperator:
         go_on = self._keys.go_on(seen)
         if latched in (LEFT, RIGHT) and self._is_done(seen, latched, go_on):
             return DEFAULT
-        if (key := self._slips_off(seen)) and key != latched:
+        if (key := {1: RIGHT, -1: LEFT}.get(slips_off(seen), latched)) != latched:
             return self._steer(seen, key, seen.lane)
         if not latched and (key := self._aside(seen)):
             return key
+        if seen.speed**2 * max(abs(seen.bend(ahead)) for ahead in _BEND_AHEAD) > _SIDEWAYS_ACCELERATION:
+            return BRAKE
         expected = predict_times_to_conflict(seen, go_on)
         if not self._must_act(seen, expected):
             return ""
@@ -111,7 +114,8 @@ class KeyOperator:
         if key not in (LEFT, RIGHT):
             return key
         away = expected.edge == expected.first
-        return self._steer(seen, key, seen.lane if away else seen.lane + (1 if key == LEFT else -1))
+        lane = seen.lane if away else seen.lane + (1 if key == LEFT else -1)
+        return self._steer(seen, key, min(max(lane, 0), seen.lanes - 1))
 
     def _options(self, seen: RoadSight, expected: TimesToConflict) -> list[Maneuver]:
         """Return what may be done: keys for lanes, where nobody crosses the road, and in time the brake."""
@@ -166,15 +170,8 @@ class KeyOperator:
         Into its own lane the car need only be turned back.
         """
         self._aim = seen.beside + seen.to_middle_of(lane)
-        self._askew = _INWARDS if lane == seen.lane else _ASKEW
+        self._askew = INWARDS if lane == seen.lane else _ASKEW
         return key
-
-    def _slips_off(self, seen: RoadSight) -> str:
-        """Return the key that leads back from an edge that the car is about to slip over, if it is."""
-        room, key, outwards = (seen.left, RIGHT, 1.0) if seen.left < seen.right else (seen.right, LEFT, -1.0)
-        turned = outwards * seen.heading
-        soon = room - max(0.0, turned - _INWARDS) * seen.speed * _SLIPPING_TIME
-        return key if soon < _NEAR_EDGE and turned > -_INWARDS else ""
 
     def _aside(self, seen: RoadSight) -> str:
         """Return the key that turns a slow car away from what stands close ahead of it, if anything does."""

@@ -19,6 +19,9 @@ STRAIGHTENING_TIME = 0.5
 """Time in which a policy turns the car back along the road, s."""
 WEAVING = 0.25
 """Angle to the road up to which a car straightens at once, rad."""
+_NEAR_EDGE, _SLIPPING_TIME, INWARDS = 0.6, 0.4, 0.1
+"""Distance from an edge of the road that is too small now or after some time, m and s, and the angle by which
+the car must at least turn away from it, rad."""
 _GAP_AHEAD, _GAP_ASIDE, _GAP_TO_EDGE = 1.5, 0.35, 0.5
 """Gaps that are too close, m: to others lengthways and sideways, and from the car's middle to an edge."""
 _SWING_TIME = 0.1
@@ -124,6 +127,14 @@ def predict_times_to_conflict(sight: RoadSight, maneuver: Maneuver, doubt: float
     kinds = stands, sight.followers, ~stands & ~sight.followers
     standing, along, across = (_first_time(close[kind].any(axis=0)) for kind in kinds)
     return TimesToConflict(standing, along, across, _first_time(out))
+
+
+def slips_off(sight: RoadSight) -> int:
+    """Return 1 if the car is about to slip over the edge on its left, −1 on its right, 0 if neither."""
+    room, side = (sight.left, 1) if sight.left < sight.right else (sight.right, -1)
+    turned = side * sight.heading
+    soon = room - max(0.0, turned - INWARDS) * sight.speed * _SLIPPING_TIME
+    return side if soon < _NEAR_EDGE and turned > -INWARDS else 0
 
 
 def next_standing(sight: RoadSight) -> tuple[float, float]:

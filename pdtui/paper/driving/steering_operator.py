@@ -22,6 +22,7 @@ from pdtui.paper.driving.maneuver import (
     Maneuver,
     predict_times_to_conflict,
     roll,
+    slips_off,
     swerve,
 )
 from pdtui.paper.driving.operator_memory import JudgementErrors, OperatorMemory
@@ -37,8 +38,9 @@ _LOOK_AHEAD, _LOOK_AHEAD_TIME = 5.0, 0.9
 """Distance of the place that it steers to: at rest, m, and per speed, s."""
 _WHEELBASE, _LARGEST_ANGLE = 2.47, math.radians(40.0)
 """Distance between the axles, m, and the angle of the wheels at full steering, rad."""
-_BRAKING, _HEADWAY, _STANDSTILL_GAP = 3.0, 1.2, 4.0
-"""How hard it plans to brake, m/s², and its distance from who is in front: per speed, s, and at rest, m."""
+_BRAKING, _HARD_BRAKING, _HEADWAY, _STANDSTILL_GAP = 3.0, 10.0, 1.2, 4.0
+"""How hard it plans to brake, and can brake, m/s², and its distance from who is in front: per speed, s, and
+at rest, m."""
 _SOON = 0.5
 """Time over which it judges how fast others get away, s."""
 _THROTTLE_GAIN = 0.3
@@ -102,6 +104,7 @@ class SteeringOperator:
             or expected.moving < PATIENCE_MOVING * patience
             or expected.crossing < PATIENCE_CROSSING * patience
             or (expected.edge < PATIENCE_EDGE * patience and abs(seen.heading) > WEAVING)
+            or slips_off(seen) != 0
             or self._halted * self._dt > 2.0
         )
 
@@ -136,10 +139,21 @@ class SteeringOperator:
         x, y = _place_ahead(road, distance, beside)
         angle = math.atan(2.0 * _WHEELBASE * y / max(x * x + y * y, 1.0))
         speed = min(CRUISING_SPEED, _bend_speed(road), self._following_speed(seen))
-        throttle = _THROTTLE_GAIN * (speed - seen.speed)
+        throttle = -1.0 if self._must_let_pass(seen) else _THROTTLE_GAIN * (speed - seen.speed)
+        if abs(seen.heading) > math.pi / 2:  # it was turned round, and the place is behind it
+            angle = -math.copysign(_LARGEST_ANGLE, seen.heading)
         return ManualControlValues(
             float(np.clip(angle / _LARGEST_ANGLE, -1.0, 1.0)), float(np.clip(throttle, -1.0, 1.0))
         )
+
+    def _must_let_pass(self, seen: RoadSight) -> bool:
+        """Return whether somebody crosses the road so that it is better to stop."""
+        here = np.zeros_like(TIMES)
+        goes = predict_times_to_conflict(seen, Maneuver("", roll(max(seen.speed, 3.0), 0.0), here))
+        if goes.crossing > PATIENCE_CROSSING * self._judgement.patience:
+            return False
+        stops = predict_times_to_conflict(seen, Maneuver("", roll(seen.speed, -_HARD_BRAKING), here))
+        return stops.crossing > goes.crossing
 
     def _following_speed(self, seen: RoadSight) -> float:
         """Return the speed at which the car does not run into what is in front of it on its way, m/s."""
