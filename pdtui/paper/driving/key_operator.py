@@ -188,6 +188,8 @@ class KeyOperator:
             return ""
         options = [self._keys.let_go(seen), *self._keys.lane_changes(seen)]
         outlooks = [(predict_times_to_conflict(seen, one, _DOUBT), one) for one in options]
+        if outlooks[0][0].crossing == outlooks[0][0].first < math.inf:
+            outlooks = outlooks[:1]
         free = [one.name for times, one in outlooks if math.isinf(times.first)]
         if free:
             return free[0]
