@@ -9,6 +9,7 @@ from pdtui.paper.driving.key_maneuvers import KeyManeuvers
 from pdtui.paper.driving.maneuver import (
     HORIZON,
     INWARDS,
+    ROOM_FOR_CROSSING,
     WEAVING,
     Maneuver,
     TimesToConflict,
@@ -21,7 +22,7 @@ from pdtui.paper.driving.road_sight import LANE_WIDTH, RoadSight
 
 PRESSES_PER_SECOND = 3
 """Largest number of key presses in any second."""
-PATIENCE_STANDING, PATIENCE_MOVING, PATIENCE_CROSSING, PATIENCE_EDGE = 4.0, 1.2, 2.6, 1.5
+PATIENCE_STANDING, PATIENCE_MOVING, PATIENCE_CROSSING, PATIENCE_EDGE = 4.0, 1.2, 3.2, 1.5
 """Times before a conflict at which it acts: with what stands, with who drives along the road, with who
 crosses it, and with an edge, s."""
 URGENT = 1.1
@@ -103,7 +104,7 @@ class KeyOperator:
             return key
         if seen.speed**2 * max(abs(seen.bend(ahead)) for ahead in _BEND_AHEAD) > _SIDEWAYS_ACCELERATION:
             return BRAKE
-        expected = predict_times_to_conflict(seen, go_on)
+        expected = predict_times_to_conflict(seen, go_on, ROOM_FOR_CROSSING)
         if not self._must_act(seen, expected):
             return ""
         outlooks = [(predict_times_to_conflict(seen, one), one) for one in self._options(seen, expected)]
@@ -179,15 +180,17 @@ class KeyOperator:
         if seen.speed > _SLOW or gap > STOPPING_ROOM:
             return ""
         side = -1.0 if beside > 0.0 else 1.0
+        if (seen.left if side > 0.0 else seen.right) < LANE_WIDTH or side * seen.heading > _ASKEW:
+            return ""
         self._aim, self._askew = seen.beside + beside + side * LANE_WIDTH, _ASKEW
-        return RIGHT if beside > 0.0 else LEFT
+        return LEFT if side > 0.0 else RIGHT
 
     def _release(self, seen: RoadSight) -> str:
         """Return the key with which a braked car can go on: the default key, or one for a lane."""
         if self._keys.time_since() < _BRAKE_TIME or (seen.speed > _SLOW and abs(seen.heading) > WEAVING):
             return ""
         options = [self._keys.let_go(seen), *self._keys.lane_changes(seen)]
-        outlooks = [(predict_times_to_conflict(seen, one, _DOUBT), one) for one in options]
+        outlooks = [(predict_times_to_conflict(seen, one, ROOM_FOR_CROSSING, _DOUBT), one) for one in options]
         if outlooks[0][0].crossing == outlooks[0][0].first < math.inf:
             outlooks = outlooks[:1]
         free = [one.name for times, one in outlooks if math.isinf(times.first)]

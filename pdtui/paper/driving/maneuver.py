@@ -24,6 +24,8 @@ _NEAR_EDGE, _SLIPPING_TIME, INWARDS = 0.6, 0.4, 0.1
 the car must at least turn away from it, rad."""
 _GAP_AHEAD, _GAP_ASIDE, _GAP_TO_EDGE = 1.5, 0.35, 0.5
 """Gaps that are too close, m: to others lengthways and sideways, and from the car's middle to an edge."""
+ROOM_FOR_CROSSING = 1.5
+"""How much more room to leave for those who cross the road, m."""
 _SWING_TIME = 0.1
 """Time in which the car ends a turn that nobody wants, s."""
 _TURNING_SPEED = 5.0
@@ -101,12 +103,15 @@ def swerve(sight: RoadSight, ahead: Floats, turns: Floats, turn_now: float = 0.0
     return np.array(places)
 
 
-def predict_times_to_conflict(sight: RoadSight, maneuver: Maneuver, doubt: float = 0.0) -> TimesToConflict:
+def predict_times_to_conflict(
+    sight: RoadSight, maneuver: Maneuver, room: float = 0.0, doubt: float = 0.0
+) -> TimesToConflict:
     """Return when a maneuver comes too close to what is seen, if everybody else goes on as before.
 
     Args:
         sight: What there is to see.
         maneuver: The maneuver.
+        room: How much more room to leave lengthways for those who cross the road, m.
         doubt: How much faster or slower than seen somebody who crosses the road may also turn, rad/s.
     """
     if doubt:
@@ -118,13 +123,14 @@ def predict_times_to_conflict(sight: RoadSight, maneuver: Maneuver, doubt: float
     out |= (maneuver.beside < _GAP_TO_EDGE - sight.right) & (maneuver.beside < -0.1)
     ahead, beside, half_length, half_width = np.moveaxis(sight.foresee(TIMES), -1, 0)
     apart, aside = ahead - maneuver.ahead, beside - maneuver.beside
-    close = np.abs(apart) < half_length + CAR_HALF_LENGTH + _GAP_AHEAD
+    stands = sight.others[:, 5] < STANDING
+    kinds = stands, sight.followers, ~stands & ~sight.followers
+    gap = np.where(kinds[2], _GAP_AHEAD + room, _GAP_AHEAD)[:, None]
+    close = np.abs(apart) < half_length + CAR_HALF_LENGTH + gap
     close &= np.abs(aside) < half_width + CAR_HALF_WIDTH + _GAP_ASIDE
     # Who comes from behind in the same lane keeps away by himself.
     follower = (ahead[:, :1] < 0.0) & (np.abs(beside[:, :1]) < half_width[:, :1] + CAR_HALF_WIDTH)
     close &= ~follower | (np.abs(maneuver.beside) > _LANE_LEFT)
-    stands = sight.others[:, 5] < STANDING
-    kinds = stands, sight.followers, ~stands & ~sight.followers
     standing, along, across = (_first_time(close[kind].any(axis=0)) for kind in kinds)
     return TimesToConflict(standing, along, across, _first_time(out))
 

@@ -17,6 +17,7 @@ from pdtui.paper.driving.key_operator import (
 )
 from pdtui.paper.driving.maneuver import (
     HORIZON,
+    ROOM_FOR_CROSSING,
     TIMES,
     WEAVING,
     Maneuver,
@@ -149,7 +150,8 @@ class SteeringOperator:
     def _must_let_pass(self, seen: RoadSight) -> bool:
         """Return whether somebody crosses the road so that it is better to stop."""
         here = np.zeros_like(TIMES)
-        goes = predict_times_to_conflict(seen, Maneuver("", roll(max(seen.speed, 3.0), 0.0), here))
+        ahead = roll(max(seen.speed, 3.0), 0.0)
+        goes = predict_times_to_conflict(seen, Maneuver("", ahead, here), ROOM_FOR_CROSSING)
         if goes.crossing > PATIENCE_CROSSING * self._judgement.patience:
             return False
         stops = predict_times_to_conflict(seen, Maneuver("", roll(seen.speed, -_HARD_BRAKING), here))
