@@ -42,6 +42,8 @@ _WHEELBASE, _LARGEST_ANGLE = 2.47, math.radians(40.0)
 _BRAKING, _HARD_BRAKING, _HEADWAY, _STANDSTILL_GAP = 3.0, 10.0, 1.2, 4.0
 """How hard it plans to brake, and can brake, m/s², and its distance from who is in front: per speed, s, and
 at rest, m."""
+_SLIPPING_SPEED = 3.0
+"""Speed to which it brakes near an edge, m/s."""
 _SOON = 0.5
 """Time over which it judges how fast others get away, s."""
 _THROTTLE_GAIN = 0.3
@@ -136,11 +138,13 @@ class SteeringOperator:
     def _drive(self, seen: RoadSight) -> ManualControlValues:
         road = seen.road_ahead()
         beside = seen.to_middle_of(self._target) + seen.beside
-        distance = _LOOK_AHEAD + _LOOK_AHEAD_TIME * seen.speed
+        slips = slips_off(seen) != 0
+        distance = _LOOK_AHEAD + (0.0 if slips else _LOOK_AHEAD_TIME * seen.speed)
         x, y = _place_ahead(road, distance, beside)
         angle = math.atan(2.0 * _WHEELBASE * y / max(x * x + y * y, 1.0))
         speed = min(CRUISING_SPEED, _bend_speed(road), self._following_speed(seen))
-        throttle = -1.0 if self._must_let_pass(seen) else _THROTTLE_GAIN * (speed - seen.speed)
+        stops = self._must_let_pass(seen) or (slips and seen.speed > _SLIPPING_SPEED)
+        throttle = -1.0 if stops else _THROTTLE_GAIN * (speed - seen.speed)
         if abs(seen.heading) > math.pi / 2:  # it was turned round, and the place is behind it
             angle = -math.copysign(_LARGEST_ANGLE, seen.heading)
         return ManualControlValues(

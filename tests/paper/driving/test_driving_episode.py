@@ -129,10 +129,8 @@ def test_the_wheel_keeps_the_car_on_the_road_and_counts_as_involvement(car: Robo
         traffic = records[-1].traffic
     assert all(record.involved for record in records)
     assert not any(record.ended or record.cost for record in records)
-    speed, left, right = (
-        loop.attributes[car.attribute_index(name)] for name in ("speed", "left distance", "right distance")
-    )
-    assert speed > 5.0
+    left, right = (loop.attributes[car.attribute_index(name)] for name in ("left distance", "right distance"))
+    assert max(record.attributes[car.attribute_index("speed")] for record in records) > 5.0
     assert min(left, right) > 1.0
     sight = SightReader(car).look(traffic)
     assert (sight.left, sight.right) == (left, right)
