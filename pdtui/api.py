@@ -128,11 +128,11 @@ def dissect(config: DissectionConfig) -> Dissection:
     load a robot and a policy given by name; an object stays in this process, with the same result. A notebook
     shows the result as a table that can be sorted; `Dissection.to_pandas` gives a data frame.
 
-    >>> import pdtui
+    >>> import dataclasses, pdtui
     >>> from torch import nn
     >>> network = nn.Sequential(nn.Linear(27, 4), nn.Tanh(), nn.Linear(4, 8))
     >>> _ = nn.init.constant_(network[2].weight, 0.01)
-    >>> quick = pdtui.QUICK_DISSECTION
+    >>> quick = dataclasses.replace(pdtui.QUICK_DISSECTION, controls=4, held_steps=40, mover_steps=20)
     >>> found = pdtui.dissect("ant", network, episodes=1, settings=quick, budget_minutes=0.0)
     >>> found.screen.effects.shape[0], found.matching.discrepancy.shape[1]  # a row, a column for each unit
     (4, 4)

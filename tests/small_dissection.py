@@ -27,6 +27,7 @@ SMALL = DissectionSettings(
     judge_starts=3,
     controls=6,
     held_steps=20,
+    mover_steps=30,
     steering=SteeringSettings(
         starts=2, units=1, values=(3.0,), lengths=(1.0,), readings=(2.0,), factors=(2.0,), random=2
     ),

@@ -61,6 +61,7 @@ _HELP = "↵ close".encode()
 _PAST = b" steps ago"
 """In the status line while the past is shown."""
 
+_COLORS = re.compile(rb"\x1b\[[0-9;?]*[a-zA-Z]")
 _PACE = re.compile("(?:▶|⏸ (paused) at) ([0-9.]+)×".encode())
 _QUERY, _ANSWER, _FRAME = b"\x1b[?2026$p", b"\x1b[?2026;2$y", b"\x1b[?2026h"
 """Asked whether frames may be bracketed; asked so, the program brackets them, and they can be counted."""
@@ -223,7 +224,7 @@ def soak(
                 raise AssertionError(
                     f"the screen ended after {number} inputs, of which the last: "
                     f"{[one[:60] for one in last]}; "
-                    f"it said {terminal.seen[-3000:].decode(errors='replace')}"
+                    f"it said {_COLORS.sub(b'', terminal.seen[-20_000:]).decode(errors='replace')[-6000:]}"
                 )
             if number % _UNSEEN == 0:
                 terminal.wait_for_frame()

@@ -14,6 +14,7 @@ DRIVING = (
     *(b"\x1b[A", b"\x1b[B", b"\x1b[C", b"\x1b[D", b"+", b"-", b"r", b"\x7f"),
     *(b"p", b"p", b"n", b",", b".", b"v", b"?", b"?", b"z", b"\t"),
     *(b"<", b"\x1b[F", b"\x1b[F"),  # into the past, and back
+    *(b"\x1b", b"\x1b"),  # out of a page that takes the keys, to the drive
 )
 _CONTROL = [bytes([code]) for code in range(0x20) if code not in (0x03, 0x0E, 0x1B)]
 _FUNCTION = [b"\x1bO" + bytes([code]) for code in b"PQRSABCDFH"] + [

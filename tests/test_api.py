@@ -95,7 +95,7 @@ def test_a_recorded_drive_of_a_live_network_replays_bit_for_bit_with_a_rewind(
 def test_a_live_network_is_dissected(world: object) -> None:
     assert callable(world)
     robot, policy, _ = world()
-    settings = replace(pdtui.QUICK_DISSECTION, controls=8, judge_starts=3, held_steps=60)
+    settings = replace(pdtui.QUICK_DISSECTION, controls=8, judge_starts=3, held_steps=60, mover_steps=30)
     found = pdtui.dissect(robot, policy, episodes=2, settings=settings)
     assert found.screen.effects.shape[:2] == (policy.units, 2)
     assert np.abs(np.nan_to_num(found.screen.effects)).max() > 0

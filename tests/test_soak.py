@@ -13,10 +13,8 @@ from tests.soak import WINDOWS, soak
 pytestmark = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads memory from /proc")
 
 
-# Slow until it is known why a paused screen stops following resizes here; it fails, and the drive lives on.
-@pytest.mark.slow
 def test_random_input_leaves_a_session_that_repeats(map_path: Path, tmp_path: Path) -> None:
-    done = soak(tmp_path, map_path, 800, random.Random(1), count=1)
+    done = soak(tmp_path, map_path, 1500, random.Random(1), count=1)
     assert done.replay.identical
     assert done.events > 50
     assert done.resizes > 5

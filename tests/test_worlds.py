@@ -160,7 +160,7 @@ def test_dissect_takes_an_environment_and_its_map_drives(tmp_path: Path) -> None
     output = tmp_path / "out.toml"
     weights = tmp_path / "small.safetensors"
     result = run(
-        "dissect", "--env", "Pendulum-v1", "--policy", weights, "-o", output, "--episodes", 1,
+        "dissect", "--env", "Pendulum-v1", "--policy", weights, "-o", output, "--quick",
         "--budget", 0.001, "--workers", 2, "--json", "--figures", tmp_path / "figures",
     )  # fmt: skip
     assert result.exit_code == 0, result.output

@@ -6,6 +6,7 @@ import os
 import select
 from codecs import getincrementaldecoder
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 
 from textual._xterm_parser import BRACKETED_PASTE_END, BRACKETED_PASTE_START, XTermParser
 from textual.drivers.linux_driver import LinuxDriver
@@ -23,6 +24,16 @@ class TerminalDriver(LinuxDriver):
     Bytes that are not UTF-8 (of a terminal set to another encoding, or of a mouse that reports in the oldest
     form) and numbers of keys that are no characters would otherwise end the application.
     """
+
+    def _get_terminal_size(self) -> tuple[int, int]:
+        """Ask the terminal; Textual would believe COLUMNS and LINES, which a shell that exports them never
+        changes when its window does.
+        """
+        with suppress(OSError):
+            columns, lines = os.get_terminal_size(self.fileno)
+            if columns and lines:
+                return columns, lines
+        return super()._get_terminal_size()
 
     def write(self, data: str) -> None:
         """Write to the terminal; once it is gone, Textual would wait for its writer, which has died."""

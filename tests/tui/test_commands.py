@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from rich.style import Style
 from textual.color import Color
+from textual.command import CommandList
+from textual.events import Click
 from textual.widgets import Input
 
 from pdtui.core.errors import SettingsError
@@ -42,6 +44,45 @@ async def test_the_palette_latches_a_behavior_and_keeps_the_maps_keys_out(make_a
         await pilot.press("escape")
         await pilot.pause(0.2)
         assert not app.choosing_command
+
+
+async def test_a_palette_that_is_closed_twice_at_once_leaves_the_drive(make_app: MakeApp) -> None:
+    app, connection = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await played(pilot, connection)
+        await pilot.press("ctrl+p")
+        await pilot.press(*"help")
+        await pilot.pause(0.5)
+        for _ in range(2):  # a second one before the first has closed the palette
+            app.screen.post_message(Click(app.screen, 0, 0, 0, 0, 1, False, False, False, 0, 0))
+        await pilot.pause(0.3)
+        assert not app.choosing_command
+        await pilot.press(next(iter(app.map.behaviors.values())).key)
+        assert len(connection.pressed) == 1
+
+
+async def test_a_palette_opens_while_the_one_before_closes(make_app: MakeApp) -> None:
+    app, connection = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await played(pilot, connection)
+        await pilot.press("ctrl+p")
+        app.pop_screen()
+        app.action_command_palette()
+        await pilot.pause(0.5)
+        assert app.choosing_command
+
+
+async def test_a_palette_that_fails_closes_and_the_drive_goes_on(make_app: MakeApp) -> None:
+    app, connection = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await played(pilot, connection)
+        await pilot.press("ctrl+p")
+        await app.screen.query_one(CommandList).remove()  # as it is gone while the palette closes
+        await pilot.press("a")
+        await pilot.pause(0.3)
+        assert not app.choosing_command
+        await pilot.press(next(iter(app.map.behaviors.values())).key)
+        assert len(connection.pressed) == 1
 
 
 async def test_the_palette_lists_behaviors_keys_and_themes(make_app: MakeApp) -> None:

@@ -13,8 +13,8 @@ from pdtui.core.outcome import Outcome
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.paper.driving.drive_operators import DriveOperator, SharedControl
+from pdtui.paper.scored_session import read_scored_session
 from pdtui.robots.road.road_scenes import TEST_SCENES
-from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
@@ -108,17 +108,8 @@ def read_episode(path: Path, robot: str) -> tuple[DrivingScore, str, SharedContr
         SessionError: The session cannot be read, is of another robot, does not start in a test scene, was
             rewound, or stops before the end of its episode.
     """
-    session = read_session(path)
+    session = read_scored_session(path, robot, TEST_STARTS)
     info = session.info
-    if info.robot != robot or info.start not in TEST_STARTS:
-        start = f"start '{info.start}'" if info.start else "the usual start"
-        raise SessionError(
-            f"{path}: expected a drive of {robot} with a start from '{TEST_STARTS[0]}' to "
-            f"'{TEST_STARTS[-1]}', found one of {info.robot} with {start}"
-        )
-    back = next((event.step for event in session.events if event.kind == "rewind"), None)
-    if back is not None:
-        raise SessionError(f"{path}: it was rewound at step {back}; a scored drive must not be rewound")
     count = int((session.episodes == 0).sum())
     outcome = session.outcomes.get(count - 1)
     if outcome is None:

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from pdtui.core.atomic_file import write_file
 from pdtui.core.drive_events import DriveEvent
-from pdtui.core.errors import SessionError
 from pdtui.core.outcome import Outcome
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import events_of_pressed_keys, run_episode
-from pdtui.driving.keystrokes import format_keystrokes
 from pdtui.paper.forest.key_motion_model import ObservedDrive
 from pdtui.paper.forest.key_pressers import KeyPresser
 from pdtui.paper.forest.scripted_operator import operator_keys
+from pdtui.paper.scored_session import read_attribute, read_scored_session, record_scored_drive
 from pdtui.robots.legged.terrain import AHEAD
-from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
@@ -91,10 +88,11 @@ def record_forest_episode(
     Raises:
         SessionError: the session already exists, or cannot be written.
     """
-    with SessionRecorder(path, replace(loop.info, activations=activations)) as recorder:
-        run, events = drive_forest_episode(loop, steps, presser, recorder)
-    write_file(path.with_suffix(".keys"), format_keystrokes(events), SessionError)
-    return run
+
+    def drive(recorder: SessionRecorder) -> tuple[ForestEpisodeScore, tuple[DriveEvent, ...]]:
+        return drive_forest_episode(loop, steps, presser, recorder)
+
+    return record_scored_drive(loop, path, activations, drive)
 
 
 def read_forest_episode(path: Path, robot: str, steps: int) -> tuple[ForestEpisodeScore, str]:
@@ -103,23 +101,9 @@ def read_forest_episode(path: Path, robot: str, steps: int) -> tuple[ForestEpiso
     Raises:
         SessionError: the session cannot be read, is of another robot or start, or was rewound.
     """
-    session = read_session(path)
+    session = read_scored_session(path, robot, [FOREST], ["distance"])
     info = session.info
-    if (info.robot, info.start) != (robot, FOREST):
-        where = f"start '{info.start}'" if info.start else "the usual start"
-        raise SessionError(
-            f"{path}: expected a drive of {robot} with start '{FOREST}', "
-            f"found one of {info.robot} with {where}"
-        )
-    back = next((event.step for event in session.events if event.kind == "rewind"), None)
-    if back is not None:
-        raise SessionError(f"{path}: it was rewound at step {back}; a scored drive must not be rewound")
-    if not session.steps:
-        raise SessionError(f"{path}: the session has no steps")
-    names = [attribute.name for attribute in info.attributes]
-    if "distance" not in names:
-        raise SessionError(f"{path}: expected the attribute 'distance'; available: {', '.join(names)}")
-    distances = session.attributes[:, names.index("distance")]
+    distances = read_attribute(session, "distance")
     ends = [*np.flatnonzero(session.episodes != 0), *(np.flatnonzero(distances >= AHEAD) + 1), steps]
     count = int(min([session.steps, *ends]))
     run = _score(

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from pdtui.core.atomic_file import write_file
 from pdtui.core.drive_events import DriveEvent
-from pdtui.core.errors import RobotError, SessionError
+from pdtui.core.errors import RobotError
 from pdtui.core.outcome import Outcome, OutcomeCounts, count_outcomes
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import events_of_pressed_keys
-from pdtui.driving.keystrokes import format_keystrokes
 from pdtui.paper.parkour.course_operator import CourseOperator, CourseView
+from pdtui.paper.scored_session import read_attribute, read_scored_session, record_scored_drive
 from pdtui.robots.parkour.parkour_run import ParkourRun
-from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_schema import ActivationsKept
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
@@ -113,10 +111,11 @@ def record_course(
     Raises:
         SessionError: the session already exists, or cannot be written.
     """
-    with SessionRecorder(path, replace(loop.info, activations=activations)) as recorder:
-        score, events = drive_through_course(loop, steps, operator, recorder)
-    write_file(path.with_suffix(".keys"), format_keystrokes(events), SessionError)
-    return score
+
+    def drive(recorder: SessionRecorder) -> tuple[CourseScore, tuple[DriveEvent, ...]]:
+        return drive_through_course(loop, steps, operator, recorder)
+
+    return record_scored_drive(loop, path, activations, drive)
 
 
 def read_course_score(path: Path, robot: str, steps: int) -> tuple[CourseScore, str]:
@@ -125,24 +124,11 @@ def read_course_score(path: Path, robot: str, steps: int) -> tuple[CourseScore, 
     Raises:
         SessionError: the session cannot be read, is of another robot or start, or was rewound.
     """
-    session = read_session(path)
+    session = read_scored_session(path, robot, [PARKOUR], [_PASSED, _ATTEMPTS])
     info = session.info
-    if (info.robot, info.start) != (robot, PARKOUR):
-        where = f"start '{info.start}'" if info.start else "the usual start"
-        raise SessionError(
-            f"{path}: expected a drive of {robot} with start '{PARKOUR}', "
-            f"found one of {info.robot} with {where}"
-        )
-    back = next((event.step for event in session.events if event.kind == "rewind"), None)
-    if back is not None:
-        raise SessionError(f"{path}: it was rewound at step {back}; a scored drive must not be rewound")
-    names = [attribute.name for attribute in info.attributes]
-    missing = [name for name in (_PASSED, _ATTEMPTS) if name not in names]
-    if missing or not session.steps:
-        raise SessionError(f"{path}: expected steps with the attributes '{_PASSED}' and '{_ATTEMPTS}'")
     arrived = [step + 1 for step, one in session.outcomes.items() if one is Outcome.ARRIVED]
     end = min([session.steps, steps, *arrived])
-    passed, attempts = (session.attributes[:end, names.index(name)] for name in (_PASSED, _ATTEMPTS))
+    passed, attempts = (read_attribute(session, name)[:end] for name in (_PASSED, _ATTEMPTS))
     # The number of the first attempt at the obstacle that comes after as many.
     first = np.array([attempts[np.searchsorted(passed, number)] for number in passed])
     given_up = np.flatnonzero(attempts - first >= ATTEMPTS_AT_ONE) + 1

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime
 
+from textual._context import active_message_pump
 from textual.binding import Binding
 from textual.command import CommandPalette
+from textual.message_pump import MessagePump
+from textual.worker import WorkerFailed, get_current_worker
 
 from pdtui.core.reserved_keys import KEY_TABLE
 from pdtui.core.settings.settings_file import ALWAYS_QUITS
@@ -72,6 +75,26 @@ class KeyBoundApp(ThemedApp[str], inherit_bindings=False):
         """Return whether a binding means anything for this robot."""
         del name
         return True
+
+    def action_command_palette(self) -> None:
+        """Open the command palette; without an id, since the one before may still be closing."""
+        if not CommandPalette.is_open(self):
+            self.push_screen(CommandPalette())
+
+    def _handle_exception(self, error: Exception) -> None:
+        """End with the error, unless the palette failed: it only closes, and the drive goes on.
+
+        Textual's palette raises when a click or a key reaches an entry or a list that has just gone.
+        """
+        failed: MessagePump | None = active_message_pump.get(None)
+        if isinstance(error, WorkerFailed):
+            failed = get_current_worker().node
+        while failed is not None and not isinstance(failed, CommandPalette):
+            failed = failed._parent
+        if failed is None:
+            super()._handle_exception(error)
+        elif failed is self.screen:
+            self.call_later(self.pop_screen)
 
     @property
     def choosing_command(self) -> bool:

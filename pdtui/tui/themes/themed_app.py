@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from textual import constants
 from textual.app import App
+from textual.await_complete import AwaitComplete
 from textual.theme import BUILTIN_THEMES, Theme
 
 from pdtui.core.errors import SettingsError
@@ -51,6 +52,13 @@ class ThemedApp(App[Result]):
     @property
     def available_themes(self) -> dict[str, Theme]:
         return dict(list_themes())
+
+    def pop_screen(self) -> AwaitComplete:
+        """Close the screen on top; the last one stays.
+
+        Two quick keys or clicks may both close the command palette, the second one when it is gone already.
+        """
+        return super().pop_screen() if len(self.screen_stack) > 1 else AwaitComplete()
 
     def watch_theme(self, name: str) -> None:
         """Paint with the colours of a theme that was chosen while the application runs."""
