@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, Obs
 from pdtui.policies.weights.weights_file import find_weights_file
 from pdtui.robots import RobotSpec, open_robot
 from pdtui.robots.robot import Robot
+from pdtui.sessions.writer.session_file import ExistingFile
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.choosing.drive_map import choose_drive_map
 from pdtui.stimulation.map_robot_options import combine_map_and_robot
@@ -93,18 +93,15 @@ def load_policy(
     """
     sha256, found = "", None
     if not isinstance(policy, nn.Module):
-        path = find_weights_file(str(policy))
-        found = policy_loading.read_policy_of_another_program(path)
+        found = policy_loading.read_policy_of_another_program(path := find_weights_file(str(policy)))
         if found is not None and found.form == "torchscript":
             policy, name, sha256 = build_torchscript(found), name or path.stem, found.sha256
     with nullcontext() if robot is None else open_robot(robot) as world:
         if not isinstance(policy, nn.Module):
+            of = None if world is None else world.name
+            spaces = None if world is None else ObservationActionSpaces.of_world(world)
             return policy_loading.load_policy(
-                policy,
-                None if world is None else world.name,
-                import_options=import_options,
-                spaces=None if world is None else ObservationActionSpaces.of_world(world),
-                found=found,
+                policy, of, import_options=import_options, spaces=spaces, found=found
             )
         return policy_from_network(
             policy,
@@ -212,8 +209,8 @@ def drive(
     with open_robot(robot) as world:
         loop = build_control_loop(config, world, None if isinstance(policy, str | Path) else policy)
         presses = read_keystrokes(Path(keys), stimulation_map) if isinstance(keys, str | Path) else keys or {}
-        open_recorder = partial(SessionRecorder, existing="replace" if overwrite else "refuse")
-        recorder = open_recorder(Path(record), loop.info) if record is not None else None
+        existing: ExistingFile = "replace" if overwrite else "refuse"
+        recorder = None if record is None else SessionRecorder(Path(record), loop.info, existing=existing)
         with progress_bar("driving", quiet=not progress) as advance:
             return collect_drive_arrays(loop, presses, steps, recorder, progress=advance, minutes=minutes)
 
@@ -223,22 +220,23 @@ def replay(
     *,
     robot: Robot | None = None,
     policy: str | Path | nn.Module | Policy | None = None,
+    minutes: float | None = None,
     progress: bool = False,
     **judging: Any,
 ) -> ReplayResult:
     """Run a session again and compare every step.
 
-    >>> import pdtui, tempfile, pathlib
+    >>> import pdtui, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = pathlib.Path(folder) / "walk.rrd"
-    ...     _ = pdtui.drive("ant", keys={10: "x"}, steps=30, record=path)
-    ...     print(pdtui.replay(path).first_difference)
+    ...     _ = pdtui.drive("ant", keys={10: "x"}, steps=30, record=f"{folder}/walk.rrd")
+    ...     print(pdtui.replay(f"{folder}/walk.rrd").first_difference)
     None
 
     Args:
         session: File of the session.
         robot: The robot, if the session's cannot be built from its name.
         policy: The policy, if the session's is not where its map says.
+        minutes: Time after which the replay ends with the steps compared so far.
         progress: Show a progress bar on standard error.
         judging: ``strict``, ``tolerance``, ``required_steps`` and ``force``, as for
             `pdtui.driving.session_replay.replay_session`.
@@ -248,4 +246,5 @@ def replay(
     """
     given = str(policy or "") if policy is None or isinstance(policy, str | Path) else policy
     with progress_bar("replaying", quiet=not progress) as advance:
-        return replay_session(Path(session), policy=given, robot=robot, progress=advance, **judging)
+        judging |= {"robot": robot, "minutes": minutes, "progress": advance}
+        return replay_session(Path(session), policy=given, **judging)

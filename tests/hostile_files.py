@@ -128,7 +128,7 @@ TORCH: dict[str, Callable[[], bytes]] = {
         {f"{n}.weight": tensor_opcodes((2048, 2048), (2048, 1), 2048 * 2048) for n in range(8_000)},
         numbers=2048 * 2048,
     ),
-    "a quantised tensor": lambda: state_dict({"w": b"ctorch._utils\n_rebuild_qtensor\n)R"}),
+    "a quantized tensor": lambda: state_dict({"w": b"ctorch._utils\n_rebuild_qtensor\n)R"}),
     "a call": lambda: state_dict({"w": b"cos\nsystem\nX\x04\x00\x00\x00true\x85R"}),
     "a long pickle": lambda: zipped({"a/data.pkl": b"\x80\x02" + b"]" * 60_000_000 + b"."}),
     "one more file at its end": lambda: zipped({"a/data.pkl": b"\x80\x02}."}) + b"x" * (80 << 20),
@@ -260,7 +260,7 @@ KINDS: dict[str, tuple[str, dict[str, Callable[[], bytes]], Callable[[Path], tup
     "statistics": (
         ".json",
         STATISTICS,
-        lambda path: (*_convert(path.with_name("plain.npz")), "--normaliser", str(path)),
+        lambda path: (*_convert(path.with_name("plain.npz")), "--normalizer", str(path)),
     ),
     "map": (".toml", MAPS, lambda path: _drive("--map", str(path), "--policy", "nothing")),
     "name of a policy": (".toml", POLICY_NAMES, lambda path: _drive("--map", str(path))),

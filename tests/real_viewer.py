@@ -185,6 +185,6 @@ def free_port() -> int:
 
 
 def is_blank(picture: NDArray[np.uint8]) -> bool:
-    """Whether nearly all of a picture is one colour."""
+    """Whether nearly all of a picture is one color."""
     _, counts = np.unique(picture.reshape(-1, 3), axis=0, return_counts=True)
     return bool(counts.max() > 0.98 * counts.sum())

@@ -21,7 +21,7 @@ from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 
 LANE, LENGTH = 3.5, 300.0
 SPEED, TRUCK_SPEED = 1.0, 0.5
-"""Metres per control step."""
+"""Meters per control step."""
 APPEARS, VANISHES = 4, 10
 """Control steps at whose end the truck is there for the first time, and no longer there."""
 CAR = Link("body", 0, "box", (2.3, 0.9, 0.7), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))

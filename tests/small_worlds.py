@@ -173,13 +173,13 @@ def trained_conv() -> ConvNet:
     wanted = torch.from_numpy(np.where(ahead[:, 0] != 0, along_x, along_y))
     images = torch.from_numpy(np.array([draw(state) for state in states], np.float32))
     network = ConvNet()
-    optimiser = torch.optim.Adam(network.parameters(), 1e-2)
+    optimizer = torch.optim.Adam(network.parameters(), 1e-2)
     for epoch in range(24):
         for rows in torch.randperm(len(states), generator=torch.Generator().manual_seed(epoch)).split(64):
             loss = nn.functional.cross_entropy(network(images[rows]), wanted[rows])
-            optimiser.zero_grad()
+            optimizer.zero_grad()
             loss.backward()
-            optimiser.step()
+            optimizer.step()
     return network
 
 
@@ -200,13 +200,13 @@ def trained_lstm() -> LstmNet:
             noise = 0.3 * rng.standard_normal() if row % 2 else 0.0
             robot.step(wanted[step, row] + np.float32(noise))
     network = LstmNet()
-    optimiser = torch.optim.Adam(network.parameters(), 2e-2)
+    optimizer = torch.optim.Adam(network.parameters(), 2e-2)
     inputs, targets = torch.from_numpy(seen), torch.from_numpy(wanted)
     for _ in range(150):
         loss = nn.functional.mse_loss(network.out(network.lstm(inputs)[0]), targets)
-        optimiser.zero_grad()
+        optimizer.zero_grad()
         loss.backward()
-        optimiser.step()
+        optimizer.step()
     return network
 
 

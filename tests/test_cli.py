@@ -168,7 +168,7 @@ def test_bench_prints_all_parts(map_path: Path) -> None:
             ["dissect", "ant", "--set", "window=kaiser", "-o", "OUT"],
             "setting 'window': expected blackman|hann",
         ),
-        (["dissect", "ant", "--set", "colour", "-o", "OUT"], "setting 'colour': expected NAME=VALUE"),
+        (["dissect", "ant", "--set", "color", "-o", "OUT"], "setting 'color': expected NAME=VALUE"),
         (["replay", "no.rrd"], "pdtui: no.rrd"),
         (["replay", "KEYS"], "keys.txt"),
         (["dissect", "ant", "--policy", "no.safetensors", "-o", "OUT"], "pdtui: no policy 'no.safetensors'"),
@@ -315,6 +315,7 @@ def test_optional_rooms_can_be_deleted(map_path: Path, tmp_path: Path) -> None:
         ("paper", ("evaluate", "ant", "--map", map_path, "--experiment", "forest")),
         ("training", ("train", "ant")),
         ("benchmarks", ("bench", "loop", "ant", "--map", map_path)),
+        ("study", ("study", "matching", "--list")),
     ]
     for room, line in refused:
         done = run_copy(*line)

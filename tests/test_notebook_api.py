@@ -57,6 +57,16 @@ def test_a_drive_ends_after_its_time(tmp_path: Path) -> None:
     assert pdtui.replay(path).first_difference is None
 
 
+def test_a_replay_ends_after_its_time_and_says_what_it_left(tmp_path: Path) -> None:
+    path = tmp_path / "drive.rrd"
+    pdtui.drive("ant", steps=60, record=path)
+    replay = pdtui.replay(path, minutes=1e-9)
+    assert (replay.steps, replay.left, replay.passed) == (1, 59, True)
+    assert replay.verdict == "identical: 1 step; the time was over before the other 59"
+    whole = pdtui.replay(path, minutes=10.0)
+    assert (whole.left, whole.verdict) == (0, "identical: 60 steps")
+
+
 def test_progress_is_shown_on_standard_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "drive.rrd"
     pdtui.drive("ant", steps=20, record=path, progress=True)
@@ -85,7 +95,7 @@ def test_a_notebook_shows_a_drive_as_curves_and_a_frame() -> None:
 
 def test_a_notebook_shows_a_dissection_as_a_table_and_a_frame(dissection: Dissection) -> None:
     html = ElementTree.fromstring(f"<div>{dissection._repr_html_()}</div>")
-    pairs = len(dissection.judgement.confirmations)
+    pairs = len(dissection.judgment.confirmations)
     assert len(html.findall(".//tbody/tr")) == pairs > 0
     pytest.importorskip("pandas")
     frame = dissection.to_pandas()

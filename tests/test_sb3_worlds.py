@@ -40,11 +40,11 @@ def strict(text: str) -> Any:
 )
 def test_a_policy_is_dissected_measured_driven_and_replayed(env: str, tmp_path: Path) -> None:
     path, session, keys = tmp_path / "x.toml", tmp_path / "s.rrd", tmp_path / "keys.txt"
-    statistics = FIXTURES / f"{WORLDS[env]}-normaliser.npz"
-    normaliser: list[str | Path] = ["--normaliser", statistics] if statistics.exists() else []
+    statistics = FIXTURES / f"{WORLDS[env]}-normalizer.npz"
+    normalizer: list[str | Path] = ["--normalizer", statistics] if statistics.exists() else []
     policy = FIXTURES / f"{WORLDS[env]}.zip"
     found = strict(
-        run("dissect", "--env", env, "--policy", policy, *normaliser, "--quick",
+        run("dissect", "--env", env, "--policy", policy, *normalizer, "--quick",
             "--budget", "0.001", "--workers", 2, "-o", path, "--json")
     )  # fmt: skip
     assert "reward" not in found["movable"]

@@ -274,11 +274,11 @@ def crowded() -> Iterator[None]:
         ("pistonball_v6", "unknown robot 'pistonball_v6'; worlds of PettingZoo have such names, but pdtui"),
         ("pettingzoo.mpe:simple_v3", "'pettingzoo.mpe:simple_v3' is a world of PettingZoo; pdtui"),
         ("test/Agents-v0", "environment 'test/Agents-v0' is a world of PettingZoo, or one like them; pdtui"),
-        ("test/Vector-v0", "environment 'test/Vector-v0' is vectorised: it runs 3 worlds at once; pdtui"),
-        ("test/OnlyVector-v0", "environment 'test/OnlyVector-v0' is registered as vectorised only; pdtui"),
+        ("test/Vector-v0", "environment 'test/Vector-v0' is vectorized: it runs 3 worlds at once; pdtui"),
+        ("test/OnlyVector-v0", "environment 'test/OnlyVector-v0' is registered as vectorized only; pdtui"),
         (
             "test/Pendulums-v0",
-            "environment 'test/Pendulums-v0' is vectorised: it runs 4 worlds at once; pdtui",
+            "environment 'test/Pendulums-v0' is vectorized: it runs 4 worlds at once; pdtui",
         ),
     ],
 )

@@ -103,6 +103,9 @@ def memory_benchmark_table(result: MemoryBenchmark) -> Table:
     return table
 
 
+_LATENESS = {"bare": "no screen", "screen": "screen", "ghost": "screen with a ghost"}
+
+
 def screen_benchmark_table(result: ScreenBenchmark) -> Table:
     """Return how soon the screen appears and what it costs."""
     table = new_table("Screen of 160×48 cells", "measure", "value")
@@ -111,6 +114,13 @@ def screen_benchmark_table(result: ScreenBenchmark) -> Table:
     table.add_row(
         f"CPU time of the screen's process over {result.seconds:g} s", f"{result.cpu_share:.0%} of one core"
     )
+    if result.ghost_cpu_share is not None:
+        table.add_row("the same with a ghost", f"{result.ghost_cpu_share:.0%} of one core")
+    for name, late in result.lateness.items():
+        table.add_row(
+            f"lateness of {late.steps} control steps, {_LATENESS[name]}: median, 99th percentile",
+            f"{1000 * late.median:.1f} ms, {1000 * late.p99:.1f} ms",
+        )
     for name, times in (("key to its echo", result.echo), ("key to the drive's answer", result.confirmation)):
         if times:
             table.add_row(

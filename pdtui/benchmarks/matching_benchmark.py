@@ -32,7 +32,7 @@ class MatchingSpeedup:
         ours_ms, loop_ms: median time over rounds, ms.
         ratio: median over rounds of the loop's time over ours.
         same_ranking: whether both rank the units of every attribute alike.
-        ties: neighbours in a ranking with equal discrepancy, whose order means nothing.
+        ties: neighbors in a ranking with equal discrepancy, whose order means nothing.
         largest_difference: largest difference of a discrepancy, as a share of the largest discrepancy.
     """
 
@@ -68,9 +68,9 @@ def compare_matching(
 
 
 def same_ranking(found: UnitDiscrepancies, reference: Floats) -> tuple[bool, int]:
-    """Return whether both rank the units of every attribute alike, and the number of tied neighbours.
+    """Return whether both rank the units of every attribute alike, and the number of tied neighbors.
 
-    Neighbours are tied where their discrepancies differ by less than rounding.
+    Neighbors are tied where their discrepancies differ by less than rounding.
     """
     same, ties = True, 0
     for row, distances in enumerate(reference):

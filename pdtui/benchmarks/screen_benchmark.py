@@ -1,4 +1,7 @@
-"""`pdtui bench screen`: how soon the screen appears and what it costs, in a real pseudo-terminal."""
+"""`pdtui bench screen`: how soon the screen appears and what it costs, in a real pseudo-terminal.
+
+How late control steps come is compared with the same loop at the same pace without a screen, in the same run.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +12,20 @@ import select
 import signal
 import struct
 import sys
+import tempfile
 import termios
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
+
+from pdtui.core.attributes import Floats
 from pdtui.core.errors import ScreenError
+from pdtui.driving.drive_client import DriveClient
+from pdtui.driving.drive_config import DriveConfig
 
 SIZE = (48, 160)
 """Rows and columns of the terminal."""
@@ -24,6 +34,17 @@ _PATIENCE = 300.0
 _PRESSES, _LONGEST_ANSWER = 20, 10.0  # s
 _ECHO_SIGN, _CONFIRMED_SIGN = b"pressed", b"latched"
 _FRAME_SIGN, _ROBOT_SIGN = b"behaviors", b"m/s"
+
+
+_GHOST_KEY, _GHOST_SIGN = b"\x07", b"since step"
+
+
+class StepLateness(NamedTuple):
+    """By how much later than it was due a control step was done: median, 99th percentile, and of how many."""
+
+    median: float
+    p99: float
+    steps: int
 
 
 @dataclass(frozen=True)
@@ -38,6 +59,9 @@ class ScreenBenchmark:
         echo: times from a key of a behavior to its mark on the screen, s, in order of size; none if the map
             has no behavior that lasts until another key is pressed.
         confirmation: times from the same keys to the drive's answer on the screen, s.
+        ghost_cpu_share: the same share while a ghost is shown; None where the map has no such behavior.
+        lateness: how late control steps were done, s, in the same loop without a screen (``bare``), with the
+            screen, and with a ghost on it.
     """
 
     first_frame: float
@@ -46,12 +70,17 @@ class ScreenBenchmark:
     seconds: float
     echo: tuple[float, ...] = ()
     confirmation: tuple[float, ...] = ()
+    ghost_cpu_share: float | None = None
+    lateness: Mapping[str, StepLateness] = field(default_factory=dict)
 
 
-def bench_screen(arguments: Sequence[str], seconds: float, keys: Sequence[str] = ()) -> ScreenBenchmark:
+def bench_screen(
+    config: DriveConfig, arguments: Sequence[str], seconds: float, keys: Sequence[str] = ()
+) -> ScreenBenchmark:
     """Run ``pdtui drive`` with these arguments in a pseudo-terminal.
 
     Args:
+        config: the drive of these arguments, for the loop without a screen.
         arguments: those of the command.
         seconds: how long to measure the processor's time.
         keys: what the terminal sends for the key of a behavior that stays latched, and for the key that
@@ -62,30 +91,85 @@ def bench_screen(arguments: Sequence[str], seconds: float, keys: Sequence[str] =
     """
     if not Path("/proc/self/stat").exists():
         raise ScreenError("the screen benchmark reads /proc, which this system does not have")
-    start = time.monotonic()
-    pid, terminal = pty.fork()
-    if pid == 0:
-        os.environ["TERM"] = "xterm-256color"
-        os.execv(sys.executable, [sys.executable, "-m", "pdtui", "drive", *arguments])
-    try:
-        fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", *SIZE, 0, 0))
-        first_frame = _read_until(terminal, _FRAME_SIGN, start)
-        first_state = _read_until(terminal, _ROBOT_SIGN, start)
-        _read_for(terminal, 2.0)
-        before, began = _cpu_seconds(pid), time.monotonic()
-        _read_for(terminal, seconds)
-        share = (_cpu_seconds(pid) - before) / (time.monotonic() - began)
-        echoes = _time_keys(terminal, *keys) if keys else []
-        os.write(terminal, b"q")
-        _read_for(terminal, 3.0)
-    finally:
-        os.kill(pid, signal.SIGTERM)
-        os.close(terminal)
-        os.waitpid(pid, 0)
+    with tempfile.TemporaryDirectory() as folder:
+        times = Path(folder) / "steps.npy"
+        bare = _drive_without_screen(replace(config, recording="", step_times=str(times)), seconds)
+        start = time.monotonic()
+        pid, terminal = pty.fork()
+        if pid == 0:
+            os.environ["TERM"] = "xterm-256color"
+            timed = [*arguments, "--step-times", str(times)]
+            os.execv(sys.executable, [sys.executable, "-m", "pdtui", "drive", *timed])
+        ghost: tuple[float, float, float] | None = None
+        try:
+            fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", *SIZE, 0, 0))
+            first_frame = _read_until(terminal, _FRAME_SIGN, start)
+            first_state = _read_until(terminal, _ROBOT_SIGN, start)
+            _read_for(terminal, 2.0)
+            screen = _measure_share(pid, terminal, seconds)
+            echoes = _time_keys(terminal, *keys) if keys else []
+            if keys:
+                os.write(terminal, _GHOST_KEY + keys[0].encode())
+                _read_until(terminal, _GHOST_SIGN, time.monotonic())
+                _read_for(terminal, 2.0)
+                ghost = _measure_share(pid, terminal, seconds)
+            os.write(terminal, b"q")
+            _read_to_end(terminal)
+        finally:
+            os.kill(pid, signal.SIGTERM)
+            os.close(terminal)
+            os.waitpid(pid, 0)
+        steps = np.load(times)
     echo, confirmation = zip(*echoes, strict=True) if echoes else ((), ())
+    lateness = {"bare": bare, "screen": _summarize_lateness(steps, *screen[1:])}
+    if ghost is not None:
+        lateness["ghost"] = _summarize_lateness(steps, *ghost[1:])
     return ScreenBenchmark(
-        first_frame, first_state, share, seconds, tuple(sorted(echo)), tuple(sorted(confirmation))
+        first_frame,
+        first_state,
+        screen[0],
+        seconds,
+        tuple(sorted(echo)),
+        tuple(sorted(confirmation)),
+        None if ghost is None else ghost[0],
+        lateness,
     )
+
+
+def _drive_without_screen(config: DriveConfig, seconds: float) -> StepLateness:
+    """Drive in a process of its own, as with a screen, but ask it for nothing."""
+    client = DriveClient(config)
+    try:
+        client.wait_until_started()
+        time.sleep(2.0)
+        begun = time.monotonic()
+        time.sleep(seconds)
+        ended = time.monotonic()
+    finally:
+        client.close()
+    return _summarize_lateness(np.load(config.step_times), begun, ended)
+
+
+def _summarize_lateness(steps: Floats, begun: float, ended: float) -> StepLateness:
+    late = steps[(steps[:, 0] >= begun) & (steps[:, 0] < ended), 1]
+    median, p99 = np.percentile(late, [50.0, 99.0]) if len(late) else (np.nan, np.nan)
+    return StepLateness(float(median), float(p99), len(late))
+
+
+def _measure_share(pid: int, terminal: int, seconds: float) -> tuple[float, float, float]:
+    """Return the processor's share of a process over some seconds, when they began, and when they ended."""
+    before, began = _cpu_seconds(pid), time.monotonic()
+    _read_for(terminal, seconds)
+    ended = time.monotonic()
+    return (_cpu_seconds(pid) - before) / (ended - began), began, ended
+
+
+def _read_to_end(terminal: int) -> None:
+    """Read until the program has closed the terminal."""
+    end = time.monotonic() + _PATIENCE
+    while time.monotonic() < end:
+        if select.select([terminal], [], [], 0.1)[0] and not _read(terminal, 0.0):
+            return
 
 
 def _time_keys(terminal: int, key: str, clear: str) -> list[tuple[float, float]]:

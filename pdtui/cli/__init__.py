@@ -30,6 +30,8 @@ COMMANDS = {
     "figure": "Draw figures.",
     "convert": "Convert a policy to safetensors.",
     "train": "Train a policy.",
+    "dynamics": "Follow units through the checkpoints of a training run.",
+    "study": "Test a hypothesis on many policies.",
     "bench": "Measure speed and memory.",
 }
 """The summary of each command in `pdtui --help`; `pdtui.cli.NAME_command` has the command."""

@@ -159,23 +159,25 @@ def bench_memory_command(
     default=15.0,
     show_default=True,
     metavar="SECONDS",
-    help="How long to measure.",
+    help="How long to measure each of the loop without a screen, the screen, and the screen with a ghost.",
 )
 @json_option
 def bench_screen_command(
     robot: str, robot_options: tuple[str, ...], map_name: str | None, seconds: float, as_json: bool
 ) -> None:
-    """Measure the time to the first frame, the screen's CPU time, and the time from a key to its echo."""
+    """Measure the time to the first frame, the screen's CPU time, the time from a key to its echo, and by how
+    much control steps are late, compared with the loop without a screen."""
     from pdtui.benchmarks.benchmark_tables import screen_benchmark_table
     from pdtui.benchmarks.screen_benchmark import bench_screen
 
     # An error shows before the screen starts.
-    drive_map = build_drive_config(robot, map_name, "", robot_options=robot_options).stimulation_map
+    config = build_drive_config(robot, map_name, "", robot_options=robot_options)
+    drive_map = config.stimulation_map
     arguments = [robot, "--no-record", *(["--map", map_name] if map_name else [])]
     arguments += [part for text in robot_options for part in ("--robot-option", text)]
     behaviors = drive_map.behaviors.values()
     lasting = [one.key for one in behaviors if one.period is None and one.onset is None]
     sent = [" " if key == "space" else key for key in (*lasting[:1], drive_map.default_key)]
     typed = len(sent) == 2 and all(len(key) == 1 for key in sent)
-    result = bench_screen(arguments, seconds, sent if typed else ())
+    result = bench_screen(config, arguments, seconds, sent if typed else ())
     print_result(asdict(result), as_json, lambda: screen_benchmark_table(result))

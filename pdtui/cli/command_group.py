@@ -14,7 +14,7 @@ from click.shell_completion import CompletionItem
 from pdtui.core.errors import PdtuiError
 from pdtui.core.printable_text import make_printable
 
-OPTIONAL_ROOMS = ("pdtui.benchmarks", "pdtui.paper", "pdtui.training")
+OPTIONAL_ROOMS = ("pdtui.benchmarks", "pdtui.paper", "pdtui.study", "pdtui.training")
 """Packages that an installation may leave out; only the commands that need one stop working."""
 
 

@@ -75,6 +75,7 @@ if TYPE_CHECKING:
     help=f"Also show the drive in a Rerun viewer that listens at this address; default: {LOCAL}:{PORT}.",
 )
 @screen_options
+@click.option("--step-times", default="", hidden=True)  # for `pdtui bench screen`
 @click.option("--headless", is_flag=True, help="Drive without a screen, as fast as possible.")
 @click.option(
     "--keys",

@@ -45,15 +45,25 @@ def replay_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.command()
 @click.argument("session", type=FILE_PATH, shell_complete=complete_sessions)
 @click.option("--watch", is_flag=True, help="Show the replay on the screen, at the pace of the drive.")
+@click.option(
+    "--minutes",
+    type=click.FloatRange(0, min_open=True),
+    metavar="MINUTES",
+    help="End the replay after this time, with the steps compared so far.",
+)
 @screen_options
 @replay_options
-def replay_command(session: Path, watch: bool, settings: UserSettings, options: dict[str, Any]) -> None:
+def replay_command(
+    session: Path, watch: bool, minutes: float | None, settings: UserSettings, options: dict[str, Any]
+) -> None:
     """Run SESSION again and compare every step.
 
     Exit codes: 0 if the drive repeats; 1 if it does not, or cannot be replayed.
     """
     from pdtui.driving.session_replay import config_from_session, replay_session
 
+    if watch and minutes is not None:
+        raise SessionError("--minutes and --watch are mutually exclusive; q ends a replay that is watched")
     if watch:
         from pdtui.sessions.session_header import read_session_header
 
@@ -63,7 +73,7 @@ def replay_command(session: Path, watch: bool, settings: UserSettings, options: 
         show_drive(config_from_session(recorded, str(session), options["policy"]), settings, watching=True)
         return
     with progress_bar("replaying") as advance:
-        result = replay_session(session, progress=advance, **options)
+        result = replay_session(session, minutes=minutes, progress=advance, **options)
     click.echo(make_printable(result.verdict), err=not result.passed)
     if not result.identical:
         for line in (*result.deviations[:5], *result.environment):

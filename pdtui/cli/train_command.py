@@ -70,6 +70,11 @@ def _parse_layers(text: str | None) -> tuple[int, ...] | None:
     help="Direction in which moving forward is rewarded, for the Ant; default: x, as in Gymnasium's Ant.",
 )
 @click.option(
+    "--checkpoints",
+    is_flag=True,
+    help="Also keep the policy at the start and after each 2 % of the steps, in FOLDER/checkpoints.",
+)
+@click.option(
     "--folder",
     type=FILE_PATH,
     metavar="FOLDER",

@@ -60,7 +60,7 @@ class PairedRatio:
 def paired_ratio(above: Floats, below: Floats, *, per: tuple[Floats, Floats] | None = None) -> PairedRatio:
     """Return the ratio of two means of positive values, with an interval over whole pairs.
 
-    It is the studentised bootstrap interval of the ratio's logarithm, with the delta method's standard error
+    It is the studentized bootstrap interval of the ratio's logarithm, with the delta method's standard error
     (Davison and Hinkley, 1997, section 5.2). It covered the true ratio on 94 to 95 % of simulated samples of
     20 pairs, a percentile interval on 92 to 94 %. For fewer than `FEWEST_PAIRS`, Student's t is used.
 

@@ -17,7 +17,7 @@ EDIT_KEY = "edit"
 """Stands for the key in the event of an edit, which counts as human involvement like a key."""
 FACTOR_STEP = 1.25
 """Factor by which one press of a key strengthens or weakens a behavior."""
-VALUED_EDITS: tuple[EventKind, ...] = ("unit", "factor", "target", "order", "kp", "ki", "kd")
+VALUED_EDITS: tuple[EventKind, ...] = ("unit", "factor", "target", "order", "kp", "ki", "kd", "limit")
 """Kinds of events that an edit can make, with a value."""
 NAMED_EDITS: tuple[EventKind, ...] = ("free", "beside", "release", "mute", "unmute")
 """Kinds of events that an edit can make, without a value."""

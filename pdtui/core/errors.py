@@ -64,6 +64,10 @@ class TrainingError(PdtuiError):
     """A training run cannot start or continue."""
 
 
+class StudyError(PdtuiError):
+    """A study's plan, data or policies are missing or malformed."""
+
+
 class WorkerError(PdtuiError):
     """A worker process died."""
 

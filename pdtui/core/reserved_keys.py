@@ -30,6 +30,7 @@ EventKind = Literal[
     "kp",
     "ki",
     "kd",
+    "limit",
 ]
 
 
@@ -53,6 +54,7 @@ EVENT_WORDINGS: dict[EventKind, str] = {
     "kp": "gain kp of '{name}' set to {value:.4g}",
     "ki": "gain ki of '{name}' set to {value:.4g}",
     "kd": "gain kd of '{name}' set to {value:.4g}",
+    "limit": "magnitude of '{name}' limited to ±{value:.4g}",
 }
 """What each kind of event does, in words that may contain ``{name}`` and ``{value}`` of the event."""
 JUMPS = ("reset", "rewind")
@@ -209,6 +211,14 @@ KEY_TABLE = (
         action="command_palette",
         hint="commands",
         hint_rank=18,
+    ),
+    ReservedKey(
+        "back",
+        "escape",
+        "closes what is open, or returns to the present",
+        action="go_back",
+        hint="back",
+        hint_rank=-1,  # it is shown only while there is something to go back from
     ),
     ReservedKey("help", "question_mark", "shows all keys", action="help", hint="help", hint_rank=0),
     ReservedKey("quit", "q", "ends the drive and quits", action="leave", hint="quit", hint_rank=1),

@@ -121,7 +121,7 @@ def find_attribute_movers(
         lasting = _lasting(probe(singles, choosing), column, sign) if singles else None
         if lasting is not None:
             single = singles[lasting]
-            pairs = _cancelling(single, column, sign, columns, spread, refined)[: settings.mover_pairs]
+            pairs = _canceling(single, column, sign, columns, spread, refined)[: settings.mover_pairs]
             plans = [single, *pairs]
             best = _choose(probe(plans, choosing), column, sign, columns, spread) if pairs else 0
             chosen = [single] if best == 0 else [plans[best], single]
@@ -172,7 +172,7 @@ def _lasting(result: PlanEffects, column: int, sign: int) -> int | None:
     return best if sure[best] > 0 else None
 
 
-def _cancelling(
+def _canceling(
     single: Stimulation, column: int, sign: int, columns: Sequence[int], spread: Floats, refined: UnitEffects
 ) -> list[Stimulation]:
     """Return pairs whose second unit, if effects add up, keeps the main effect and cancels side effects."""

@@ -98,7 +98,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             steps=settings.refine_steps,
             progress=stage("refine the best"),
         )
-        judgement = judge_primitives(
+        judgment = judge_primitives(
             prober,
             robot.attributes,
             choose_primitive_candidates(
@@ -166,7 +166,7 @@ def dissect(config: DissectionConfig) -> Dissection:
             sample_episode=pick_sample_episode(episodes, robot.attributes, matching, preset),
             screen=screen,
             refined=refined,
-            judgement=judgement,
+            judgment=judgment,
             spread=spread,
             movable=tuple(movable),
             attribute_movers=movers,

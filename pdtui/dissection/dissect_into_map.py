@@ -15,7 +15,7 @@ from pdtui.core.errors import MapError
 from pdtui.dissection.dissect import dissect
 from pdtui.dissection.dissection_config import DissectionConfig
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_summary import summarise_dissection
+from pdtui.dissection.dissection_summary import summarize_dissection
 from pdtui.dissection.dissection_text import render_dissection
 from pdtui.dissection.draft_map import draft_map
 from pdtui.stimulation.map_policy_lookup import relative_policy_name
@@ -35,7 +35,7 @@ class WrittenDissection:
     def as_dict(self) -> dict[str, Any]:
         """Return the form that ``--json`` prints."""
         written = {"map": str(self.output), "pictures": [str(path) for path in self.pictures]}
-        return {**summarise_dissection(self.dissection), **written}
+        return {**summarize_dissection(self.dissection), **written}
 
     def table(self) -> RenderableType:
         """Return what the command prints."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pdtui.core.attributes import Attribute, Floats, attribute_column
 from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
-from pdtui.dissection.primitive_judging import PrimitiveJudgement
+from pdtui.dissection.primitive_judging import PrimitiveJudgment
 from pdtui.dissection.steering.steering_results import SteeringComparison
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.measured_effects import UnitEffects
@@ -52,7 +52,7 @@ class Dissection:
         sample_episode: One monitored episode, with the units that match best, for pictures.
         screen: Effects of every unit at a few outputs.
         refined: Effects of the best units and the first matches, from other starts.
-        judgement: Which of them are confirmed, from starts that neither saw.
+        judgment: Which of them are confirmed, from starts that neither saw.
         spread: Standard deviation of every attribute over the monitored steps, shape (J,).
         movable: Columns of the attributes for which up and down were searched.
         attribute_movers: What moves each attribute up and down.
@@ -80,7 +80,7 @@ class Dissection:
     sample_episode: SampleEpisode
     screen: UnitEffects
     refined: UnitEffects
-    judgement: PrimitiveJudgement
+    judgment: PrimitiveJudgment
     spread: Floats
     movable: tuple[int, ...]
     attribute_movers: tuple[AttributeMover, ...]
@@ -104,10 +104,10 @@ class Dissection:
 
     def _repr_html_(self) -> str:
         """Show every pair that was judged, as a table that a click on a heading sorts, in a notebook."""
-        from pdtui.dissection.dissection_summary import summarise_dissection
+        from pdtui.dissection.dissection_summary import summarize_dissection
         from pdtui.notebook.dissection_display import dissection_html
 
-        return dissection_html(repr(self).strip("<>"), summarise_dissection(self))
+        return dissection_html(repr(self).strip("<>"), summarize_dissection(self))
 
     def to_pandas(self) -> pd.DataFrame:
         """Return a data frame with a row for each pair of an attribute and a unit that was judged.
@@ -119,11 +119,11 @@ class Dissection:
         Raises:
             PdtuiError: pandas is not installed.
         """
-        from pdtui.dissection.dissection_summary import summarise_dissection
+        from pdtui.dissection.dissection_summary import summarize_dissection
         from pdtui.notebook.data_frames import make_data_frame
         from pdtui.notebook.dissection_display import list_judged_pairs
 
-        return make_data_frame(list_judged_pairs(summarise_dissection(self)), "pair")
+        return make_data_frame(list_judged_pairs(summarize_dissection(self)), "pair")
 
     def matches(self, attribute: str, count: int = 5) -> list[str]:
         """Return the addresses of the units whose spectrograms are nearest to an attribute's, nearest first.

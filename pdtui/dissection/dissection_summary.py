@@ -9,7 +9,7 @@ from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.search_task_into_map import draft_task_behavior
-from pdtui.dissection.steering.steering_summary import summarise_steering
+from pdtui.dissection.steering.steering_summary import summarize_steering
 from pdtui.probing.matching_hits import TOP_MATCHES, measure_matching_hits
 from pdtui.probing.primitive_confirmation import EffectVerdict, PrimitiveConfirmation
 from pdtui.robots.task import average_figures
@@ -19,7 +19,7 @@ from pdtui.search.task_search import TaskSearchResult
 from pdtui.spectra.matching_presets import list_preset_values
 
 
-def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str, Any]:
+def summarize_dissection(dissection: Dissection, matches: int = 10) -> dict[str, Any]:
     """Return the findings as data for JSON. Numbers that do not exist are None.
 
     For each attribute at most `matches` matches are listed, the nearest first.
@@ -40,11 +40,11 @@ def summarise_dissection(dissection: Dissection, matches: int = 10) -> dict[str,
         "attributes": [
             _attribute(dissection, column, matches) for column in range(len(dissection.attributes))
         ],
-        "judged": _judgement(dissection),
+        "judged": _judgment(dissection),
         "shortened": dissection.shortened,
         "movable": [dissection.attributes[column].name for column in dissection.movable],
         "steered": [_mover(dissection, one) for one in dissection.attribute_movers],
-        "steering": summarise_steering(dissection.steering, dissection.attributes),
+        "steering": summarize_steering(dissection.steering, dissection.attributes),
         "side_effects": _side_effects(dissection),
         "behaviors": [_behavior(found, layers) for found in dissection.behaviors],
         "tasks": [_task(found, dissection) for found in dissection.tasks],
@@ -72,11 +72,11 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
     attribute = dissection.attributes[column]
     matching, phase, layers = dissection.matching, dissection.phase, dissection.layers
     ranked = matching.ranked_units(column)
-    judgement = dissection.judgement
+    judgment = dissection.judgment
     rate = measure_matching_hits(
-        column, dissection.screen, matching, judgement.control_effects, judgement.controls
+        column, dissection.screen, matching, judgment.control_effects, judgment.controls
     )
-    first = judgement.of_pair(int(ranked[0]), column) if ranked.size else None
+    first = judgment.of_pair(int(ranked[0]), column) if ranked.size else None
     return {
         "name": attribute.name,
         "unit": attribute.unit,
@@ -99,7 +99,7 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
             for unit in ranked[:matches]
         ],
         "first_match": None if first is None else _confirmation(dissection, column, first),
-        "probed": [_confirmation(dissection, column, one) for one in judgement.of_attribute(column)],
+        "probed": [_confirmation(dissection, column, one) for one in judgment.of_attribute(column)],
         "hits": {
             "first": rate.first,
             **{f"best_{count}": _number(share) for count, share in zip(TOP_MATCHES, rate.best, strict=True)},
@@ -112,7 +112,7 @@ def _attribute(dissection: Dissection, column: int, matches: int) -> dict[str, A
 
 def _confirmation(dissection: Dissection, column: int, one: PrimitiveConfirmation) -> dict[str, Any]:
     rho, measured = float(dissection.phase.rho(dissection.preset)[column, one.unit]), one.verdict.measured
-    low, high = dissection.judgement.own_range[one.unit]
+    low, high = dissection.judgment.own_range[one.unit]
     return {
         "unit": format_unit(one.unit, dissection.layers),
         **_verdict(one.verdict),
@@ -141,9 +141,9 @@ def _verdict(one: EffectVerdict) -> dict[str, Any]:
     }
 
 
-def _judgement(dissection: Dissection) -> dict[str, Any]:
-    judgement = dissection.judgement
-    pairs = judgement.confirmations
+def _judgment(dissection: Dissection) -> dict[str, Any]:
+    judgment = dissection.judgment
+    pairs = judgment.confirmations
     ranges = {
         name: {
             "judged": len(some),
@@ -156,11 +156,11 @@ def _judgement(dissection: Dissection) -> dict[str, Any]:
         )
     }
     return {
-        "level": judgement.level,
-        "starts": judgement.starts,
-        "controls": len(judgement.controls),
-        "smallest_p": judgement.smallest_p,
-        "fewest_confirmed": judgement.fewest_confirmed,
+        "level": judgment.level,
+        "starts": judgment.starts,
+        "controls": len(judgment.controls),
+        "smallest_p": judgment.smallest_p,
+        "fewest_confirmed": judgment.fewest_confirmed,
         "pairs": len(pairs),
         "passed": sum(one.verdict.confirmed for one in pairs),
         "passing_by": sum(one.verdict.confirmed and not one.confirmed for one in pairs),
@@ -190,7 +190,7 @@ def _side_effects(dissection: Dissection) -> dict[str, Any]:
     }
     return {
         "units": [format_unit(unit, dissection.layers) for unit in dissection.refined.units],
-        "controls": [format_unit(unit, dissection.layers) for unit in dissection.judgement.controls],
+        "controls": [format_unit(unit, dissection.layers) for unit in dissection.judgment.controls],
         "attributes": [attribute.name for attribute in dissection.attributes],
         "by_value": matrices,
     }

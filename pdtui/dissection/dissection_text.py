@@ -10,13 +10,13 @@ from rich.text import Text
 from pdtui.core.units import MAX_LISTED
 from pdtui.dissection.dissection_findings import describe_findings
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_summary import summarise_dissection
+from pdtui.dissection.dissection_summary import summarize_dissection
 from pdtui.dissection.dissection_tables import LISTED_MATCHES, dissection_tables
 
 
 def render_dissection(dissection: Dissection) -> RenderableType:
     """Return what `pdtui dissect` prints: the tables, the remarks, and the findings in plain words."""
-    summary = summarise_dissection(dissection)
+    summary = summarize_dissection(dissection)
     parts: list[RenderableType] = [*dissection_tables(summary)]
     parts += [Text(line) for line in dissection_remarks(summary)]
     for heading, lines in describe_findings(summary).items():

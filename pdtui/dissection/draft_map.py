@@ -112,7 +112,7 @@ def _draft_primitives(dissection: Dissection) -> list[MotorPrimitive]:
     primitives = []
     for attribute, name in _primitive_names(dissection).items():
         column = dissection.column(attribute)
-        best_units = dissection.judgement.of_attribute(column)
+        best_units = dissection.judgment.of_attribute(column)
         # Without a phase there is no ρ, and without ρ no magnitude c: such a unit is no primitive.
         rho = dissection.phase.rho(dissection.preset)[column]
         best = next((one for one in best_units if one.confirmed and np.isfinite(rho[one.unit])), None)

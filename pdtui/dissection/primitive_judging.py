@@ -25,7 +25,7 @@ from pdtui.spectra.episode_monitor import MonitoredEpisode
 
 
 @dataclass(frozen=True)
-class PrimitiveJudgement:
+class PrimitiveJudgment:
     """What the judging starts say about the candidates of all attributes.
 
     Attributes:
@@ -92,7 +92,7 @@ def judge_primitives(
     settings: DissectionSettings,
     seed: int,
     progress: StepProgress | None = None,
-) -> PrimitiveJudgement:
+) -> PrimitiveJudgment:
     """Probe candidates and controls from the judging starts, and hold what moves a rate for long.
 
     Args:
@@ -106,7 +106,7 @@ def judge_primitives(
     probed = prober.measure_outputs(outputs, starts, steps=settings.refine_steps, progress=progress)
     judged = judge_candidates(candidates, probed, own_range, controls, settings.level, seed)
     held = _hold_rates(prober, attributes, judged, candidates, starts, settings, seed)
-    return PrimitiveJudgement(
+    return PrimitiveJudgment(
         tuple(replace(one, held=held.get(number)) for number, one in enumerate(judged)),
         controls,
         probed.select(controls, values),

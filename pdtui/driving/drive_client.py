@@ -93,6 +93,11 @@ class DriveClient(DriveConnection):
         """Process id of the simulation."""
         return self._process.pid or 0
 
+    @property
+    def is_pictured(self) -> bool:
+        """Whether the world is shown by pictures; known once the drive has started."""
+        return self._first is not None and self._first.pictured
+
     def wait_until_started(self) -> None:
         """Wait until robot, policy and recording are ready; a `PdtuiError` says what cannot be loaded."""
         while self._first is None:

@@ -31,6 +31,7 @@ class DriveConfig:
         viewer: address of a Rerun viewer that shows the recorded drive; None for none.
         watched: the session whose events are applied instead of keys, and with which every step is compared;
             None to drive by keys.
+        step_times: file for when each control step was done and how late, as a NumPy array; empty for none.
         ghost: what is other in the ghost than that it has no behaviors; None for nothing.
     """
 
@@ -47,4 +48,5 @@ class DriveConfig:
     activations: ActivationsKept = "all"
     viewer: ViewerAddress | None = None
     watched: SessionHeader | None = None
+    step_times: str = ""
     ghost: GhostVariant | None = None

@@ -55,7 +55,8 @@ class DriveServer:
         self._branches = 0
         length = 0 if config.watched is None else config.watched.steps
         self._begin(config, build_control_loop(config), RunTimeline(length))
-        self._pacer = Pacer(self._loop.robot.control_dt, time.monotonic())
+        dt, keeps_times = self._loop.robot.control_dt, bool(config.step_times)
+        self._pacer = Pacer(dt, time.monotonic(), keeps_times=keeps_times)
 
     def _begin(
         self,
@@ -105,6 +106,7 @@ class DriveServer:
             raise
         finally:
             self._close_helpers()
+            self._pacer.save_times(self._config.step_times)
             self._recording.close(self._finished or self._closing or "an error ended the drive")
 
     def stop(self, reason: str) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
+import numpy as np
+
 PaceRequest = Literal["pause", "step", "slower", "faster"]
 SLOWEST, FASTEST = 1 / 16, 16.0
 _LONGEST_LAG = 0.25  # that is caught up by faster steps, s
@@ -15,14 +17,16 @@ class Pacer:
     Args:
         dt: simulated time of a control step, s.
         now: present time, s.
+        keeps_times: whether to keep when each step was done, for a benchmark.
     """
 
-    def __init__(self, dt: float, now: float) -> None:
+    def __init__(self, dt: float, now: float, *, keeps_times: bool = False) -> None:
         self._dt = dt
         self.speed, self.paused = 1.0, False
         self._due = now
         self._single = 0
         self._marks: list[float] = []
+        self._times: list[tuple[float, float]] | None = [] if keeps_times else None
 
     def change_pace(self, pace: PaceRequest, now: float) -> None:
         """Change the pace; a single step pauses first."""
@@ -52,10 +56,17 @@ class Pacer:
         if self._single:
             self._single -= 1
             return
+        if self._times is not None:
+            self._times.append((now, now - self._due))
         self._due += self._dt / self.speed
         if now - self._due > _LONGEST_LAG:
             self._due = now  # too slow for this speed: continue from here rather than catch up
         self._marks = [*self._marks[-40:], now]
+
+    def save_times(self, path: str) -> None:
+        """Write when each step was done, and how much later than it was due, s, as an array (n, 2)."""
+        if self._times is not None:
+            np.save(path, np.array(self._times, float).reshape(-1, 2))
 
     @property
     def achieved_speed(self) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
@@ -77,6 +79,7 @@ def replay_session(
     tolerance: float = TOLERANCE,
     required_steps: int = REQUIRED_STEPS,
     force: bool = False,
+    minutes: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> ReplayResult:
     """Run a session from its file and its policy alone, and compare every step.
@@ -101,6 +104,7 @@ def replay_session(
         tolerance: elsewhere, in standard deviations of each attribute over the session.
         required_steps: elsewhere, number of first control steps that must be within the tolerance.
         force: run even if the policy is not the session's.
+        minutes: time after which the replay ends with the steps compared so far; None for no limit.
         progress: called with the number of steps done and the total.
 
     Raises:
@@ -118,8 +122,9 @@ def replay_session(
         if world.attributes != header.info.attributes:
             raise SessionError(f"{path}: the robot has other attributes than the session")
         description = describe_info_differences(loop.info, header.info, exact=not elsewhere)
-        stopped = "" if description else _compare_steps(header, loop, comparison, progress)
-    first, deviations = comparison.difference, comparison.deviations.summarise()
+        end = math.inf if minutes is None else time.monotonic() + 60.0 * minutes
+        stopped = "" if description else _compare_steps(header, loop, comparison, progress, end)
+    first, deviations = comparison.difference, comparison.deviations.summarize()
     state_differs = first is not None and comparison.first_digest == first.step
     return ReplayResult(
         steps=comparison.steps,
@@ -139,6 +144,7 @@ def replay_session(
         beyond_rounding=comparison.beyond_rounding,
         description=description,
         missing=header.gaps,
+        left=0 if description or stopped else header.steps - header.missing - comparison.steps,
     )
 
 
@@ -147,8 +153,12 @@ def _compare_steps(
     loop: ControlLoop,
     comparison: ReplayComparison,
     progress: Callable[[int, int], None] | None,
+    end: float,
 ) -> str:
-    """Run the session block by block; return why the replay stopped before its end, or nothing."""
+    """Run the session block by block; return why the replay cannot go on before its end, or nothing.
+
+    It ends at a time of `time.monotonic`, too.
+    """
     events = group_events_by_step(header.events)
     total = header.steps - header.missing
     for block in read_step_blocks(header, activations=True, poses=True):
@@ -170,11 +180,12 @@ def _compare_steps(
                     progress(comparison.steps + len(records), total)
             if record.outcome is Outcome.DIVERGED and comparison.steps + len(records) < total:
                 stopped = f"step {step}: {record.ended}"
+            if stopped or time.monotonic() >= end:
                 break
         comparison.add(records, block.part(0, len(records)))
         if stopped and comparison.difference is None:
             raise SessionError(f"{header.path}: {stopped}, but {total} steps are recorded")
-        if stopped:
+        if stopped or time.monotonic() >= end:
             return stopped
     return ""
 

@@ -18,8 +18,8 @@ from pdtui.evaluation.behavior_summary import (
     BehaviorEvaluation,
     BehaviorRuns,
     SubstituteFigures,
-    summarise_behavior,
-    summarise_substitute,
+    summarize_behavior,
+    summarize_substitute,
 )
 from pdtui.evaluation.disturbance_conditions import UNDISTURBED
 from pdtui.evaluation.effect_figures import relative_spread
@@ -40,7 +40,7 @@ from pdtui.evaluation.tasks.task_runs import (
     run_task_episode,
     task_measuring_runs,
 )
-from pdtui.evaluation.tasks.task_success import TaskEvaluation, summarise_tasks
+from pdtui.evaluation.tasks.task_success import TaskEvaluation, summarize_tasks
 from pdtui.stimulation.stimulation_map import Behavior, MeasuredEffect
 
 FEWEST_DIFFERENT = 0.02
@@ -140,7 +140,7 @@ def evaluate_behaviors(
         episodes = [one for one in planned if one is not None]
         judged = pool.map(run_task_episode, episodes, advance)
         verdicts = {one.run: verdict for one, verdict in zip(episodes, judged, strict=True)}
-    return _summarise(plan, traces, summarise_tasks(plan, verdicts))
+    return _summarize(plan, traces, summarize_tasks(plan, verdicts))
 
 
 def _by_behavior(
@@ -152,7 +152,7 @@ def _by_behavior(
     return measured
 
 
-def _summarise(
+def _summarize(
     plan: EvaluationPlan, traces: Mapping[RunKey, HeldRunTrace], tasks: tuple[TaskEvaluation, ...]
 ) -> MapEvaluation:
     robot = plan.loop.robot
@@ -161,7 +161,7 @@ def _summarise(
     for table in tables:
         own = [_runs_of(plan, traces, behavior, name) for name in table for behavior in plan.behaviors]
         summaries = [
-            replace(summarise_behavior(runs), substitutes=_summarise_substitutes(plan, traces, runs))
+            replace(summarize_behavior(runs), substitutes=_summarize_substitutes(plan, traces, runs))
             for runs in own
         ]
         rows += correct_over_table(summaries, plan.settings.level)
@@ -198,7 +198,7 @@ def _runs_of(
     )
 
 
-def _summarise_substitutes(
+def _summarize_substitutes(
     plan: EvaluationPlan, traces: Mapping[RunKey, HeldRunTrace], own: BehaviorRuns
 ) -> tuple[SubstituteFigures, ...]:
     if own.condition != UNDISTURBED.name:
@@ -209,7 +209,7 @@ def _summarise_substitutes(
         keys = [[RunKey(name, seed, UNDISTURBED.name, kind, draw) for seed in seeds] for draw in range(draws)]
         if keys[0][0] in traces:
             drawn = [[traces[key] for key in row] for row in keys]
-            figures.append(summarise_substitute(kind, own, drawn))
+            figures.append(summarize_substitute(kind, own, drawn))
     return tuple(figures)
 
 

@@ -179,8 +179,8 @@ class BehaviorRuns:
         return float(effects[:, times.first_bins].mean()), float(effects[:, times.last_bins].mean())
 
 
-def summarise_behavior(runs: BehaviorRuns) -> BehaviorEvaluation:
-    """Summarise the runs of one behavior; its p-values are not corrected yet."""
+def summarize_behavior(runs: BehaviorRuns) -> BehaviorEvaluation:
+    """Summarize the runs of one behavior; its p-values are not corrected yet."""
     behavior, times, column = runs.behavior, runs.times[0], runs.column
     assert behavior.aim is not None
     both = runs.traces, runs.defaults
@@ -221,7 +221,7 @@ def summarise_behavior(runs: BehaviorRuns) -> BehaviorEvaluation:
     )
 
 
-def summarise_substitute(
+def summarize_substitute(
     kind: str, own: BehaviorRuns, draws: Sequence[Sequence[HeldRunTrace]]
 ) -> SubstituteFigures:
     """Compare draws of a substitute, each run on the first seeds of the behavior, with the behavior."""

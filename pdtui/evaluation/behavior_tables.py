@@ -75,7 +75,7 @@ def _time_table(result: MapEvaluation) -> Table:
             f"{row.lasts:.1f} s ({row.lasting}/{row.runs} to the end)",
         )
     table.caption = (
-        "Intervals: studentised bootstrap over starts; a run counts as 0 from its end on. p: paired "
+        "Intervals: studentized bootstrap over starts; a run counts as 0 from its end on. p: paired "
         "sign-flip test of the last 5 s, corrected over the rows (Holm); an effect holds if p < "
         f"{result.settings.level:g} and it goes the wanted way. Half there: half of the effect of the first "
         "5 s; lasts: until less is left for good (medians)."

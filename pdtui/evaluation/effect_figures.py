@@ -9,13 +9,13 @@ import numpy as np
 
 from pdtui.core.attributes import Attribute, BehaviorAim, Floats
 from pdtui.evaluation.held_run import HeldRunTrace
-from pdtui.evaluation.paired_statistics import sign_flip_p_value, studentised_interval
+from pdtui.evaluation.paired_statistics import sign_flip_p_value, studentized_interval
 from pdtui.evaluation.protocol_settings import RunTimes
 
 ONSET_SECONDS = 0.5
 """Effects are averaged over this time before their onset is read, because strides swing them."""
 GAIT_ATTRIBUTES = ("speed", "height", "yaw rate", "pitch")
-"""Attributes by which the usual gait is recognised, whatever the course."""
+"""Attributes by which the usual gait is recognized, whatever the course."""
 _GAIT_SPREADS, _GAIT_SHARE = 3.0, 0.1
 
 
@@ -26,7 +26,7 @@ class WindowEffect:
     Attributes:
         value, default: Means of the attribute with the behavior and without, over the runs that still go on.
         effect: Mean of the paired differences.
-        low, high: 95 % interval of `effect` (studentised bootstrap over starts).
+        low, high: 95 % interval of `effect` (studentized bootstrap over starts).
         p_value: That of a paired sign-flip test.
         corrected: The same, corrected over the rows of the table.
     """
@@ -78,7 +78,7 @@ def window_effect(
 ) -> WindowEffect:
     """Return the effect in a window, not yet corrected."""
     differences = paired_effects(traces, defaults, column)[:, bins].mean(axis=1)
-    low, high = studentised_interval(differences)
+    low, high = studentized_interval(differences)
     value, default = (
         _mean_of_finite(np.array([one.values[bins, column] for one in runs])) for runs in (traces, defaults)
     )

@@ -18,8 +18,8 @@ _EXACT_UP_TO = 13
 """Largest number of differences of which all sign flips are counted: 2 ** 13 is less than `RESAMPLES`."""
 
 
-def studentised_interval(values: Floats, *, level: float = 0.95, seed: int = 0) -> tuple[float, float]:
-    """Return the studentised bootstrap interval of a mean (Efron and Tibshirani, 1993, section 12.5).
+def studentized_interval(values: Floats, *, level: float = 0.95, seed: int = 0) -> tuple[float, float]:
+    """Return the studentized bootstrap interval of a mean (Efron and Tibshirani, 1993, section 12.5).
 
     Unlike a percentile interval it is wide enough for 20 values, and it can contain 0 although all values
     have one sign.

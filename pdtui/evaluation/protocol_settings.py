@@ -22,7 +22,7 @@ class RandomPurpose(IntEnum):
     RANDOM_UNITS = 5
     RANDOM_DIRECTION = 6
     PLACEBO_KEYS = 7
-    OPERATOR_JUDGEMENT = 8
+    OPERATOR_JUDGMENT = 8
 
 
 def purpose_generator(purpose: RandomPurpose, *key: int) -> np.random.Generator:
@@ -65,7 +65,7 @@ class ProtocolSettings:
 QUICK_SEEDS = 6
 """Number of seeds of a quick evaluation, the first ones."""
 QUICK_PROTOCOL = ProtocolSettings(draws=4, draw_seeds=2, condition_seeds=3)
-"""A look rather than a judgement: with 6 seeds, no p-value is below 1/32."""
+"""A look rather than a judgment: with 6 seeds, no p-value is below 1/32."""
 
 
 def choose_protocol(*, quick: bool, hold: int | None) -> ProtocolSettings:

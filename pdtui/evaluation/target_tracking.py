@@ -8,7 +8,7 @@ from pdtui.core.errors import MapError
 from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveRunner
-from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarise_tracking
+from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarize_tracking
 from pdtui.stimulation.stimulation_map import Behavior
 
 
@@ -38,7 +38,7 @@ def evaluate_target_tracking(
         ]
         results = runner.run(drives, progress)
         unit = runner.attribute(attribute).unit
-    return summarise_tracking(results[: len(seeds)], unit, results[len(seeds) :])
+    return summarize_tracking(results[: len(seeds)], unit, results[len(seeds) :])
 
 
 def find_pid_behaviors(config: DriveConfig, attribute: str) -> list[Behavior]:

@@ -22,6 +22,7 @@ TOPICS = (
     "your-policy",
     "your-world",
     "results",
+    "matching-study",
     "shipped-policies",
     "speed",
     "commands",

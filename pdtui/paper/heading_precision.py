@@ -26,7 +26,7 @@ from pdtui.search.tracking_drives import (
     TrackingDriveResult,
     TrackingDriveRunner,
 )
-from pdtui.search.tracking_summary import HEADINGS, TrackingSummary, mean_errors_by_seed, summarise_tracking
+from pdtui.search.tracking_summary import HEADINGS, TrackingSummary, mean_errors_by_seed, summarize_tracking
 from pdtui.stimulation.stimulation_map import Behavior
 
 ATTRIBUTE = "yaw"
@@ -189,7 +189,7 @@ def _rows(
     shoved: list[PushedHeadingResult | None] = [None] * len(behaviors)
     if pushed is not None:
         shoved = [
-            PushedHeadingResult(summarise_tracking(part, unit), ratio)
+            PushedHeadingResult(summarize_tracking(part, unit), ratio)
             for part, ratio in zip(pushed, _ratios(behaviors, pushed), strict=True)
         ]
     return [
@@ -200,7 +200,7 @@ def _rows(
             describe_pid_output(behavior),
             (*behavior.commands, *loop.map.units_of(behavior)),
             {name: value for name, value in loop.robot.commands.items() if name not in behavior.commands},
-            summarise_tracking(drives[number], unit),
+            summarize_tracking(drives[number], unit),
             ratios[number],
             np.array([one.values.ravel() for one in drives[number]]),
             shoved[number],

@@ -22,7 +22,7 @@ class RepeatStatistics:
         return f"{self.mean:{form}}{spread}"
 
 
-def summarise_repeats(means: ArrayLike) -> RepeatStatistics:
+def summarize_repeats(means: ArrayLike) -> RepeatStatistics:
     """Return the statistics of the means of repeats, one number for each, shape (repeats,)."""
     values = np.asarray(means, np.float64)
     std = float(values.std(ddof=1)) if len(values) > 1 else math.nan

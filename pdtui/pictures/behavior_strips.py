@@ -19,7 +19,7 @@ from pdtui.evaluation.protocol_settings import RunTimes
 from pdtui.evaluation.ranked_runs import RankedRun
 from pdtui.pictures.matplotlib_page import open_figure_page
 from pdtui.pictures.perspective_camera import PerspectiveCamera
-from pdtui.pictures.plot_colors import BLUE, GREEN, GREY, VERMILLION, color_to_hex
+from pdtui.pictures.plot_colors import BLUE, GRAY, GREEN, VERMILLION, color_to_hex
 from pdtui.robots.geometry import capsule_ends, compute_link_poses
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def _draw_robot(axis: Axes, links: Sequence[Link], poses: Floats, extent: float)
         (float(root[0]), float(root[1]), 0.45 * extent), _ELEVATION, extent, 1.0, (0.0, 0.0)
     )
     inches = _ROW_HEIGHT * 0.8 / (2.6 * extent)  # of paper per m
-    for segments, color in ((ends * (1.0, 1.0, 0.0), GREY), (ends, BLUE)):
+    for segments, color in ((ends * (1.0, 1.0, 0.0), GRAY), (ends, BLUE)):
         dots, _, _ = camera.project(segments)
         radii = [2.0 * min(link.size) * inches * _POINTS_PER_INCH for link in links]
         widths = [max(0.6, radius) for radius in radii] if color is BLUE else [0.4] * len(links)

@@ -17,13 +17,13 @@ from pdtui.pictures.dissection_chart_data import (
     rank_nearest_units,
 )
 from pdtui.pictures.matplotlib_page import format_policy_title, open_figure_page
-from pdtui.pictures.plot_colors import BLUE, GREEN, GREY, VERMILLION, color_to_hex
+from pdtui.pictures.plot_colors import BLUE, GRAY, GREEN, VERMILLION, color_to_hex
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MATCHED, _PROBED, _OTHER, _FAINT = (color_to_hex(color) for color in (VERMILLION, GREEN, BLUE, GREY))
+_MATCHED, _PROBED, _OTHER, _FAINT = (color_to_hex(color) for color in (VERMILLION, GREEN, BLUE, GRAY))
 
 
 def draw_attribute_page(dissection: Dissection, column: int) -> bytes:
@@ -42,7 +42,7 @@ def draw_attribute_page(dissection: Dissection, column: int) -> bytes:
 
 
 def draw_spectrograms(figure: Figure, left: Axes, right: Axes, dissection: Dissection, column: int) -> None:
-    """Draw the spectrograms of an attribute and of its best match, in the same colours."""
+    """Draw the spectrograms of an attribute and of its best match, in the same colors."""
     pair = matched_spectrograms(dissection, column)
     if pair is None:
         _leave_out(left, dissection, column)
@@ -102,7 +102,7 @@ def draw_effects(panel: Axes, dissection: Dissection, column: int) -> None:
 
 
 def draw_effect_key(figure: Figure) -> None:
-    """Say below a page what the colours of effect curves mean."""
+    """Say below a page what the colors of effect curves mean."""
     from matplotlib.lines import Line2D
 
     handles = [

@@ -15,11 +15,11 @@ from pdtui.spectra.matching_presets import MatchingPreset
 from pdtui.spectra.spectrogram import short_time_transform
 
 DECIBELS = 60.0
-"""Range of a spectrogram's colours below its strongest cell, dB."""
+"""Range of a spectrogram's colors below its strongest cell, dB."""
 RANKED = 12
 """Number of units that a ranking shows."""
 STRONG = 3.0
-"""Side effect, in standard deviations, that gets the strongest colour; with a higher limit, the torques of a
+"""Side effect, in standard deviations, that gets the strongest color; with a higher limit, the torques of a
 robot that otherwise hardly moves would make all else pale."""
 
 
@@ -46,7 +46,7 @@ class MatchedSpectrograms:
     Attributes:
         attribute: The attribute, at the scale at which matching compares it.
         unit, label: Flat index and address of the unit.
-        low, high: Range of the colours that both share, dB.
+        low, high: Range of the colors that both share, dB.
     """
 
     attribute: Attribute
@@ -97,7 +97,7 @@ class SideEffectMatrix:
 
     @property
     def limit(self) -> float:
-        """Value at which the colours end: the largest magnitude, but at most `STRONG`."""
+        """Value at which the colors end: the largest magnitude, but at most `STRONG`."""
         sizes = [np.abs(np.nan_to_num(matrix)).max(initial=0.0) for matrix in self.by_value.values()]
         return min(STRONG, max([*map(float, sizes), 1e-9]))
 
@@ -146,7 +146,7 @@ def rank_nearest_units(dissection: Dissection, column: int) -> tuple[list[str], 
 
 def compute_effect_curves(dissection: Dissection, column: int) -> list[EffectCurve]:
     """Return the effect curves of the unit that moves an attribute most and of its first match."""
-    probed = dissection.judgement.of_attribute(column)[:1]
+    probed = dissection.judgment.of_attribute(column)[:1]
     ranked = dissection.matching.ranked_units(column)
     roles: dict[int, list[str]] = {}
     for one in probed:

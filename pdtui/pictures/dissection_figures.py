@@ -12,7 +12,7 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_summary import summarise_dissection
+from pdtui.dissection.dissection_summary import summarize_dissection
 from pdtui.pictures.dissection_attribute_plots import (
     draw_effect_key,
     draw_effects,
@@ -21,14 +21,14 @@ from pdtui.pictures.dissection_attribute_plots import (
 )
 from pdtui.pictures.dissection_chart_data import side_effect_matrix
 from pdtui.pictures.matplotlib_page import format_policy_title, open_figure_page
-from pdtui.pictures.plot_colors import GREEN, GREY, VERMILLION, color_to_hex, diverging_colors
+from pdtui.pictures.plot_colors import GRAY, GREEN, VERMILLION, color_to_hex, diverging_colors
 from pdtui.probing.matching_hits import TOP_MATCHES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MATCHED, _PROBED, _FAINT = color_to_hex(VERMILLION), color_to_hex(GREEN), color_to_hex(GREY)
+_MATCHED, _PROBED, _FAINT = color_to_hex(VERMILLION), color_to_hex(GREEN), color_to_hex(GRAY)
 _A_PAGE = 8
 """Attributes per page."""
 NAMES = ("spectrograms", "discrepancies", "effects", "side-effects", "hit-rates")
@@ -129,7 +129,7 @@ def _colorbar(figure: Figure, panels: Sequence[Axes], limit: float) -> None:
 
 def draw_matching_hits(target: Path | BytesIO, dissection: Dissection) -> None:
     """Draw how well matching finds the units that probing finds, one row per attribute."""
-    attributes = summarise_dissection(dissection)["attributes"]
+    attributes = summarize_dissection(dissection)["attributes"]
     names = [attribute["name"] for attribute in attributes]
 
     def column(key: str) -> Floats:
@@ -162,7 +162,7 @@ def draw_matching_hits(target: Path | BytesIO, dissection: Dissection) -> None:
         )
         right.axvline(0, color=_FAINT, linewidth=0.6)
         right.set(xlabel="rank correlation with the effect on other starts", xlim=(-1.05, 1.05))
-        right.set_title(f"Held out: {len(dissection.judgement.controls)} units drawn at random")
+        right.set_title(f"Held out: {len(dissection.judgment.controls)} units drawn at random")
         for panel in (left, right):
             panel.grid(axis="y", linewidth=0.3, alpha=0.5)
             panel.set_axisbelow(True)

@@ -19,7 +19,7 @@ from pdtui.core.atomic_file import check_writable
 from pdtui.core.errors import PictureError
 from pdtui.dissection.dissection_findings import describe_findings
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_summary import summarise_dissection
+from pdtui.dissection.dissection_summary import summarize_dissection
 from pdtui.dissection.dissection_tables import dissection_tables
 from pdtui.dissection.dissection_text import dissection_remarks
 from pdtui.pictures.dissection_attribute_plots import draw_attribute_page
@@ -60,7 +60,7 @@ def write_dissection_report(path: Path, dissection: Dissection) -> None:
             rr.log(entity, part, static=True, recording=recording, strict=True)
 
         recording.send_recording_name(f"Dissection of {dissection.policy} on {dissection.robot}")
-        recording.send_property(PROPERTY, rr.AnyValues(summary=json.dumps(summarise_dissection(dissection))))
+        recording.send_property(PROPERTY, rr.AnyValues(summary=json.dumps(summarize_dissection(dissection))))
         versions: dict[str, Any] = dict(collect_versions())
         recording.send_property(VERSIONS, rr.AnyValues(**versions))
         log(SUMMARY, rr.TextDocument(dissection_markdown(dissection), media_type=rr.MediaType.MARKDOWN))
@@ -162,7 +162,7 @@ def _log_overviews(log: Log, dissection: Dissection) -> None:
 
 def dissection_markdown(dissection: Dissection) -> str:
     """Return what was found in plain words, and everything else that the terminal prints, as Markdown."""
-    summary = summarise_dissection(dissection)
+    summary = summarize_dissection(dissection)
     parts = [f"# Dissection of {summary['policy']} on {summary['robot']}"]
     for heading, lines in describe_findings(summary).items():
         parts += [f"## {heading}", "\n".join(f"- {line}" for line in lines)]

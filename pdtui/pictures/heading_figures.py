@@ -17,7 +17,7 @@ from rich.table import Table
 from pdtui.core.attributes import Floats, wrap_angles
 from pdtui.core.printable_text import to_json
 from pdtui.pictures.matplotlib_page import FIGURE_SUFFIXES, open_figure_page
-from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, color_to_hex
+from pdtui.pictures.plot_colors import CYCLE, GRAY, RgbColor, color_to_hex
 from pdtui.pictures.rerun_report_file import TIME, open_report_file, table_to_markdown
 
 APP = "pdtui-tracking"
@@ -126,7 +126,7 @@ def _write_heading_recording(path: Path, shown: HeadingFigure) -> None:
         recording.send_property(PROPERTY, rr.AnyValues(summary=to_json(shown.summary, indent=None)))
         table = rr.TextDocument(table_to_markdown(shown.figures), media_type=rr.MediaType.MARKDOWN)
         rr.log(_FIGURES, table, static=True, recording=recording, strict=True)
-        curve(f"{_HEADINGS}/target", shown.target, "target", GREY, 1.5)
+        curve(f"{_HEADINGS}/target", shown.target, "target", GRAY, 1.5)
         for behavior, color in zip(shown.behaviors, cycle(CYCLE), strict=False):
             mean, low, high, error = behavior.statistics(shown.target)
             part = rr.escape_entity_path_part(behavior.name)

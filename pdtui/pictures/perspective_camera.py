@@ -19,11 +19,11 @@ class PerspectiveCamera:
     """A perspective camera whose picture has world x to the right, or another direction on the ground.
 
     Attributes:
-        target: the point that appears at `centre`, m.
+        target: the point that appears at `center`, m.
         elevation: angle of the camera above the horizon, degrees; 90 looks straight down, with world y up.
         extent: half the size of the area to show, m; the camera is 6 times as far away.
         zoom: dots per m at the target's distance.
-        centre: place of the target in the picture, in dots.
+        center: place of the target in the picture, in dots.
         azimuth: angle from world x to the picture's right, counterclockwise about the vertical, rad.
     """
 
@@ -31,7 +31,7 @@ class PerspectiveCamera:
     elevation: float
     extent: float
     zoom: float
-    centre: tuple[float, float]
+    center: tuple[float, float]
     azimuth: float = 0.0
 
     def project(self, points: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -46,8 +46,8 @@ class PerspectiveCamera:
         magnification = 1.0 / np.where(before, depth, 1.0)
         dots = np.stack(
             [
-                self.centre[0] + relative[..., 0] * magnification * self.zoom,
-                self.centre[1] - up * magnification * self.zoom,
+                self.center[0] + relative[..., 0] * magnification * self.zoom,
+                self.center[1] - up * magnification * self.zoom,
             ],
             axis=-1,
         )

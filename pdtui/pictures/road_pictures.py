@@ -1,4 +1,4 @@
-"""Ways of cars on roads from above, coloured by behavior, as a PNG and as a recording for the viewer."""
+"""Ways of cars on roads from above, colored by behavior, as a PNG and as a recording for the viewer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import rerun.blueprint as rrb
 
 from pdtui.core.attributes import Floats
 from pdtui.pictures.matplotlib_page import FIGURE_SUFFIXES, open_figure_page
-from pdtui.pictures.plot_colors import CYCLE, GREY, RgbColor, color_to_hex
+from pdtui.pictures.plot_colors import CYCLE, GRAY, RgbColor, color_to_hex
 from pdtui.pictures.rerun_report_file import open_report_file
 
 APP = "pdtui-driving"
@@ -68,9 +68,9 @@ def draw_road_pictures(paths: Sequence[Path], title: str, pictures: Sequence[Roa
 
 
 def behavior_colors(pictures: Sequence[RoadPicture]) -> dict[str, RgbColor]:
-    """Return a colour for each behavior that occurs; grey for none."""
+    """Return a color for each behavior that occurs; gray for none."""
     names = sorted({name for one in pictures for name in one.behaviors if name})
-    return {"": GREY} | {name: CYCLE[row % len(CYCLE)] for row, name in enumerate(names)}
+    return {"": GRAY} | {name: CYCLE[row % len(CYCLE)] for row, name in enumerate(names)}
 
 
 def box_corners(boxes: Floats) -> Floats:

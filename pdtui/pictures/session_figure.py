@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.pictures.matplotlib_page import open_figure_page
-from pdtui.pictures.plot_colors import BLUE, GREY, VERMILLION, color_to_hex
+from pdtui.pictures.plot_colors import BLUE, GRAY, VERMILLION, color_to_hex
 from pdtui.sessions.comparison.session_comparison import SessionComparison
 from pdtui.sessions.drive_path import DrivePath
 from pdtui.sessions.session_header import SessionHeader
@@ -23,7 +23,7 @@ def draw_session_comparison(
 ) -> None:
     """Draw the paths of two sessions, and over time the attributes that differ most in the end.
 
-    What both have in common is grey; the first step that differs is a dot and a line. An attribute is ranked
+    What both have in common is gray; the first step that differs is a dot and a line. An attribute is ranked
     by its mean deviation in shares of its standard deviation.
 
     Raises:
@@ -53,17 +53,17 @@ def draw_session_comparison(
             split = len(course.steps) if first is None else int(np.searchsorted(course.steps, first))
             if has_path:
                 cut = len(course.places) if first is None else int(np.searchsorted(course.pose_steps, first))
-                path.plot(*course.places[: cut + 1, :2].T, color=color_to_hex(GREY))
+                path.plot(*course.places[: cut + 1, :2].T, color=color_to_hex(GRAY))
                 path.plot(*course.places[cut:, :2].T, color=color_to_hex(color), label=label)
                 path.plot(*course.places[min(cut, len(course.places) - 1), :2], "o", color="black", ms=3)
             for axes, column in zip(plots, shown, strict=True):
                 attribute = info.attributes[column]
                 times = (course.steps + 1) * info.dt
                 values = course.attributes[:, column]
-                axes.plot(times[:split], values[:split], color=color_to_hex(GREY))
+                axes.plot(times[:split], values[:split], color=color_to_hex(GRAY))
                 axes.plot(times[split:], values[split:], color=color_to_hex(color), label=label)
                 axes.set_title(attribute.name + (f" ({attribute.unit})" if attribute.unit else ""))
                 if first is not None:
-                    axes.axvline((first + 1) * info.dt, color=color_to_hex(GREY), linewidth=0.5)
+                    axes.axvline((first + 1) * info.dt, color=color_to_hex(GRAY), linewidth=0.5)
         plots[-1].set_xlabel("time (s)")
         (path if has_path else plots[0]).legend(loc="best")

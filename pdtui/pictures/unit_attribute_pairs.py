@@ -135,7 +135,7 @@ def pair_units_with_attributes(
 def draw_unit_attribute_pairs(
     path: Path, curves: UnitAttributePairs, *, start: float = 0.0, seconds: float | None = 10.0
 ) -> None:
-    """Draw one panel per pair: the attribute as a solid line, the unit as a dashed one, in the same colour.
+    """Draw one panel per pair: the attribute as a solid line, the unit as a dashed one, in the same color.
 
     The part that is shown begins at `start` and lasts `seconds`, or up to the end for None. An existing file
     is replaced once the picture is whole.

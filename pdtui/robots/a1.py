@@ -67,7 +67,7 @@ class A1(BulletRobot):
         terrain: Where the robot starts unless `reset` says otherwise: on a ``plane``, on ``rough`` ground, or
             in a ``forest`` on rough ground.
         roughness: Largest height of rough ground, m.
-        density: Trees of the forest per square metre.
+        density: Trees of the forest per square meter.
         top_speed: Speed beyond which going faster is not rewarded, m/s.
     """
 

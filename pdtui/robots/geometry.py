@@ -1,4 +1,4 @@
-"""Rotations and poses, vectorised over leading axes. Quaternions are w x y z, of unit length."""
+"""Rotations and poses, vectorized over leading axes. Quaternions are w x y z, of unit length."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class TaskRunTrace:
 
 @dataclass(frozen=True)
 class TaskVerdict:
-    """The judgement of one run of a task.
+    """The judgment of one run of a task.
 
     Attributes:
         success: Whether the task was done.

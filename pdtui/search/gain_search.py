@@ -63,7 +63,6 @@ class GainSearch:
         seeds: seeds of the drives.
         costs_of: returns the costs of a controller on seeds.
         settings: how much to do.
-        deadline: asked before each measurement.
     """
 
     def __init__(
@@ -73,10 +72,10 @@ class GainSearch:
         seeds: Sequence[int],
         costs_of: Callable[[PidGains, Sequence[int]], list[float]],
         settings: TuningSettings,
-        deadline: Deadline,
     ) -> None:
         self._old, self._step, self._seeds, self._costs_of = old, step, seeds, costs_of
-        self._settings, self._deadline = settings, deadline
+        self._settings = settings
+        self._deadline: Deadline = lambda: False
         self._refined = min(_REFINED_SEEDS, len(seeds))
         self._costs: dict[PidGains, list[float]] = {}
         self.ended_early = False
@@ -86,12 +85,14 @@ class GainSearch:
         """Number of controllers measured so far."""
         return len(self._costs)
 
-    def run(self, also: Sequence[PidGains], *, proportional: bool = False) -> PidGains:
+    def run(self, also: Sequence[PidGains], deadline: Deadline, *, proportional: bool = False) -> PidGains:
         """Return the best controller, without integral and derivative if it is to be only proportional.
 
         Those given are measured first. What an earlier run measured counts, too, so that a search of all
-        gains does no worse than the one of the proportional part before it.
+        gains does no worse than the one of the proportional part before it. The deadline is asked before each
+        measurement.
         """
+        self._deadline = deadline
         try:
             starts = self._select(also, proportional)
             for start in starts:

@@ -1,6 +1,6 @@
 """`pdtui tune`: choose gains and limit of a behavior of mode ``pid`` by its step responses.
 
-The search minimises the integral of the absolute error over steps of the target, a common criterion for PID
+The search minimizes the integral of the absolute error over steps of the target, a common criterion for PID
 tuning (Åström and Hägglund, "Advanced PID Control", 2006), plus a penalty for falls. The steps of an angle
 are drawn anew for each seed, since the starts of a robot on flat ground hardly differ, and on every second
 seed the limit is larger, since a search otherwise ends at gains with which the robot only just does not fall.
@@ -25,7 +25,7 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.search.evolutionary_search import Deadline, SharedTimeBudget
 from pdtui.search.gain_search import GainSearch, TuningSettings
 from pdtui.search.tracking_drives import TrackingDriveJob, TrackingDriveResult, TrackingDriveRunner
-from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarise_tracking
+from pdtui.search.tracking_summary import TrackingSummary, choose_tracking_targets, summarize_tracking
 from pdtui.stimulation.seed_ranges import require_search_seeds
 from pdtui.stimulation.stimulation_map import Behavior, PidGains, StimulationMap
 
@@ -47,7 +47,7 @@ class GainsOnTrial:
     Attributes:
         pid: the controller.
         tracking: its figures; a drive counts until its end.
-        ratio: its mean |error|, with failures penalised, over that of the controller that is kept, paired by
+        ratio: its mean |error|, with failures penalized, over that of the controller that is kept, paired by
             seed; None for that one.
     """
 
@@ -139,8 +139,9 @@ def tune_gains(
         behaviors = _find_pid_behaviors(runner.loop.map, names)
         results = []
         for number, behavior in enumerate(behaviors):
-            deadline = budget.share(len(behaviors) - number)
-            results.append(_tune_behavior(runner, behavior, seeds, settings, deadline, progress))
+            left = 2 * (len(behaviors) - number)
+            deadlines = budget.share(left), budget.share(left // 2)
+            results.append(_tune_behavior(runner, behavior, seeds, settings, deadlines, progress))
         return results
 
 
@@ -174,7 +175,7 @@ def _tune_behavior(
     behavior: Behavior,
     seeds: Sequence[int],
     settings: TuningSettings,
-    deadline: Deadline,
+    deadlines: tuple[Deadline, Deadline],
     progress: Progress | None,
 ) -> TunedGains:
     assert behavior.pid is not None
@@ -201,10 +202,10 @@ def _tune_behavior(
             progress(search.tried + 1, 2 * total + 2, f"{behavior.name}: {best[0]:.3g} {attribute.unit}")
         return costs
 
-    search = GainSearch(old, step, seeds[:half], costs_of, settings, deadline)
+    search = GainSearch(old, step, seeds[:half], costs_of, settings)
     plain = [replace(old, ki=0.0, kd=0.0)] if old.kp else []
-    proportional = search.run(plain, proportional=True)
-    found = search.run([old, proportional])
+    proportional = search.run(plain, deadlines[0], proportional=True)
+    found = search.run([old, proportional], deadlines[1])
     pids: dict[GainsOrigin, PidGains] = {"map": old, "proportional": proportional, "found": found}
     jobs = [
         TrackingDriveJob(old.attribute, behavior.name, seed, targets[seed], pid)
@@ -221,7 +222,7 @@ def _tune_behavior(
     trials = {
         name: GainsOnTrial(
             pid,
-            summarise_tracking(results[name], attribute.unit),
+            summarize_tracking(results[name], attribute.unit),
             None if pid == pids[kept] else paired_ratio(costs[name], costs[kept]),
         )
         for name, pid in pids.items()

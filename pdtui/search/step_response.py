@@ -43,7 +43,7 @@ class StepResponseSummary:
 
     @classmethod
     def of(cls, responses: Sequence[StepResponse]) -> StepResponseSummary:
-        """Summarise responses."""
+        """Summarize responses."""
         risen = [one.rise for one in responses if np.isfinite(one.rise)]
         return cls(
             float(np.mean(risen)) if risen else None,

@@ -148,7 +148,7 @@ def drive_through_targets(template: ControlLoop, drive: TrackingDriveJob) -> Tra
             outcome = record.outcome or outcome
             if record.ended:
                 break
-    return _summarise(
+    return _summarize(
         drive, path, outcome, template.robot.attributes[column].wraps, template.robot.control_dt
     )
 
@@ -161,7 +161,7 @@ def _events(step: int, drive: TrackingDriveJob, number: int) -> list[DriveEvent]
     return [DriveEvent(step, "behavior", drive.behavior), target] if number == 0 else [target]
 
 
-def _summarise(
+def _summarize(
     drive: TrackingDriveJob, path: Floats, outcome: Outcome | None, wraps: bool, dt: float
 ) -> TrackingDriveResult:
     smooth = np.unwrap(path) if wraps else path

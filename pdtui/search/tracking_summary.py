@@ -66,10 +66,10 @@ class TrackingSummary:
     default_outcomes: OutcomeCounts = field(default_factory=dict)
 
 
-def summarise_tracking(
+def summarize_tracking(
     results: Sequence[TrackingDriveResult], unit: str, untouched: Sequence[TrackingDriveResult] = ()
 ) -> TrackingSummary:
-    """Summarise drives of one behavior, one per seed, beside the `untouched`: those without a controller."""
+    """Summarize drives of one behavior, one per seed, beside the `untouched`: those without a controller."""
     drive = results[0].drive
     common = drive.targets if len({one.drive.targets for one in results}) == 1 else ()
     table = np.abs(np.array([one.errors for one in results]))

@@ -26,7 +26,7 @@ class DrivePath:
         steps: numbers of the control steps, shape (S,).
         attributes: attributes after each, shape (S, J).
         pose_steps: those that have poses, shape (P,); none for a robot without links.
-        places: the centre of the robot's first shape after each of those, in m, shape (P, 3).
+        places: the center of the robot's first shape after each of those, in m, shape (P, 3).
     """
 
     steps: NDArray[np.int64]
@@ -82,7 +82,7 @@ def _pair(place: Floats) -> tuple[float, float]:
 
 
 def _place_robot(link: Link, block: StepBlock) -> Floats:
-    """Return the centre of the robot's first shape in each step that has poses, shape (p, 3)."""
+    """Return the center of the robot's first shape in each step that has poses, shape (p, 3)."""
     if link.shape == "box":
         return block.poses["Boxes3D:centers"][:, 0].astype(np.float64)
     # A session keeps where a capsule begins; from there, it extends along its own z.

@@ -172,16 +172,16 @@ def read_session_summary(session: SessionHeader) -> SessionSummary:
     """Read the summary statistics of a session from the index at its end, or compute them without one.
 
     Raises:
-        SessionError: as `summarise_session`.
+        SessionError: as `summarize_session`.
     """
     index = read_end_index(session.path) or {}
     try:
         return _decode_summary(index["summary"])
     except (KeyError, TypeError, AttributeError):
-        return summarise_session(session)
+        return summarize_session(session)
 
 
-def summarise_session(session: SessionHeader) -> SessionSummary:
+def summarize_session(session: SessionHeader) -> SessionSummary:
     """Compute the summary statistics of a session from its file, of which a block at a time is in memory.
 
     Raises:

@@ -191,4 +191,4 @@ def _find_unit_flaws(
 
 
 def _levels_count(preset: MatchingPreset) -> bool:
-    return preset.level == "kept" and preset.scaling != "standardised"
+    return preset.level == "kept" and preset.scaling != "standardized"

@@ -33,7 +33,7 @@ class MatchingPreset:
         hop: distance between the starts of windows, samples.
         spectrogram: ``power`` |STFT|² (section 3.2), or ``magnitude`` |STFT| (the authors' released code).
         scaling: scale of the series before the transform: ``observed``, attributes as the policy observes
-            them; ``raw``, attributes in their physical units; ``standardised``, attributes and units minus
+            them; ``raw``, attributes in their physical units; ``standardized``, attributes and units minus
             their mean and divided by their standard deviation over all episodes.
         level: ``kept``, or ``removed`` to leave the bins that a constant fills out of distances.
         angles: ``unwrapped`` over time, or ``wrapped`` to (−π, π].
@@ -50,7 +50,7 @@ class MatchingPreset:
     length: int
     hop: int
     spectrogram: Literal["power", "magnitude"]
-    scaling: Literal["observed", "raw", "standardised"] = "observed"
+    scaling: Literal["observed", "raw", "standardized"] = "observed"
     level: Literal["kept", "removed"] = "kept"
     angles: Literal["unwrapped", "wrapped"] = "unwrapped"
     predominant: Literal["any", "moving"] = "any"

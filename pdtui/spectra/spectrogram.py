@@ -39,8 +39,8 @@ def scaled_attribute_series(
             if attribute.wraps:
                 for values in series:
                     values[:, column] = np.pi - (np.pi - values[:, column]) % (2 * np.pi)
-    if preset.scaling == "standardised":
-        return _standardised(series)
+    if preset.scaling == "standardized":
+        return _standardized(series)
     if preset.scaling == "observed":
         for values in series:
             for column, attribute in enumerate(attributes):
@@ -53,7 +53,7 @@ def scaled_activation_series(
 ) -> list[NDArray[Any]]:
     """Return the scaled activations of B units of each episode, shape (T, B) each."""
     series = [episode.activations[:, units] for episode in episodes]
-    return _standardised(series) if preset.scaling == "standardised" else series
+    return _standardized(series) if preset.scaling == "standardized" else series
 
 
 def map_unit_blocks(
@@ -76,7 +76,7 @@ def _libraries() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _standardised(series: Sequence[NDArray[Any]]) -> list[Floats]:
+def _standardized(series: Sequence[NDArray[Any]]) -> list[Floats]:
     together = np.concatenate(series).astype(np.float64)
     mean, spread = together.mean(axis=0), together.std(axis=0)
     # The mean of equal numbers is not exactly that number; a constant series has to become all zeros.

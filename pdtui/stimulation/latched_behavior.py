@@ -80,7 +80,7 @@ class LatchedBehavior:
             self.factor,
             self.muted,
             tuple(dict.fromkeys((*self.base, *self.weights, *edited))),
-            None if gains is None else PidTuning(gains.kp, gains.ki, gains.kd),
+            None if gains is None else PidTuning(gains.kp, gains.ki, gains.kd, gains.limit),
         )
 
     def copy(self) -> LatchedBehavior:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pdtui.policies.weights.import_options import (
-    NO_NORMALISER,
+    NO_NORMALIZER,
     NO_OPTIONS,
     ImportOptions,
     ObservationActionSpaces,
@@ -51,8 +51,8 @@ def locate_map_policy(
     source = stimulation_map.source
     name = policy or _path_from_here(stimulation_map.policy, source)
     merged = import_options.or_else(stimulation_map.import_options)
-    if merged.normaliser != NO_NORMALISER and not import_options.normaliser:
-        merged = replace(merged, normaliser=_path_from_here(merged.normaliser, source))
+    if merged.normalizer != NO_NORMALIZER and not import_options.normalizer:
+        merged = replace(merged, normalizer=_path_from_here(merged.normalizer, source))
     return replace(stimulation_map, policy=name, import_options=merged)
 
 
@@ -80,8 +80,8 @@ def relative_policy_name(
         import_options: As the user gave them.
         output: The map's file.
     """
-    normaliser = _path_from_map(import_options.normaliser, output)
-    return _path_from_map(policy, output), replace(import_options, normaliser=normaliser)
+    normalizer = _path_from_map(import_options.normalizer, output)
+    return _path_from_map(policy, output), replace(import_options, normalizer=normalizer)
 
 
 def _path_from_map(name: str, output: Path) -> str:

@@ -59,7 +59,7 @@ def parse_map(text: str, source: str) -> StimulationMap:
     import_options = ImportOptions(
         policy.choice("activation", ACTIVATION_NAMES, ""),
         policy.choice("squash", SQUASH_NAMES, ""),
-        policy.text("normaliser", ""),
+        policy.text("normalizer", policy.text("normaliser", "")),  # the spelling of earlier maps
     )
     policy.done()
     keys = MapTableReader(source, text, "keys", top.take("keys", dict, {"default": "space"}), "[keys]", 0)

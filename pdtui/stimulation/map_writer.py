@@ -99,6 +99,7 @@ def replace_policy(text: str, name: str, import_options: ImportOptions, source: 
             raise KeyError("policy")
         part = tomlkit.parse(text[start:end])
         policy: Any = part["policy"]
+        policy.pop("normaliser", None)  # the spelling of earlier maps
         policy.update(policy_fields(name, policy["sha256"], import_options))
     except (TOMLKitError, KeyError, AttributeError) as error:
         raise MapError(f"{source}: expected the policy in a table [policy] of its own") from error

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 from simple_pid import PID
 
 from pdtui.core.attributes import wrap_angle
+from pdtui.core.errors import KeystrokeError
 from pdtui.stimulation.stimulation_map import PidGains
 
-GainName = Literal["kp", "ki", "kd"]
+GainName = Literal["kp", "ki", "kd", "limit"]
 
 
 class PidMagnitude:
@@ -48,10 +49,16 @@ class PidMagnitude:
         self.target = wrap_angle(target) if self._wraps else target
 
     def set_gain(self, name: GainName, value: float) -> None:
-        """Set a gain from now on; what the integral has summed up stays."""
-        kp, ki, kd = (value if one == name else getattr(self.gains, one) for one in ("kp", "ki", "kd"))
-        self.gains = replace(self.gains, kp=kp, ki=ki, kd=kd)
-        self._pid.tunings = kp, ki, kd
+        """Set a gain or the limit from now on; what the integral has summed up stays, within the limit.
+
+        A limit that is not above 0 is a `KeystrokeError`.
+        """
+        if name == "limit" and value <= 0.0:
+            raise KeystrokeError(f"limit: expected more than 0, found {value:g}")
+        changed: dict[str, Any] = {name: value}
+        self.gains = replace(self.gains, **changed)
+        self._pid.tunings = self.gains.kp, self.gains.ki, self.gains.kd
+        self._pid.output_limits = -self.gains.limit, self.gains.limit
 
     def update(self, value: float) -> float:
         """Return the magnitude c for the attribute's present value; call it once per control step."""

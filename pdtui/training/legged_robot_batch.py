@@ -1,6 +1,6 @@
 """Many legged robots that are stepped together: physics in MuJoCo's own threads, everything else in NumPy.
 
-They are randomised as in legged_gym (Rudin et al., 2021): friction, pushes, noisy observations, commands.
+They are randomized as in legged_gym (Rudin et al., 2021): friction, pushes, noisy observations, commands.
 """
 
 from __future__ import annotations

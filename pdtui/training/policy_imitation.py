@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pdtui.policies.weights.policy_network import PolicyNetwork
 from pdtui.training.actor_conversion import Actor, make_numpy_actor, network_to_actor
 from pdtui.training.multilayer_perceptron import MlpParameters, apply_mlp
-from pdtui.training.ppo_learner import PpoLearner, PpoState, normalise_observations
+from pdtui.training.ppo_learner import PpoLearner, PpoState, normalize_observations
 
 _EPOCHS, _BATCH, _LEARNING_RATE = 60, 256, 1e-3
 # Control steps of every robot in each round of imitation, and the deviation of the noise on the actions.
@@ -86,7 +86,7 @@ def fit_actor(
     """
     mean, variance = jnp.asarray(seen.mean(axis=0)), jnp.asarray(seen.var(axis=0))
     state = state._replace(mean=mean, variance=variance, rows_seen=jnp.asarray(float(len(seen))))
-    inputs = normalise_observations(state, jnp.asarray(seen), learner.config.least_deviation)
+    inputs = normalize_observations(state, jnp.asarray(seen), learner.config.least_deviation)
     actor, left = _fit_layers(state.actor, inputs, jnp.asarray(actions), learner.activate, rng)
     return state._replace(actor=actor, average=jax.tree.map(jnp.copy, actor)), left
 
@@ -133,7 +133,7 @@ def _fit_layers(
 ) -> tuple[MlpParameters, float]:
     """Fit layers whose outputs are squashed by tanh; also returns the error on the last tenth of the rows."""
     fitted = int(0.9 * len(inputs))
-    optimiser = optax.adam(_LEARNING_RATE)
+    optimizer = optax.adam(_LEARNING_RATE)
 
     def error(actor: MlpParameters, rows: jax.Array) -> jax.Array:
         acted = jnp.tanh(apply_mlp(actor, inputs[rows], activate))
@@ -142,11 +142,11 @@ def _fit_layers(
 
     def step(carry: tuple[MlpParameters, Any], rows: jax.Array) -> tuple[tuple[MlpParameters, Any], None]:
         actor, kept = carry
-        changes, kept = optimiser.update(jax.grad(error)(actor, rows), kept)
+        changes, kept = optimizer.update(jax.grad(error)(actor, rows), kept)
         return (optax.apply_updates(actor, changes), kept), None
 
     scan = jax.jit(lambda carry, batches: jax.lax.scan(step, carry, batches)[0])
-    carry = (actor, optimiser.init(actor))
+    carry = (actor, optimizer.init(actor))
     for _ in range(_EPOCHS):
         order = rng.permutation(fitted)[: fitted // _BATCH * _BATCH]
         carry = scan(carry, jnp.asarray(order.reshape(-1, _BATCH)))

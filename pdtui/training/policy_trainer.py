@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.outcome import Outcome, is_failure
 from pdtui.policies.weights.policy_network import NetworkSpec
-from pdtui.policies.weights.weights_file import save_network
+from pdtui.policies.weights.weights_file import CHECKPOINT_FOLDER, save_network
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot
 from pdtui.training.actor_conversion import Actor, actor_to_network, make_numpy_actor
@@ -29,6 +29,8 @@ from pdtui.training.training_config import TrainingConfig
 # First seeds of the episodes that select the best weights, and of those that its published score comes from.
 SELECTION_SEEDS, REPORT_SEEDS = 1_000_000, 2_000_000
 _ITERATIONS_PER_REPORT = 16
+_CHECKPOINTS = 50
+"""Parts of a run after each of which the policy is kept on request."""
 Config = TypeVar("Config", bound=TrainingConfig)
 
 
@@ -166,9 +168,12 @@ class PolicyTrainer(ABC, Generic[Config]):
         config, iterations = self.config, 0
         if not self.steps and self.has_initial_policy:
             report(0, self._evaluate(), self._best_score())
+        if not self.steps:
+            self._keep_checkpoint(0)
         while self.steps < config.total_steps:
             taken = self.advance()
             self.steps += taken
+            self._keep_checkpoint(taken)
             score = None
             if self.steps % config.evaluate_every < taken or self.steps >= config.total_steps:
                 score = self._evaluate()
@@ -207,10 +212,17 @@ class PolicyTrainer(ABC, Generic[Config]):
             log.write(json.dumps(line) + "\n")
         if best is None or score.steadiness > best.steadiness:
             self.best = line
-            self._save_best(params, self._score(actor, REPORT_SEEDS))
+            self._save(self.best_weights, params, asdict(self._score(actor, REPORT_SEEDS)))
         return score
 
-    def _save_best(self, params: MlpParameters, score: ActorScore) -> None:
+    def _keep_checkpoint(self, taken: int) -> None:
+        """Keep the policy if the last steps completed another part of the run, and at its start."""
+        part = self.config.total_steps / _CHECKPOINTS
+        if self.config.keeps_checkpoints and (not taken or self.steps // part > (self.steps - taken) // part):
+            path = self.folder / CHECKPOINT_FOLDER / f"{self.steps:010d}.safetensors"
+            self._save(path, self.averaged_actor(), {})
+
+    def _save(self, path: Path, params: MlpParameters, score: dict[str, Any]) -> None:
         spec = NetworkSpec(
             robot=self.robot,
             observations=self.observations,
@@ -221,9 +233,9 @@ class PolicyTrainer(ABC, Generic[Config]):
             action_low=tuple(self._low.tolist()),
             action_high=tuple(self._high.tolist()),
             command=self.command,
-            score={"steps": self.steps, **asdict(score)},
+            score={"steps": self.steps, **score},
         )
-        save_network(self.best_weights, actor_to_network(params, spec))
+        save_network(path, actor_to_network(params, spec))
 
     def _best_score(self) -> ActorScore | None:
         if self.best is None:

@@ -1,6 +1,6 @@
-"""The learner of Proximal Policy Optimisation, compiled by JAX.
+"""The learner of Proximal Policy Optimization, compiled by JAX.
 
-It follows Schulman et al., "Proximal Policy Optimization Algorithms" (2017): a clipped surrogate, generalised
+It follows Schulman et al., "Proximal Policy Optimization Algorithms" (2017): a clipped surrogate, generalized
 advantages, and a learning rate that adapts to the divergence between updates. The policy is a Gaussian
 squashed by tanh, as in SAC, so that both algorithms end in the same network. The squashing is the same before
 and after an update, so probability ratios are those of the Gaussians.
@@ -29,13 +29,13 @@ _MIN_LOG_STD, _MAX_LOG_STD = -3.0, 0.5
 class PpoState(NamedTuple):
     """Everything that learning changes, as a tree of arrays.
 
-    `mean`, `variance` and `rows_seen` normalise observations; `average` is the moving average of the actor.
+    `mean`, `variance` and `rows_seen` normalize observations; `average` is the moving average of the actor.
     """
 
     actor: MlpParameters
     log_std: jax.Array
     critic: MlpParameters
-    optimiser: Any
+    optimizer: Any
     rate: jax.Array
     key: jax.Array
     mean: jax.Array
@@ -64,8 +64,8 @@ class _Sample(NamedTuple):
     value_goal: jax.Array
 
 
-def normalise_observations(state: PpoState, observation: jax.Array, least_deviation: float) -> jax.Array:
-    """Return observations normalised by the running mean and deviation."""
+def normalize_observations(state: PpoState, observation: jax.Array, least_deviation: float) -> jax.Array:
+    """Return observations normalized by the running mean and deviation."""
     return (observation - state.mean) / _deviation(state, least_deviation)
 
 
@@ -94,10 +94,10 @@ class PpoLearner:
         actor[-1] = jax.tree.map(lambda leaf: 0.01 * leaf, actor[-1])
         critic = init_mlp_parameters(critic_key, (self.observations, *config.layers, 1), False)
         log_std = jnp.full(self.actions, config.log_std)
-        optimiser, rate = self._tx.init((actor, log_std, critic)), jnp.asarray(config.learning_rate)
+        optimizer, rate = self._tx.init((actor, log_std, critic)), jnp.asarray(config.learning_rate)
         mean, variance, rows_seen = jnp.zeros(self.observations), jnp.ones(self.observations), 1e-4
         seen = (mean, variance, jnp.asarray(rows_seen), jnp.zeros(()), jax.tree.map(jnp.copy, actor))
-        return PpoState(actor, log_std, critic, optimiser, rate, key, *seen)
+        return PpoState(actor, log_std, critic, optimizer, rate, key, *seen)
 
     def folded_actor(self, state: PpoState) -> MlpParameters:
         """Return the averaged actor on raw observations, with log deviations as constant outputs."""
@@ -138,9 +138,9 @@ class PpoLearner:
 
     def _samples(self, state: PpoState, rollout: PpoRollout) -> _Sample:
         config = self.config
-        observation = normalise_observations(state, rollout.observation, config.least_deviation)
+        observation = normalize_observations(state, rollout.observation, config.least_deviation)
         value = apply_mlp(state.critic, observation, self.activate)[..., 0]
-        following = normalise_observations(state, rollout.following, config.least_deviation)
+        following = normalize_observations(state, rollout.following, config.least_deviation)
         future = apply_mlp(state.critic, following, self.activate)[..., 0]
         delta = rollout.reward * config.reward_scale + config.discount * rollout.discount * future - value
 
@@ -176,7 +176,7 @@ class PpoLearner:
 
         parameters = (state.actor, state.log_std, state.critic)
         gradient, divergence = jax.grad(loss, has_aux=True)(parameters)
-        changes, optimiser = self._tx.update(gradient, state.optimiser)
+        changes, optimizer = self._tx.update(gradient, state.optimizer)
         learns = state.iterations >= config.critic_iterations
         moved, spread, valued = jax.tree.map(lambda change: -state.rate * change, changes)
         moved, spread = jax.tree.map(lambda change: jnp.where(learns, change, 0.0), (moved, spread))
@@ -194,7 +194,7 @@ class PpoLearner:
                 actor=actor,
                 log_std=jnp.clip(log_std, _MIN_LOG_STD, _MAX_LOG_STD),
                 critic=critic,
-                optimiser=optimiser,
+                optimizer=optimizer,
                 rate=jnp.clip(rate, _MIN_RATE, _MAX_RATE),
                 average=average,
             ),

@@ -1,4 +1,4 @@
-"""Training by Proximal Policy Optimisation: many robots, stepped by two threads, and a warm start.
+"""Training by Proximal Policy Optimization: many robots, stepped by two threads, and a warm start.
 
 MuJoCo releases Python's lock while it steps. For a simulator that does not, each thread waits for a process.
 """
@@ -26,7 +26,7 @@ from pdtui.training.robot_batch import RemoteRobotBatch, RobotBatch, TransitionB
 from pdtui.training.training_config import PpoConfig
 
 THREADS = 2
-# Control steps of the initial policy from which the observations are normalised.
+# Control steps of the initial policy from which the observations are normalized.
 _WARM_START_STEPS = 200
 # A smaller deviation than this would blow up inputs that hardly change.
 _MIN_DEVIATION = 0.01
@@ -120,7 +120,7 @@ def warm_start_policy(
         state: Untrained state.
         actor: Trained actor on raw observations, which returns means and log deviations. It observes the
             first columns of what the run observes.
-        seen: Raw observations while the policy acts, shape (T, observations), to normalise by.
+        seen: Raw observations while the policy acts, shape (T, observations), to normalize by.
 
     Raises:
         TrainingError: The policy has other layers or actions, or observes more.

@@ -43,8 +43,8 @@ def _critic_forward(params: MlpParameters, observation: jax.Array, action: jax.A
     x = jnp.concatenate([observation, action], axis=-1)
     for layer in params[:-1]:
         x = x @ layer["w"] + layer["b"]
-        centred = x - x.mean(-1, keepdims=True)
-        x = centred * jax.lax.rsqrt((centred**2).mean(-1, keepdims=True) + 1e-6)
+        centered = x - x.mean(-1, keepdims=True)
+        x = centered * jax.lax.rsqrt((centered**2).mean(-1, keepdims=True) + 1e-6)
         x = jax.nn.relu(x * layer["scale"] + layer["shift"])
     value: jax.Array = (x @ params[-1]["w"] + params[-1]["b"])[..., 0]
     return value
@@ -85,8 +85,8 @@ class SacLearner:
             jnp.stack(critic_keys)
         )
         (targets, average), log_alpha = jax.tree.map(jnp.copy, (critics, actor)), jnp.zeros(())
-        optimisers = self._actor_tx.init(actor), self._critic_tx.init(critics), self._alpha_tx.init(log_alpha)
-        return SacState(actor, critics, targets, log_alpha, *optimisers, key, average)
+        optimizers = self._actor_tx.init(actor), self._critic_tx.init(critics), self._alpha_tx.init(log_alpha)
+        return SacState(actor, critics, targets, log_alpha, *optimizers, key, average)
 
     def _critic_step(self, state: SacState, batch: TransitionBatch) -> SacState:
         key, action_key = jax.random.split(state.key)

@@ -27,6 +27,7 @@ def train_policy(
     activation: str | None = None,
     initial_policy: str | None = None,
     imitation_rounds: int | None = None,
+    checkpoints: bool = False,
     robot_options: RobotOptions = NO_ROBOT_OPTIONS,
 ) -> Path:
     """Train a policy in a folder, or continue there, and return the path of the best weights.
@@ -58,6 +59,7 @@ def train_policy(
         "activation": activation,
         "initial_policy": initial_policy,
         "imitation_rounds": imitation_rounds,
+        "keeps_checkpoints": checkpoints or None,
     }
     if algorithm == "sac" and activation not in (None, "tanh"):
         raise TrainingError("--activation is for PPO; SAC trains a tanh network")
@@ -78,6 +80,7 @@ def train_policy(
     command += f" --activation {activation}" if activation else ""
     command += f" --initial-policy {Path(initial_policy).stem}" if initial_policy else ""
     command += f" --imitation-rounds {imitation_rounds}" if imitation_rounds is not None else ""
+    command += " --checkpoints" if checkpoints else ""
 
     def report(taken: int, _: ActorScore | None, best: ActorScore | None) -> None:
         if progress is not None:

@@ -30,6 +30,7 @@ class TrainingConfig:
             recipe's. PPO imitates one with other layers first, and SAC imitates any.
         imitation_rounds: Rounds of imitation at the start, of 500 control steps of every robot each.
         reward_scale: Factor on rewards, which brings the values to the order of 1.
+        keeps_checkpoints: Whether the policy is kept at the start and after each 2 % of the steps.
     """
 
     total_steps: int
@@ -48,11 +49,12 @@ class TrainingConfig:
     initial_policy: str = ""
     imitation_rounds: int = 3
     reward_scale: float = 1.0
+    keeps_checkpoints: bool = False
 
 
 @dataclass(frozen=True)
 class PpoConfig(TrainingConfig):
-    """Settings of Proximal Policy Optimisation.
+    """Settings of Proximal Policy Optimization.
 
     Attributes:
         processes: Whether the robots run in processes of their own, which simulators need that hold Python's
@@ -62,7 +64,7 @@ class PpoConfig(TrainingConfig):
         divergence: Mean divergence per gradient step that the learning rate is adapted to.
         final_divergence: Share of `divergence` to which it falls, linearly, in the second half of the run.
         clip: Range of the probability ratio around 1 in the clipped surrogate.
-        gae: λ of the generalised advantage estimation.
+        gae: λ of the generalized advantage estimation.
         entropy: Weight of the entropy bonus.
         log_std: Initial log standard deviation of the actions.
         critic_iterations: Iterations at the start in which only the critic learns, so that an untrained one

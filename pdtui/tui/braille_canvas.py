@@ -24,7 +24,7 @@ class BrailleCanvas:
     """Dots, inks and a few characters on a grid of cells.
 
     x runs right and y runs down, both in dots, from the canvas's upper left corner; a dot covers a unit
-    square whose centre has coordinates ending in .5. What lies outside is cut off. A cell shows the ink that
+    square whose center has coordinates ending in .5. What lies outside is cut off. A cell shows the ink that
     was drawn there last.
 
     Args:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import signal
 from collections.abc import Mapping
-from time import monotonic
 from typing import cast
 
 from textual import events
 from textual.app import ComposeResult
 from textual.containers import Container
 from textual.reactive import reactive
+from textual.widget import Widget
 
 from pdtui.core.errors import PdtuiError
 from pdtui.driving.drive_client import DriveConnection
@@ -20,7 +20,8 @@ from pdtui.driving.pacer import PaceRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import displayed_key_name
 from pdtui.tui.commands.key_bound_app import HINTS, NO_KEYMAP, KeyBoundApp
-from pdtui.tui.help_screen import HelpScreen
+from pdtui.tui.graphics.graphics_pane import GraphicsPane
+from pdtui.tui.graphics.terminal_graphics import TerminalGraphics
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.spectra.spectra_pane import SpectraPane
 from pdtui.tui.strip.unit_picked import UnitPicked
@@ -28,6 +29,7 @@ from pdtui.tui.style_sheets import DRIVE, HEIGHTS, WIDTHS
 from pdtui.tui.terminal_size_notice import LEAST_SIZE, TerminalSizeNotice
 from pdtui.tui.theme import THEME
 from pdtui.tui.timeline.timeline_bar import TimelineBar, describe_past_keys
+from pdtui.tui.unit_bench.bench_page import GainTuner
 from pdtui.tui.unit_bench.bench_pane import BenchPane, BenchRequest
 from pdtui.tui.widgets.activation_heatmap import ActivationHeatmap
 from pdtui.tui.widgets.attribute_table import AttributeTable
@@ -38,7 +40,6 @@ from pdtui.tui.widgets.status_lines import KeyLine, NoticeLine, StatusLine
 from pdtui.tui.widgets.unit_table import UnitTable
 from pdtui.tui.widgets.world_picture import WorldPicture
 
-NOTICE_SECONDS = 4.0
 _ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
@@ -55,6 +56,8 @@ class DriveApp(KeyBoundApp):
         watching: whether the drive follows a recording, so that keys that would change it are refused.
         theme: name of the theme.
         keymap: the user's keys, by the bindings' ids.
+        tuning: tunes gains beside the drive; None where nothing can.
+        graphics: how the terminal shows pictures; None for half blocks.
     """
 
     CSS = DRIVE
@@ -64,7 +67,6 @@ class DriveApp(KeyBoundApp):
 
     facts: reactive[DriveFacts | None] = reactive(None, init=False, repaint=False, always_update=True)
     snapshot: reactive[DriveSnapshot | None] = reactive(None, init=False, repaint=False, always_update=True)
-    notice: reactive[str] = reactive("", init=False, repaint=False)
 
     def __init__(
         self,
@@ -75,34 +77,36 @@ class DriveApp(KeyBoundApp):
         watching: bool = False,
         theme: str = THEME.name,
         keymap: Mapping[str, str] = NO_KEYMAP,
+        tuning: GainTuner | None = None,
+        graphics: TerminalGraphics | None = None,
     ) -> None:
-        behaviors = stimulation_map.behaviors.values()
-        map_keys = {stimulation_map.default_key, *(behavior.key for behavior in behaviors)}
-        super().__init__(map_keys, theme, keymap)
-        self.connection, self.map, self.fps, self.watching = connection, stimulation_map, fps, watching
-        self._keymap_at_first, self._notice_until = keymap, 0.0
-        self._help: HelpScreen | None = None
+        super().__init__(stimulation_map, theme, keymap)
+        self.connection, self.fps, self.watching = connection, fps, watching
+        self._keymap_at_first, self._graphics, self._could_go_back = keymap, graphics, False
+        self._spectra = SpectraPane(self.map, connection, id="spectra")
+        self._timeline = TimelineBar(self.map, connection, id="timeline")
+        self._bench = BenchPane(self.map, self.action_run_key, connection.search_units, self.say, tuning)
 
     def compose(self) -> ComposeResult:
-        def bound(panel: SnapshotWidget) -> SnapshotWidget:
+        def bound(panel: SnapshotWidget | GraphicsPane) -> Widget:
             return panel.data_bind(DriveApp.facts, DriveApp.snapshot)
 
         yield bound(StatusLine(self.map, id="status"))
         with Container(id="body"):
             with Container(id="left"):
                 yield bound(RobotView(self.map, id="robot"))
-                yield bound(WorldPicture(self.map, id="world"))
+                world = GraphicsPane(self._graphics, id="world") if self._graphics else None
+                yield bound(world or WorldPicture(self.map, id="world"))
                 with Container(id="below"):
                     yield bound(PathView(self.map, id="path"))
                     yield bound(UnitTable(self.map, id="units"))
-                yield bound(SpectraPane(self.map, self.connection, id="spectra"))
+                yield bound(self._spectra)
             with Container(id="right"):
-                bench = BenchPane(self.map, self.action_run_key, self.connection.search_units, self.say)
-                yield bench.data_bind(DriveApp.facts, DriveApp.snapshot)
+                yield self._bench.data_bind(DriveApp.facts, DriveApp.snapshot)
                 yield bound(BehaviorList(self.map, id="behaviors"))
                 yield bound(AttributeTable(self.map, id="attributes"))
         yield bound(ActivationHeatmap(self.map, id="heat"))
-        yield bound(TimelineBar(self.map, self.connection, id="timeline"))
+        yield bound(self._timeline)
         yield bound(NoticeLine(self.map, id="notice")).data_bind(DriveApp.notice)
         yield KeyLine(self.map, id="keys")
         yield TerminalSizeNotice(id="too-small")
@@ -124,6 +128,16 @@ class DriveApp(KeyBoundApp):
         if facts is not None and facts.branches:  # the drive has left the recording
             self.query_one(StatusLine).watching = self.watching = False
 
+    def _show_way_back(self) -> None:
+        """Show the key that goes back while there is something to go back from."""
+        if (can := bool(self._open_panes())) != self._could_go_back:
+            self._could_go_back = can
+            self._show_keys()
+
+    def _open_panes(self) -> list[BenchPane | SpectraPane | TimelineBar]:
+        """Return what the key that goes back leaves, in this order."""
+        return [pane for pane in (self._bench, self._spectra, self._timeline) if pane.is_open]
+
     def _end(self, number: signal.Signals) -> None:
         self.exit(f"ended by {number.name}", return_code=1)
 
@@ -136,32 +150,22 @@ class DriveApp(KeyBoundApp):
         super().set_keymap(dict(keymap))
         if self.is_running:
             self._show_keys()
-            self._forget_help()
-
-    def watch_theme(self, name: str) -> None:
-        super().watch_theme(name)
-        if self.is_running:
-            self._forget_help()
-
-    def _forget_help(self) -> None:
-        if self._help is not None and self._help is not self.screen:
-            self.uninstall_screen("help")
-            self._help = None
+            self.forget_help()
 
     def has_binding(self, name: str) -> bool:
         return name != "takeover" or (self.facts is not None and bool(self.facts.manual_controls))
 
     def _show_keys(self) -> None:
         now = self.keys_now
-        shown = tuple((now[name][0], says) for name, says in HINTS.items() if name in now)
+        hints = ((name, says) for name, says in HINTS.items() if name != "back" or self._could_go_back)
+        shown = tuple((now[name][0], says) for name, says in hints if name in now)
         self.screen_stack[0].query_one(KeyLine).keys = shown
-        leave = now.get("quit", now["quit_always"])[0]
         notices = self.screen_stack[0].query_one(NoticeLine)
-        notices.hints, notices.past_hints = f"{displayed_key_name(leave)} quits", describe_past_keys(now)
+        notices.hints, notices.past_hints = f"{self.leaving_key} quits", describe_past_keys(now)
 
     def _poll(self) -> None:
-        if self._notice_until and monotonic() > self._notice_until:
-            self._notice_until, self.notice = 0.0, ""
+        self.drop_old_notice()
+        self._show_way_back()
         try:
             message = self.connection.poll_message()
         except PdtuiError as error:
@@ -174,16 +178,11 @@ class DriveApp(KeyBoundApp):
                 self.say(message.notice)
             self.snapshot = message
 
-    def say(self, notice: str) -> None:
-        """Show a notice for a few seconds."""
-        self.notice = notice
-        self._notice_until = monotonic() + NOTICE_SECONDS
-
     def on_key(self, event: events.Key) -> None:
         """Give the map's keys precedence over all bindings, and name a key that is not bound."""
         if self.choosing_command:
             return
-        if self.query_one(BenchPane).takes_key(event.key):
+        if self._bench.takes_key(event.key):
             event.prevent_default()
         elif event.key in self.map_keys:
             event.prevent_default()
@@ -193,7 +192,7 @@ class DriveApp(KeyBoundApp):
 
     def action_run_key(self, key: str) -> None:
         """Send a key that changes the run, unless a recording is being watched."""
-        if self.query_one(TimelineBar).takes_key(key):
+        if self._timeline.takes_key(key):
             return
         if self.watching:
             self.say(f"{displayed_key_name(key)}: this drive follows a recording, so keys cannot change it")
@@ -213,6 +212,14 @@ class DriveApp(KeyBoundApp):
         """Have a pane do what its key asks for."""
         cast(SnapshotWidget, self.query_one(f"#{pane}")).handle_request(request)
 
+    def action_go_back(self) -> None:
+        """Leave what was opened; as this key is also pressed by mistake, it never ends the drive."""
+        opened = self._open_panes()
+        if opened:
+            opened[0].leave()
+        else:
+            self.say(f"nothing is open; {self.leaving_key} ends the drive")
+
     def action_toggle_ghost(self) -> None:
         """Turn the ghost on or off; it is no part of the run, so it may run beside a recording, too."""
         if self.facts is None:
@@ -222,10 +229,10 @@ class DriveApp(KeyBoundApp):
 
     def action_bench(self, request: BenchRequest) -> None:
         """Open or close the unit bench, or show other layers."""
-        self.query_one(BenchPane).act(request)
+        self._bench.act(request)
 
     def on_unit_picked(self, event: UnitPicked) -> None:
-        self.query_one(BenchPane).pick(event.unit)
+        self._bench.pick(event.unit)
 
     def action_zoom_path(self, change: int) -> None:
         """Show more of the path for 1, less for −1."""
@@ -234,16 +241,6 @@ class DriveApp(KeyBoundApp):
     def action_toggle_view(self) -> None:
         """Look at the robot from the side or from above."""
         self.query_one(RobotView).toggle_view()
-
-    def action_help(self) -> None:
-        """Show the help."""
-        if isinstance(self.screen, HelpScreen):
-            return
-        # Created only once: Textual caches what up to 1024 removed widgets have drawn.
-        if self._help is None:
-            self._help = HelpScreen(self.map, list(self.keys_now.values()))
-            self.install_screen(self._help, "help")
-        self.push_screen("help")
 
     def action_leave(self) -> None:
         """Quit; the caller of `run` then ends the drive."""

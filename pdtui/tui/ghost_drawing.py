@@ -48,7 +48,7 @@ def add_ghost_to_title(title: str, ghost: GhostSnapshot | None, step: int) -> st
 def draw_ghost(
     canvas: BrailleCanvas, camera: PerspectiveCamera, links: Sequence[Link], poses: Floats, ink: int
 ) -> None:
-    """Draw the ghost's shapes in one colour and without rims, for poses of its bodies (B, 7)."""
+    """Draw the ghost's shapes in one color and without rims, for poses of its bodies (B, 7)."""
     placed = compute_link_poses(links, poses)
     ends = capsule_ends(links, placed)
     if not np.isfinite(ends).all():

@@ -99,14 +99,14 @@ def draw_links_on_road(
     ends: Floats,
     ink: int,
 ) -> None:
-    """Draw links in one colour, after the rims of all, so that none cuts into another.
+    """Draw links in one color, after the rims of all, so that none cuts into another.
 
     Args:
         canvas, camera: Where, and as seen from where.
         links: The links.
         placed: Their world poses, shape (L, 7).
         ends: Both ends of the axis of each, m, shape (L, 2, 3).
-        ink: Number of the colour.
+        ink: Number of the color.
     """
     dots = camera.project(ends)[0]
     for halo in (1.0, 0.0):

@@ -159,7 +159,7 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
                 ]
             )
             for line_filter in self.get_line_filters():
-                # All colours are true colours already; other filters, such as NO_COLOR's, still apply.
+                # All colors are true colors already; other filters, such as NO_COLOR's, still apply.
                 if not isinstance(line_filter, ANSIToTruecolor):
                     content = content.apply_filter(line_filter, background)
             framed = self._framed[row] = Strip([*left, *content, *right], self.outer_size.width)

@@ -17,7 +17,7 @@ class TerminalSizeNotice(Widget, can_focus=False):
     """Shows the needed and the present size instead of a drive that does not fit; the drive continues."""
 
     def render_line(self, y: int) -> Strip:
-        """Render one line; the message is centred in the terminal."""
+        """Render one line; the message is centered in the terminal."""
         (width, height), terminal = self.size, self.app.size
         lines = [
             ("terminal too small", STYLES.accent),

@@ -27,7 +27,7 @@ _COLD, _WARM = Color.parse("#4aa3ff"), Color.parse("#ff9d4d")
 _DEEP_COLD, _DEEP_WARM = Color.parse("#0b5cc4"), Color.parse("#c24e00")  # on a light background
 HEAT_LEVELS = 8
 _DEPTHS = ((0.0, 0.45), (0.0, 0.62), (0.0, 0.80), (0.03, 1.0), (0.16, 1.0))
-"""From far to near: the lightening of the robot's colour, and its share in the blend with the background."""
+"""From far to near: the lightening of the robot's color, and its share in the blend with the background."""
 _MUTED, _FAINT = 4.2, 2.0  # least contrasts of secondary text and of scales
 
 
@@ -42,28 +42,28 @@ class ThemeStyles:
         base: the background.
         text, muted, faint: three strengths of the foreground.
         title: titles and values.
-        primary, accent, good, warn, bad: the theme's colours.
+        primary, accent, good, warn, bad: the theme's colors.
         alert: urgent messages.
         below: values below zero, where those above are `primary`.
         ghost: the ghost.
         obstacle: obstacles.
         key: cap of a key that is not latched.
-        behaviors: colours of behaviors by row in the map, modulo their number.
+        behaviors: colors of behaviors by row in the map, modulo their number.
         caps: key caps of latched behaviors, in the same order.
         depth: shades of the robot from far to near.
-        heat: colours from −1 over 0 to +1, 2 × HEAT_LEVELS + 1 of them.
+        heat: colors from −1 over 0 to +1, 2 × HEAT_LEVELS + 1 of them.
     """
 
     def __init__(self, theme: Theme) -> None:
         self.adopt(theme)
 
     def adopt(self, theme: Theme) -> None:
-        """Derive all styles from a theme, with colours that can be read on its background."""
+        """Derive all styles from a theme, with colors that can be read on its background."""
         variables = theme.to_color_system().generate()
         back = Color.parse(variables["background"])
 
         def color(name: str, contrast: float = TEXT_CONTRAST) -> Color:
-            # Text may be a blend with the background's own "auto" colour; the foreground is never.
+            # Text may be a blend with the background's own "auto" color; the foreground is never.
             return make_legible(Color.parse(variables[name]), back, contrast)
 
         front, main, second, success = (
@@ -100,7 +100,7 @@ class ThemeStyles:
         )
 
     def behavior(self, row: int) -> Style:
-        """Return the colour of the behavior in a row of the map; faint for no behavior."""
+        """Return the color of the behavior in a row of the map; faint for no behavior."""
         return self.faint if row < 0 else self.behaviors[row % len(self.behaviors)]
 
 

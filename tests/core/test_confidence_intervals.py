@@ -27,8 +27,8 @@ def test_a_ratio_pairs_its_values() -> None:
     assert 1.4 < noisy.low < noisy.value < noisy.high < 1.6
     shuffled = paired_ratio(rng.permutation(1.5 * below), below)
     assert shuffled.high / shuffled.low > (noisy.high / noisy.low) ** 3
-    per_metre = paired_ratio(below, below, per=(2.0 * below, below))
-    assert (per_metre.value, per_metre.low, per_metre.high) == pytest.approx((0.5, 0.5, 0.5))
+    per_meter = paired_ratio(below, below, per=(2.0 * below, below))
+    assert (per_meter.value, per_meter.low, per_meter.high) == pytest.approx((0.5, 0.5, 0.5))
 
 
 def test_a_ratio_that_cannot_be_known_has_an_open_interval() -> None:

@@ -16,7 +16,7 @@ from pdtui.core.errors import MapError
 from pdtui.core.units import Stimulation
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.dissection_searches import DissectionSearches
-from pdtui.dissection.dissection_summary import summarise_dissection
+from pdtui.dissection.dissection_summary import summarize_dissection
 from pdtui.dissection.dissection_text import render_dissection
 from pdtui.dissection.draft_map import draft_map
 from pdtui.policies.weights.weights_file import hash_file
@@ -54,7 +54,7 @@ def test_the_result_does_not_depend_on_the_workers(dissection: Dissection, polic
 
 
 def test_summary_is_json_and_names_what_was_asked(dissection: Dissection, policy_file: Path) -> None:
-    summary = json.loads(json.dumps(summarise_dissection(dissection), allow_nan=False))
+    summary = json.loads(json.dumps(summarize_dissection(dissection), allow_nan=False))
     assert summary["sha256"] == hash_file(policy_file)
     vx = summary["attributes"][0]
     assert vx["name"] == "vx"
@@ -63,7 +63,7 @@ def test_summary_is_json_and_names_what_was_asked(dissection: Dissection, policy
 
 
 def test_summary_holds_every_setting_and_the_whole_match(dissection: Dissection) -> None:
-    summary = summarise_dissection(dissection)
+    summary = summarize_dissection(dissection)
     assert summary["settings"] == list_preset_values(PRESETS["paper"])
     assert summary["settings_changed"] == []
     keys = {"unit", "flaw", "discrepancy", "level_share", "rho", "rho_circular", "rho_disagree"}
@@ -82,7 +82,7 @@ def test_a_silent_unit_and_a_broken_attribute_are_marked_rows(dissection: Dissec
         unit_flaws={9: "never fires"},
     )
     broken = replace(dissection, matching=matching, preset=find_matching_preset("paper", ["hop=8"]))
-    summary = json.loads(json.dumps(summarise_dissection(broken), allow_nan=False))
+    summary = json.loads(json.dumps(summarize_dissection(broken), allow_nan=False))
     assert summary["settings_changed"] == ["hop=8"]
     assert summary["unit_flaws"] == {"1:1": "never fires"}
     vx, vy = summary["attributes"][:2]

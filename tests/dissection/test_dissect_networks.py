@@ -61,7 +61,7 @@ def test_without_its_memory_the_start_is_another() -> None:
     assert not np.array_equal(means[0], means[1])
 
 
-def test_a_unit_that_favours_a_move_makes_it() -> None:
+def test_a_unit_that_favors_a_move_makes_it() -> None:
     robot, policy = Dot(), dot_policy()
     weight = trained_conv().logits.weight.detach().numpy()
     left_minus_right = weight[1] - np.delete(weight, 1, axis=0).max(axis=0)

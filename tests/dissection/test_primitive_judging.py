@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-from pdtui.dissection.primitive_judging import PrimitiveJudgement, judge_primitives, measure_own_range
+from pdtui.dissection.primitive_judging import PrimitiveJudgment, judge_primitives, measure_own_range
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
@@ -19,7 +19,7 @@ COLUMN = 1
 
 
 @cache
-def judged() -> PrimitiveJudgement:
+def judged() -> PrimitiveJudgment:
     settings = replace(
         SMALL, screen_values=(-3.0, 3.0), refine_steps=12, held_steps=300, judge_starts=8, walk_steps=10
     )
@@ -54,10 +54,10 @@ def test_a_spin_is_confirmed_and_a_turn_is_not() -> None:
 
 
 def test_the_strongest_comes_first_and_a_pair_can_be_asked_for() -> None:
-    judgement = judged()
-    assert judgement.of_attribute(COLUMN)[0].unit == SPIN
-    found = judgement.of_pair(TURN, COLUMN)
+    judgment = judged()
+    assert judgment.of_attribute(COLUMN)[0].unit == SPIN
+    found = judgment.of_pair(TURN, COLUMN)
     assert found is not None
     assert not found.in_range
-    assert judgement.of_pair(TURN, 0) is None
-    assert judgement.control_effects.values == (-3.0, 3.0)
+    assert judgment.of_pair(TURN, 0) is None
+    assert judgment.control_effects.values == (-3.0, 3.0)

@@ -35,6 +35,7 @@ KEYS = """\
 18 free 0:3
 20 beside hold heading
 22 kp hold heading 4
+22 limit hold heading 0.25
 22 target hold heading 0.3
 26 release hold heading
 30 space
@@ -107,6 +108,15 @@ def test_a_gain_acts_from_the_next_control_step_on(loop: ControlLoop) -> None:
     assert len(set(after)) == 1, "what the integral has summed up stays"
     assert loop.map.behaviors["hold heading"].pid is not None
     assert loop.map.behaviors["hold heading"].pid.kp == 2.0, "the map stays as it is"
+
+
+def test_a_limit_bounds_the_magnitude_from_the_next_control_step_on(loop: ControlLoop) -> None:
+    advance(loop, "h", "target hold heading -0.5")
+    assert abs(advance(loop).behaviors[0].magnitude or 0.0) > 0.5
+    after = advance(loop, "limit hold heading 0.5")
+    assert abs(after.behaviors[0].magnitude or 0.0) == 0.5
+    with pytest.raises(KeystrokeError, match="limit: expected more than 0, found -1"):
+        events_of_pressed_keys(["limit hold heading -1"], loop)
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from pdtui.robots import make_robot
 from pdtui.sessions.export.export_writer import export_stream
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_reader import read_session
-from pdtui.sessions.session_summary import read_session_summary, summarise_session
+from pdtui.sessions.session_summary import read_session_summary, summarize_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.turning_robot import Vehicle, turning_loop
 
@@ -181,7 +181,7 @@ def test_a_takeover_is_recorded_and_repeats_with_its_rewind(tmp_path: Path) -> N
     assert [step for step, on in enumerate(taken) if on] == [*range(20, 40), *range(60, 200)]
     result = pdtui.replay(path, robot=SteeredVehicle(), policy=turning_loop().policy)
     assert result.verdict == "identical: 260 steps"
-    assert summarise_session(read_session_header(path)) == read_session_summary(read_session_header(path))
+    assert summarize_session(read_session_header(path)) == read_session_summary(read_session_header(path))
 
 
 def test_a_rewind_into_a_takeover_repeats(loop: ControlLoop, tmp_path: Path) -> None:
@@ -220,7 +220,7 @@ def test_a_step_of_takeover_is_one_step_of_involvement_everywhere(loop: ControlL
     assert [one.step for one in records if one.involved] == [5, *range(10, 31)]
     snapshot = builder.build_snapshot(paused=False, speed=1, achieved_speed=1, recorded_bytes=0, finished="")
     header = read_session_header(path)
-    for summary in (read_session_summary(header), summarise_session(header)):
+    for summary in (read_session_summary(header), summarize_session(header)):
         assert (summary.involvement, summary.taken_over) == (22, 20)
         assert [tally.involvement for tally in summary.tallies] == [22]
     assert snapshot.involvement == snapshot.statistics.involvement == 22

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 from pdtui.driving.pacer import Pacer
@@ -55,3 +58,12 @@ def test_lag_is_not_made_up_for() -> None:
     pacer = Pacer(0.05, 0.0)
     pacer.note_step(10.0)
     assert _run(pacer, 10.0, 1.0) <= 21
+
+
+def test_what_a_benchmark_asks_for_is_kept(tmp_path: Path) -> None:
+    pacer = Pacer(0.5, 10.0, keeps_times=True)
+    for done in (10.25, 10.5, 11.5):
+        pacer.note_step(done)
+    pacer.save_times(str(tmp_path / "times.npy"))
+    times = np.load(tmp_path / "times.npy")
+    assert times.tolist() == [[10.25, 0.25], [10.5, 0.0], [11.5, 0.5]]

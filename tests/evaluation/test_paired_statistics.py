@@ -11,7 +11,7 @@ from pdtui.evaluation.paired_statistics import (
     holm_correction,
     share_interval,
     sign_flip_p_value,
-    studentised_interval,
+    studentized_interval,
 )
 
 
@@ -19,7 +19,7 @@ from pdtui.evaluation.paired_statistics import (
 def test_the_interval_covers_the_mean_of_20_values_as_often_as_it_says(skewed: bool) -> None:
     rng = np.random.default_rng(1)
     draws = rng.exponential(size=(200, 20)) - 1.0 if skewed else rng.normal(size=(200, 20))
-    intervals = [studentised_interval(values, seed=number) for number, values in enumerate(draws)]
+    intervals = [studentized_interval(values, seed=number) for number, values in enumerate(draws)]
     covered = sum(low <= 0.0 <= high for low, high in intervals) / len(draws)
     # The standard error of the share is 0.015. A percentile interval covers 0.92 and 0.90 of these.
     assert 0.91 <= covered <= 0.985
@@ -27,14 +27,14 @@ def test_the_interval_covers_the_mean_of_20_values_as_often_as_it_says(skewed: b
 
 def test_an_interval_of_values_of_one_sign_can_contain_zero() -> None:
     values = np.array([0.01, 0.02, 0.01, 0.03, 0.02, 0.01, 0.02, 9.0])
-    low, high = studentised_interval(values)
+    low, high = studentized_interval(values)
     assert low < 0.0 < high
 
 
 def test_few_or_equal_values_have_students_interval() -> None:
     values = np.array([0.5, 1.0, 2.5])
-    assert studentised_interval(values) == confidence_interval(values)
-    assert studentised_interval(np.full(20, 2.0)) == (2.0, 2.0)
+    assert studentized_interval(values) == confidence_interval(values)
+    assert studentized_interval(np.full(20, 2.0)) == (2.0, 2.0)
 
 
 @pytest.mark.parametrize("count", [8, 20])

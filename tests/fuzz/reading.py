@@ -85,7 +85,7 @@ def read_session_file(path: Path) -> None:
     from pdtui.sessions.session_integrity import examine_session
     from pdtui.sessions.session_reader import read_activations, read_session
     from pdtui.sessions.session_repair import repair_session
-    from pdtui.sessions.session_summary import summarise_session
+    from pdtui.sessions.session_summary import summarize_session
 
     with suppress(PdtuiError):
         read_session_header(path)
@@ -101,7 +101,7 @@ def read_session_file(path: Path) -> None:
     examine_session(path)
     with Path("/dev/null").open("w") as nowhere:
         console = Console(file=nowhere)
-        console.print(session_details(session, summarise_session(session)))
+        console.print(session_details(session, summarize_session(session)))
         course = read_drive_path(session)
         paths = compare_drive_paths(course, course, 0)
         console.print(session_comparison_table(compare_sessions(session, session), (session, session), paths))

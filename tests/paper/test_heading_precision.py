@@ -41,7 +41,7 @@ name = "anymal_tanh.npz"
 sha256 = "{sha256}"
 activation = "tanh"
 squash = "none"
-normaliser = "none"
+normalizer = "none"
 [[behaviors]]
 name = "by command"
 key = "c"

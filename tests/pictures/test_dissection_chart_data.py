@@ -12,7 +12,7 @@ from pdtui.pictures.dissection_chart_data import (
     matched_spectrograms,
     side_effect_matrix,
 )
-from pdtui.pictures.plot_colors import BLUE, GREY, VERMILLION, diverging_colors
+from pdtui.pictures.plot_colors import BLUE, GRAY, VERMILLION, diverging_colors
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.robots import make_robot
 from pdtui.spectra.episode_monitor import monitor_episodes
@@ -67,9 +67,9 @@ def test_side_effects_leave_out_units_that_are_only_controls(dissection: Dissect
     assert 0 < effects.limit <= 3.0
 
 
-def test_diverging_colours() -> None:
+def test_diverging_colors() -> None:
     values: Floats = np.array([-9.0, -2.0, 0.0, 1.0, 2.0, np.nan])
     colors = diverging_colors(values, 2.0)
     assert colors.dtype == np.uint8
-    np.testing.assert_array_equal(colors[[0, 1, 2, 4, 5]], [VERMILLION, VERMILLION, (255,) * 3, BLUE, GREY])
+    np.testing.assert_array_equal(colors[[0, 1, 2, 4, 5]], [VERMILLION, VERMILLION, (255,) * 3, BLUE, GRAY])
     assert (colors[3] > np.array(BLUE)).all()

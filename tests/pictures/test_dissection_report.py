@@ -17,7 +17,7 @@ from pdtui.core.confidence_intervals import bootstrap_interval
 from pdtui.core.errors import PictureError, SessionError
 from pdtui.core.units import format_unit, parse_unit
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_summary import summarise_dissection
+from pdtui.dissection.dissection_summary import summarize_dissection
 from pdtui.pictures.dissection_attribute_plots import draw_ranking, draw_spectrograms
 from pdtui.pictures.dissection_report import write_dissection_report
 from pdtui.sessions.session_reader import read_session
@@ -97,7 +97,7 @@ def test_curves_are_the_refined_effects_with_their_intervals(
     curves = {
         entity: part for entity, part in entities.items() if entity.startswith(start) and "effect" in part
     }
-    best = summarise_dissection(dissection)["attributes"][column]
+    best = summarize_dissection(dissection)["attributes"][column]
     shown = {best["probed"][0]["unit"], best["first_match"]["unit"]}
     assert len(curves) == len(shown)
     for entity, curve in curves.items():
@@ -113,7 +113,7 @@ def test_curves_are_the_refined_effects_with_their_intervals(
 
 
 def test_the_side_effect_matrix_is_the_measured_one(dissection: Dissection, entities: Entities) -> None:
-    summary = summarise_dissection(dissection)["side_effects"]
+    summary = summarize_dissection(dissection)["side_effects"]
     numbers = entities["/side_effect_numbers/v\\ \\=\\ 3"]
     tensor, units = numbers["Tensor:data"][0], numbers["units"]
     shape, cells = tensor["shape"], np.array(tensor["buffer"])
@@ -123,7 +123,7 @@ def test_the_side_effect_matrix_is_the_measured_one(dissection: Dissection, enti
     np.testing.assert_array_equal(cells.reshape(shape), wanted)
 
 
-def test_spectrograms_share_their_colours_and_show_the_loudest_cell(dissection: Dissection) -> None:
+def test_spectrograms_share_their_colors_and_show_the_loudest_cell(dissection: Dissection) -> None:
     figure = Figure()
     left, right = figure.subplots(1, 2)
     draw_spectrograms(figure, left, right, dissection, dissection.column("height"))
@@ -149,7 +149,7 @@ def test_the_episode_is_the_monitored_one(dissection: Dissection, entities: Enti
 
 def test_text_and_properties_say_what_it_was_made_from(dissection: Dissection, entities: Entities) -> None:
     (text,) = entities["/summary"]["TextDocument:text"]
-    first = summarise_dissection(dissection)["attributes"][0]
+    first = summarize_dissection(dissection)["attributes"][0]
     row = f"| vx | {first['frequency']:.2f} | {first['matches'][0]['unit']} |"
     heading = "## Probing: effects of units, 3 starts, beside 6 random units"
     for fact in (dissection.policy_hash, f"| seed | {dissection.seed};", heading, row):
@@ -165,7 +165,7 @@ def test_text_and_properties_say_what_it_was_made_from(dissection: Dissection, e
     # Three starts allow no p-value below 2 ** -2.
     assert "Nothing could be confirmed: with 3 starts and 6 random units no p-value is below 0.25" in text
     stored = json.loads(entities["/__properties/dissection"]["summary"][0])
-    assert stored == summarise_dissection(dissection)
+    assert stored == summarize_dissection(dissection)
 
 
 def test_an_attribute_that_was_left_out_leaves_its_pictures_out(

@@ -11,7 +11,7 @@ import pytest
 
 from pdtui.core.errors import PictureError
 from pdtui.pictures.picture_paths import check_picture_paths
-from pdtui.pictures.plot_colors import GREY
+from pdtui.pictures.plot_colors import GRAY
 from pdtui.pictures.road_pictures import RoadPicture, behavior_colors, box_corners, draw_road_pictures
 
 WAY = np.stack([np.arange(6.0), np.zeros(6)], axis=1)
@@ -39,10 +39,10 @@ def test_a_box_that_is_turned_lies_across() -> None:
     np.testing.assert_allclose(corners[0].mean(axis=0), [5.0, 2.0])
 
 
-def test_each_behavior_has_a_colour_of_its_own() -> None:
+def test_each_behavior_has_a_color_of_its_own() -> None:
     colors = behavior_colors([PICTURE, replace(PICTURE, behaviors=("operator",) * 6)])
     assert list(colors) == ["", "brake", "lane left", "operator"]
-    assert colors[""] == GREY
+    assert colors[""] == GRAY
     assert len(set(colors.values())) == 4
 
 

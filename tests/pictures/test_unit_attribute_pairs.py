@@ -63,7 +63,7 @@ def test_what_does_not_exist_is_named(
         )
 
 
-def test_each_pair_is_drawn_in_its_colour(curves: UnitAttributePairs, tmp_path: Path) -> None:
+def test_each_pair_is_drawn_in_its_color(curves: UnitAttributePairs, tmp_path: Path) -> None:
     path = tmp_path / "new" / "episode.png"
     draw_unit_attribute_pairs(path, curves)
     with Image.open(path) as image:

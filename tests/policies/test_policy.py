@@ -91,7 +91,7 @@ def test_any_module_has_its_units_in_the_config_of_the_calls() -> None:
     np.testing.assert_allclose(step.action, expected.numpy(), atol=1e-6)
 
 
-class _Centre(nn.Module):
+class _Center(nn.Module):
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         return x - x.mean()
 
@@ -100,8 +100,8 @@ class _Centre(nn.Module):
     ("stages", "hidden"),
     [
         ([nn.Linear(5, 32), nn.ELU(), nn.Linear(32, 32), nn.Tanh(), nn.Linear(32, 3)], ["1", "3"]),
-        ([_Centre(), nn.Linear(5, 40), nn.ReLU(), nn.Dropout(), nn.Linear(40, 8, bias=False)], ["2"]),
-        ([nn.Linear(5, 32), _Centre(), nn.Tanh(), nn.ReLU(), nn.Linear(32, 9), nn.Tanh()], ["2", "3", "5"]),
+        ([_Center(), nn.Linear(5, 40), nn.ReLU(), nn.Dropout(), nn.Linear(40, 8, bias=False)], ["2"]),
+        ([nn.Linear(5, 32), _Center(), nn.Tanh(), nn.ReLU(), nn.Linear(32, 9), nn.Tanh()], ["2", "3", "5"]),
     ],
 )
 def test_chain_and_hooks_give_the_same_bits(stages: list[nn.Module], hidden: list[str]) -> None:

@@ -16,11 +16,11 @@ from pdtui.policies.weights.weights_file import find_weights_file, load_network,
 
 def test_what_is_saved_comes_back(weights: Path, tmp_path: Path) -> None:
     network = load_network(weights)
-    network.normaliser.mean.fill_(0.5)
+    network.normalizer.mean.fill_(0.5)
     save_network(tmp_path / "copy.safetensors", network)
     copy = load_network(tmp_path / "copy.safetensors")
     assert copy.spec == network.spec
-    assert copy.normalises
+    assert copy.normalizes
     for name, tensor in network.state_dict().items():
         assert torch.equal(copy.state_dict()[name], tensor)
     assert [path.name for path in tmp_path.iterdir()] == ["copy.safetensors"]

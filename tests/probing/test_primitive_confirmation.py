@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pdtui.core.attributes import Floats
-from pdtui.dissection.primitive_judging import PrimitiveJudgement
+from pdtui.dissection.primitive_judging import PrimitiveJudgment
 from pdtui.probing.matching_hits import measure_noise_ceiling
 from pdtui.probing.measured_effects import PlanEffects, SingleUnitEffects, UnitEffects
 from pdtui.probing.null_distributions import (
@@ -104,7 +104,7 @@ CANDIDATES = [PrimitiveCandidate(unit, 0, 3.0, 1.0) for unit in (0, 1, 2, 3)]
 OWN_RANGE = np.tile([-0.5, 0.5], (UNITS, 1))
 
 
-def test_a_planted_effect_is_confirmed_and_its_neighbours_are_not() -> None:
+def test_a_planted_effect_is_confirmed_and_its_neighbors_are_not() -> None:
     probed = probe(np.random.default_rng(3), {0: 2.0}, 0.5)
     first, *others = judge_candidates(CANDIDATES, probed, OWN_RANGE, range(20, 119), LEVEL)
     assert first.confirmed
@@ -151,21 +151,21 @@ def test_a_fall_counts_as_no_effect() -> None:
     assert not first.confirmed
 
 
-def judgement(starts: int, controls: int) -> PrimitiveJudgement:
+def judgment(starts: int, controls: int) -> PrimitiveJudgment:
     empty = UnitEffects(
         (), (), np.zeros((0, 0, 0, 1)), np.zeros((0, 0, 0), bool), np.zeros((0, 1)), np.zeros(0, bool)
     )
     probed = probe(np.random.default_rng(3), {0: 2.0}, 0.5)
     confirmations = judge_candidates(CANDIDATES, probed, OWN_RANGE, range(20, 119), LEVEL)
-    return PrimitiveJudgement(confirmations, tuple(range(controls)), empty, OWN_RANGE, starts, LEVEL)
+    return PrimitiveJudgment(confirmations, tuple(range(controls)), empty, OWN_RANGE, starts, LEVEL)
 
 
 def test_too_few_starts_or_units_are_known_before_anything_is_confirmed() -> None:
-    assert judgement(4, 100).fewest_confirmed is None
-    assert judgement(8, 15).fewest_confirmed is None
-    assert judgement(8, 100).fewest_confirmed == 1
+    assert judgment(4, 100).fewest_confirmed is None
+    assert judgment(8, 15).fewest_confirmed is None
+    assert judgment(8, 100).fewest_confirmed == 1
     # 4 pairs at p = 1/32 pass together with 4 · 1/32 / 0.05 = 2.5, that is 3, of them.
-    assert judgement(6, 1000).fewest_confirmed == 3
+    assert judgment(6, 1000).fewest_confirmed == 3
 
 
 def test_an_effect_that_passes_is_no_primitive() -> None:

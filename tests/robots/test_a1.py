@@ -42,14 +42,14 @@ def _value(robot: A1, name: str) -> float:
 @pytest.mark.skipif(not REFERENCE.exists(), reason="the authors' weights (../shared/reference) are not here")
 def test_the_authors_policy_runs_as_measured(a1: A1) -> None:
     weights = np.load(REFERENCE / "quadrupedal.npz")
-    normaliser = np.load(REFERENCE / "quadrupedal_obs_normalizer.npz")
+    normalizer = np.load(REFERENCE / "quadrupedal_obs_normalizer.npz")
     names = ("base.seq_fcs.0", "base.seq_fcs.2", "seq_append_fcs.0", "seq_append_fcs.2", "seq_append_fcs.4")
     layers = [(weights[f"{name}.weight"], weights[f"{name}.bias"]) for name in names]
     for seed in range(4):
         observation, _ = a1.reset(seed=seed)
         speeds = []
         for _ in range(500):
-            x = (observation - normaliser["mean"]) / (np.sqrt(normaliser["var"]) + 1e-4)
+            x = (observation - normalizer["mean"]) / (np.sqrt(normalizer["var"]) + 1e-4)
             x = np.clip(x, -10, 10)
             for weight, bias in layers[:-1]:
                 x = np.tanh(weight @ x + bias)

@@ -166,7 +166,7 @@ from pdtui.robots.robot import TrainingRecipe
 
 
 def runs_away(trace):
-    """It is ten metres from where it was."""
+    """It is ten meters from where it was."""
     way = float(trace["place"][-1] - trace.before("place")[-1])
     return TaskVerdict(way > 10.0, way / 10.0, {"way (m)": way})
 

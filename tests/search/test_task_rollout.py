@@ -80,7 +80,7 @@ def _biped(
     return find_task(task, BIPEDAL_WALKER_TASKS, "bipedal_walker").judge(trace)
 
 
-def test_a_jump_rises_half_a_metre_and_walks_on() -> None:
+def test_a_jump_rises_half_a_meter_and_walks_on() -> None:
     flat, fast = np.zeros(200), np.full(200, 5.0)
     arc = 2.0 + 0.6 * np.sin(np.linspace(0.0, np.pi, 200))
     assert _biped("jump", arc, flat, fast).success

@@ -69,7 +69,7 @@ def test_the_command_writes_a_behavior_and_keeps_what_the_map_says(tmp_path: Pat
     assert behavior.task == "jump"
     assert behavior.magnitudes == told["magnitudes"]
     assert behavior.period == told["period"]
-    path.write_text(path.read_text().replace('key = "j"', 'key = "z"  # mine') + "\n# the end\n")
+    path.write_text(path.read_text().replace('key = "i"', 'key = "z"  # mine') + "\n# the end\n")
     assert CliRunner().invoke(main, arguments).exit_code == 0
     text = path.read_text()
     assert "# mine" in text

@@ -14,7 +14,7 @@ from pdtui.sessions.recorded_outcomes import decode_outcomes
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_header_decoding import scan_session_header
 from pdtui.sessions.session_repair import repair_session
-from pdtui.sessions.session_summary import read_session_summary, summarise_session
+from pdtui.sessions.session_summary import read_session_summary, summarize_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.road import Road, road_loop
 
@@ -41,7 +41,7 @@ def test_a_session_has_the_words_with_and_without_its_index(driven: Path) -> Non
 def test_its_summary_counts_them_and_names_that_of_each_episode(driven: Path) -> None:
     header = read_session_header(driven)
     summary = read_session_summary(header)
-    assert summary == summarise_session(header)
+    assert summary == summarize_session(header)
     assert summary.outcomes == {"arrived": 2, "crashed": 1, "left the road": 1, "out of time": 1}
     assert [tally.outcome for tally in summary.tallies] == [*OUTCOMES.values(), ""]
 

@@ -32,7 +32,7 @@ def test_shapes_follow_their_bodies() -> None:
     poses[1, :, 0] = 4.0
     poses[1, 1, 3:] = ON_ITS_SIDE
     found = drawn(LINKS, poses)
-    # A capsule of the viewer starts at its translation; this leg reaches half a metre to both sides.
+    # A capsule of the viewer starts at its translation; this leg reaches half a meter to both sides.
     expected = np.array([[[0, 0, 1], [0, 0, -0.5]], [[4, 0, 1], [3.5, 0, 0]]])
     np.testing.assert_allclose(found["Capsules3D:translations"], expected, atol=1e-6)
     np.testing.assert_allclose(found["Boxes3D:centers"], [[[0, 0, -0.5]], [[3.5, 0, 0]]], atol=1e-6)

@@ -125,6 +125,10 @@ def test_columns_have_names_in_the_table_for_the_viewer(recorded: Recorded) -> N
         assert np.array_equal(found, np.array([r.attributes[column] for r in records], np.float32))
     assert [row["action 2"] for row in rows] == [[np.float32(record.action[2])] for record in records]
     assert [row["reward"] for row in rows] == [[np.float32(record.reward)] for record in records]
+    assert [row["episode"] for row in rows] == [[record.episode] for record in records]
+    latched = [[", ".join(one.name for one in record.behaviors)] for record in records]
+    assert [row["behaviors"] for row in rows] == latched
+    assert any(", " in names for (names,) in latched)
 
 
 def test_the_layout_at_the_end_adds_what_came_and_leaves_out_what_did_not(

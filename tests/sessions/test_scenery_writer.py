@@ -15,7 +15,7 @@ from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.sessions.episode_statistics import EpisodeStatistics, EpisodeStatisticsCounter
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.session_repair import repair_session
-from pdtui.sessions.session_summary import summarise_session
+from pdtui.sessions.session_summary import summarize_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from tests.obstacle_course import course_loop
 from tests.real_viewer import RealViewer
@@ -80,7 +80,7 @@ def test_a_session_counts_what_the_screen_counted(course: Course) -> None:
     path, obstacles, live = course
     session = read_session(path)
     assert session.info.obstacles
-    summary = summarise_session(session)
+    summary = summarize_session(session)
     assert summary.tallies == (live[-1], live[17])
     before, after = summary.tallies
     # Steps 0 to 11 reached 3 m; the rewind to step 10 went on from 2.5 m, for 6 steps.

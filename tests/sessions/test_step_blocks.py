@@ -11,7 +11,7 @@ import pytest
 from pdtui.core.errors import SessionError
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_reader import read_activations, read_session
-from pdtui.sessions.session_summary import SessionSummaryCounter, summarise_session
+from pdtui.sessions.session_summary import SessionSummaryCounter, summarize_session
 from pdtui.sessions.streams.step_block import StepBlock, step_block_of_records
 from pdtui.sessions.streams.step_block_reader import read_step_blocks
 from pdtui.sessions.streams.stream_differences import find_first_stream_difference
@@ -128,7 +128,7 @@ def test_the_summary_does_not_depend_on_the_size_of_the_blocks(recorded: Recorde
             )
         summaries.append(counter.summary())
     assert all(asdict(one) == asdict(summaries[0]) for one in summaries)
-    session, summary = read_session(path), summarise_session(read_session_header(path))
+    session, summary = read_session(path), summarize_session(read_session_header(path))
     assert summary.involvement == len(keyed)
     assert summary.total_reward == pytest.approx(float(session.rewards.sum()), rel=1e-12)
     assert summary.stimulated == sum(bool(one.units) for one in session.stimulations)

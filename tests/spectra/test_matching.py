@@ -172,7 +172,7 @@ def test_units_that_never_fire_stand_still_or_break_are_marked() -> None:
     assert sorted(found.ranked_units(0).tolist()) == [0, 1, 2, 3, 5]
 
 
-@pytest.mark.parametrize("setting", ["level=removed", "scaling=standardised"])
+@pytest.mark.parametrize("setting", ["level=removed", "scaling=standardized"])
 def test_what_is_constant_is_left_out_where_levels_do_not_count(setting: str) -> None:
     one = episode(15, 100)
     one.attributes[:, 0] = 3.0
@@ -200,7 +200,7 @@ def test_scalings_say_how_attributes_and_units_are_compared() -> None:
     raw = match_units([one], ATTRIBUTES, find_matching_preset("paper", ["scaling=raw"]))
     by_hand = [Attribute(attribute.name, attribute.unit) for attribute in ATTRIBUTES]
     np.testing.assert_array_equal(raw.discrepancy, match_units([one], by_hand, PRESETS["paper"]).discrepancy)
-    standard = match_units([one], ATTRIBUTES, find_matching_preset("paper", ["scaling=standardised"]))
+    standard = match_units([one], ATTRIBUTES, find_matching_preset("paper", ["scaling=standardized"]))
     z = (one.activations - one.activations.mean(0, float)) / one.activations.std(0, dtype=float)
     s = (one.attributes - one.attributes.mean(0)) / one.attributes.std(0)
     expected = by_scipy(MonitoredEpisode(17, z, s), by_hand, PRESETS["paper"])

@@ -51,7 +51,7 @@ def test_windows_are_the_periodic_ones(name: str) -> None:
     ("setting", "message"),
     [
         ("window", r"setting 'window': expected NAME=VALUE, one of window=blackman\|hann"),
-        ("colour=red", r"unknown setting 'colour'; available: window=.*; length=4…65536 samples"),
+        ("color=red", r"unknown setting 'color'; available: window=.*; length=4…65536 samples"),
         ("window=kaiser", r"setting 'window': expected blackman\|hann\|hamming\|rectangular, got 'kaiser'"),
         ("length=3", r"setting 'length': expected 4…65536 samples, got '3'"),
         ("hop=-1", r"setting 'hop': expected 1…65536 samples, got '-1'"),

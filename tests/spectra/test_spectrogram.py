@@ -18,7 +18,7 @@ def test_agrees_with_scipy_on_windows_that_lie_inside_the_series(preset: Matchin
     window = get_window(preset.window, preset.length, fftbins=True)
     reference = ShortTimeFFT(window, preset.hop, fs=1.0, scale_to="magnitude", phase_shift=None)
     whole = (300 - preset.length) // preset.hop + 1
-    # scipy centres slice p on sample p·hop: ours starts there.
+    # scipy centers slice p on sample p·hop: ours starts there.
     first = (preset.length // 2) // preset.hop
     expected = reference.stft(series, p0=first, p1=first + whole, axis=0).transpose(1, 2, 0)
     np.testing.assert_allclose(short_time_transform(series, preset), expected, atol=1e-12)
@@ -42,7 +42,7 @@ def test_sine_at_a_bin_is_known_by_hand(preset: MatchingPreset) -> None:
     time = np.arange(4 * preset.length)
     sine = 3.0 * np.cos(2 * np.pi * 8 * time / preset.length)
     magnitude = np.abs(short_time_transform(sine[:, None], preset))[0]
-    # Half the amplitude at the sine's bin; its neighbours hold the window's own side lines.
+    # Half the amplitude at the sine's bin; its neighbors hold the window's own side lines.
     side = 0.25 / 0.42 if preset.window == "blackman" else 0.25 / 0.5
     np.testing.assert_allclose(magnitude[:, 8], 1.5, atol=1e-12)
     np.testing.assert_allclose(magnitude[:, [7, 9]], 1.5 * side, atol=1e-12)

@@ -31,7 +31,7 @@ name = "push"
 key = "w"
 magnitudes = {{ "0:3" = 4.0 }}
 """
-CHOICES = 'activation = "relu"\nsquash = "clip"\nnormaliser = "stats.npz"\n'
+CHOICES = 'activation = "relu"\nsquash = "clip"\nnormalizer = "stats.npz"\n'
 
 
 def run(*arguments: str | Path | int) -> Result:
@@ -82,7 +82,7 @@ def test_a_replay_finds_what_has_moved_by_the_policy_option(
 def test_flags_reach_the_session_and_need_force_where_they_change_the_policy(folder: Path) -> None:
     plain = run("drive", "maps/open.toml", "--headless", "--steps", 5)
     assert "does not say how outputs become actions; choose with --squash none|tanh|clip" in plain.output
-    flags = "--activation", "relu", "--squash", "none", "--normaliser", "maps/stats.npz"
+    flags = "--activation", "relu", "--squash", "none", "--normalizer", "maps/stats.npz"
     driven = run("drive", "maps/open.toml", *flags, "--headless", "--steps", 20, "--record", "a.rrd")
     assert driven.exit_code == 0, driven.output
     assert run("replay", "a.rrd").stdout == "identical: 20 steps\n"
@@ -102,7 +102,7 @@ def test_evaluate_takes_the_choices_too(folder: Path) -> None:
 
 def test_a_policy_of_other_shapes_is_refused_with_both(folder: Path) -> None:
     torch.save(nn.Sequential(nn.Linear(4, 6), nn.Tanh(), nn.Linear(6, 2)).state_dict(), "small.pt")
-    result = run("drive", "maps/none.toml", "--policy", "small.pt", "--normaliser", "none", "--headless")
+    result = run("drive", "maps/none.toml", "--policy", "small.pt", "--normalizer", "none", "--headless")
     assert result.exit_code == 1
     assert "expected observations of shape (27,) and actions of shape (8,), as ant has" in result.output
     assert "the policy has observations of shape (4,) and actions of shape (2,)" in result.output
@@ -131,9 +131,16 @@ def test_a_map_that_needs_nothing_stays_as_it_is(folder: Path) -> None:
     [
         ("relu", "sine", r"m\.toml:7: policy: field 'activation': expected one of tanh, relu.*found 'sine'"),
         ('"clip"', "1", r"m\.toml:8: policy: field 'squash': expected text, found a number"),
-        ("normaliser", "normalizer", r"m\.toml:9: policy: field 'normalizer': not a field of this table"),
+        ("normalizer", "normal", r"m\.toml:9: policy: field 'normal': not a field of this table"),
     ],
 )
 def test_mistakes_in_the_choices_name_line_and_field(old: str, new: str, message: str) -> None:
     with pytest.raises(MapError, match=message):
         parse_map(MAP.format(sha256="0", choices=CHOICES).replace(old, new), "m.toml")
+
+
+def test_the_spelling_of_earlier_maps_is_read() -> None:
+    text = MAP.format(sha256="0", choices=CHOICES)
+    earlier = parse_map(text.replace("normalizer", "normaliser"), "m.toml")
+    assert earlier.import_options == parse_map(text, "m.toml").import_options
+    assert earlier.import_options.normalizer == "stats.npz"

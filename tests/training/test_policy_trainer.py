@@ -11,7 +11,7 @@ import torch
 
 from pdtui.core.errors import TrainingError
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
-from pdtui.policies.weights.weights_file import load_network, save_network
+from pdtui.policies.weights.weights_file import CHECKPOINT_FOLDER, load_network, save_network
 
 pytest.importorskip("jax", reason="the extra 'train' is not installed")
 
@@ -165,3 +165,21 @@ def test_the_replay_buffer_keeps_the_newest() -> None:
         replay.add(TransitionBatch(row, row, row[0], row[0], row))
     assert sorted(replay.arrays.reward.tolist()) == [2, 3, 4, 5]
     assert set(replay.sample(np.random.default_rng(0), 2, 50).reward.ravel().tolist()) == {2, 3, 4, 5}
+
+
+def test_policies_are_kept_after_each_part_of_a_run(tmp_path: Path) -> None:
+    config = replace(SMALL_PPO, total_steps=6400, evaluate_every=6400, keeps_checkpoints=True)
+    best = _train(tmp_path, config)
+    kept = sorted((tmp_path / CHECKPOINT_FOLDER).iterdir())
+    # 2 % are 128 control steps: two iterations.
+    assert [int(path.stem) for path in kept] == list(range(0, 6401, 128))
+    first, last = (load_network(path) for path in (kept[0], kept[-1]))
+    assert last.spec.score == {"steps": 6400}
+    weights = [network.state_dict()["hidden.0.weight"] for network in (first, last, load_network(best))]
+    assert not torch.equal(weights[0], weights[1])
+    assert torch.equal(weights[1], weights[2])
+
+
+def test_no_policy_is_kept_unless_it_is_asked_for(tmp_path: Path) -> None:
+    _train(tmp_path, SMALL_PPO)
+    assert not (tmp_path / CHECKPOINT_FOLDER).exists()

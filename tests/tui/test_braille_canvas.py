@@ -49,8 +49,8 @@ def test_lines_far_outside_or_endless_are_left_out() -> None:
 
 def test_a_disc_has_the_area_of_its_radius() -> None:
     canvas = BrailleCanvas(20, 10)
-    centre = np.array([20.0, 20.0])
-    canvas.draw_capsule(centre, centre, 10.0, 1)
+    center = np.array([20.0, 20.0])
+    canvas.draw_capsule(center, center, 10.0, 1)
     assert canvas.dots.sum() == pytest.approx(np.pi * 100, rel=0.03)
     rows, columns = np.nonzero(canvas.dots)
     assert (rows.min(), rows.max(), columns.min(), columns.max()) == (10, 29, 10, 29)

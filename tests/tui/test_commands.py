@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,8 @@ from textual.widgets import Input
 
 from pdtui.core.errors import SettingsError
 from pdtui.core.reserved_keys import KEY_TABLE
+from pdtui.core.settings.settings_file import read_settings
+from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, PastPosition
 from pdtui.tui.commands.palette_commands import list_palette_commands
 from pdtui.tui.drive_app import DriveApp
 from pdtui.tui.theme import STYLES, THEME
@@ -108,6 +111,30 @@ async def test_a_screenshot_is_written_where_pdtui_runs(
         (picture,) = tmp_path.glob("pdtui-*.svg")
         assert f"wrote ./{picture.name}" in notice(app) or picture.name in notice(app)
     assert "behaviors" in picture.read_text()
+
+
+async def test_escape_goes_back_from_one_thing_after_the_other_and_never_ends_the_drive(
+    make_app: MakeApp, drive: tuple[DriveFacts, list[DriveSnapshot]]
+) -> None:
+    facts, snapshots = drive
+    past = replace(snapshots[2], past=PastPosition(snapshots[3].step, 0))
+    app, connection = make_app([facts, snapshots[3], past])
+    async with app.run_test(size=(80, 24)) as pilot:
+        await played(pilot, connection)
+        assert "esc back" in shown(app.query_one(KeyLine))
+        await pilot.press("ctrl+f", "ctrl+e", "escape")
+        assert not app.query_one("#bench").display
+        assert app.query_one("#spectra").display
+        await pilot.press("escape")
+        assert not app.query_one("#spectra").display
+        await pilot.press("escape")
+        assert connection.sought == [snapshots[3].step], "the present"
+        connection.messages.append(snapshots[4])
+        await played(pilot, connection)
+        assert "esc back" not in shown(app.query_one(KeyLine))
+        await pilot.press("escape", "escape")
+        assert "nothing is open; q ends the drive" in notice(app)
+        assert app.is_running
 
 
 async def test_clicks_latch_clear_and_press_keys(make_app: MakeApp) -> None:
@@ -222,6 +249,22 @@ def test_everything_can_be_read_in_every_theme(name: str) -> None:
         assert contrast_ratio(zero, cold) >= 2.0
     finally:
         STYLES.adopt(THEME)
+
+
+async def test_a_theme_is_saved_by_the_palette(
+    make_app: MakeApp, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    app, connection = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await played(pilot, connection)
+        for command in ("themenord", "savetheme"):
+            await pilot.press("ctrl+p", *command)
+            await pilot.pause(0.5)
+            await pilot.press("enter")
+            await pilot.pause(0.2)
+        assert "theme nord is in" in notice(app)
+    assert read_settings().theme == "nord"
 
 
 def test_a_theme_that_does_not_exist_is_refused(make_app: MakeApp) -> None:

@@ -76,7 +76,7 @@ def test_a_box_is_filled_as_long_and_wide_as_it_is() -> None:
     poses = np.array([[*ahead(0.3, 20.0, 0.0), 0.0, 0.3]])
     car = Traffic(np.zeros(1, np.int64), ("vehicle",), poses, np.array([[10.0, 5.0, 0.0]]))
     draw_traffic(canvas, camera, car, BOXES, filled=True)
-    (x, y), zoom = camera.centre, camera.zoom
+    (x, y), zoom = camera.center, camera.zoom
     across = np.abs(np.arange(120)[None, :] + 0.5 - x) / zoom
     along = np.abs(np.arange(120)[:, None] + 0.5 - y + 20.0 * zoom) / zoom
     assert canvas.dots[(across < 2.4) & (along < 4.9)].all()
@@ -100,7 +100,7 @@ def road_drive(steps: int) -> tuple[ControlLoop, DriveFacts, list[DriveSnapshot]
 
 
 def dots_in(view: RobotView, style: Style) -> int:
-    """The number of dots in a colour."""
+    """The number of dots in a color."""
     return sum(
         bin(ord(character) - 0x2800).count("1")
         for strip in view.paint(*view.content_size)

@@ -14,11 +14,13 @@ from pdtui.core.units import parse_unit
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot, StimulatedUnit
 from pdtui.driving.unit_bench.natural_ranges import NaturalRanges
 from pdtui.driving.unit_bench.unit_search_snapshot import FoundUnit, UnitSearchRequest, UnitSearchSnapshot
+from pdtui.search.gain_tuning_process import TUNING_SEEDS, GainTuningState, OfferedGains
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stack.stack_entry import PidTuning, StackEntry
+from pdtui.tui.drive_app import DriveApp
 from pdtui.tui.unit_bench.bench_entry import BenchEntry
 from pdtui.tui.unit_bench.unit_page import UnitPage
-from tests.tui.conftest import MakeApp
+from tests.tui.conftest import MakeApp, ScriptedConnection
 from tests.tui.ghost_snapshots import with_ghost
 from tests.tui.screens import notice, played, shown
 
@@ -130,7 +132,7 @@ async def test_gains_are_edited_beside_the_chart(make_app: MakeApp, drive: Drive
     held = next(
         n for n, one in enumerate(snapshots) if any(v.target is not None for v in one.active_behaviors)
     )
-    layer = StackEntry("heading", 1.0, False, (5,), PidTuning(2.0, 0.1, 0.2))
+    layer = StackEntry("heading", 1.0, False, (5,), PidTuning(2.0, 0.1, 0.2, 3.0))
     messages = [replace(one, stack=(layer,)) for one in snapshots[held : held + 20]]
     app, connection = make_app([facts, *messages])
     async with app.run_test(size=(80, 24)) as pilot:
@@ -141,6 +143,66 @@ async def test_gains_are_edited_beside_the_chart(make_app: MakeApp, drive: Drive
         assert "in the map 0.1" in page, "kd differs"
         await pilot.press("right", "down", "equals_sign", *"0.5", "enter")
         assert connection.pressed == ["kp heading 2.2", "ki heading 0.5"]
+
+
+class ScriptedTuning:
+    """Offers what it is told to, and remembers what it was asked."""
+
+    def __init__(self) -> None:
+        self.state: GainTuningState | None = None
+        self.asked: list[str] = []
+
+    def tune(self, behavior: str) -> str:
+        self.asked.append(behavior)
+        return "" if len(self.asked) == 1 else "a tuning is under way"
+
+
+async def test_gains_are_tuned_taken_and_saved_with_the_maps_comments(
+    drive: Drive, map_path: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text("# my notes\n" + map_path.read_text())
+    facts, snapshots = drive
+    view = ActiveBehavior("hold heading", None, 1.0, 0.5, 0.1, 0.4, 0.8)
+
+    def latched(step: int, *gains: float) -> DriveSnapshot:
+        layer = StackEntry("hold heading", 1.0, False, (5,), PidTuning(*gains))
+        return replace(snapshots[0], step=step, active_behaviors=(view,), stack=(layer,))
+
+    own = load_map(path)
+    pid = own.behaviors["hold heading"].pid
+    assert pid is not None
+    better = replace(pid, kp=5.0, ki=0.0, limit=2.0)
+    tuning, connection = ScriptedTuning(), ScriptedConnection([facts, latched(1, 2.0, 0.1, 0.05, 3.0)])
+    app = DriveApp(connection, own, fps=200, tuning=tuning)
+    async with app.run_test(size=(200, 60)) as pilot:
+        await played(pilot, connection)
+        await pilot.press("ctrl+e", "tab", "tab", *["down"] * 5, "enter", "enter")
+        assert tuning.asked == ["hold heading"] * 2
+        assert "under way" in notice(app)
+        offered = (OfferedGains("found", better, 0.125, 0, 5), OfferedGains("map", pid, 0.25, 2, 5))
+        tuning.state = GainTuningState("done", "hold heading", "", 7, 7, offered)
+        connection.messages.append(latched(2, 2.0, 0.1, 0.05, 3.0))
+        await played(pilot, connection)
+        page = shown(app.query_one("#bench-pid"))
+        assert "7 controllers tried" in page
+        assert "○ found     0.12 5/0/0.05 ±2" in page
+        assert "fell 2/5" in page
+        await pilot.press("down", "enter")
+        edits = ["kp hold heading 5", "ki hold heading 0", "limit hold heading 2"]
+        assert connection.pressed == edits
+        connection.messages.append(latched(3, 5.0, 0.0, 0.05, 2.0))
+        await played(pilot, connection)
+        assert "in the map 2" in shown(app.query_one("#bench-pid"))
+        await pilot.press("ctrl+s")
+        assert f"gains saved in {path}"[:40] in notice(app)
+        connection.messages.append(latched(4, 5.0, 0.0, 0.05, 2.0))
+        await played(pilot, connection)
+        assert "in the map" not in shown(app.query_one("#bench-pid"))
+    saved = load_map(path)
+    assert saved.behaviors["hold heading"].pid == better
+    assert saved.text.startswith("# my notes\n")
+    assert saved.seeds == (TUNING_SEEDS,), "the seeds that they were chosen on are noted"
 
 
 async def test_a_search_is_asked_for_and_its_units_are_held(make_app: MakeApp, drive: Drive) -> None:
@@ -252,7 +314,7 @@ async def test_odd_numbers_and_tiny_terminals_do_no_harm(
         first,
         **arrays,
         active_behaviors=(odd,),
-        stack=(StackEntry("heading", value, False, (5,), PidTuning(value, value, value)),),
+        stack=(StackEntry("heading", value, False, (5,), PidTuning(value, value, value, value)),),
         held_units=((5, value),),
         natural_ranges=NaturalRanges(arrays["activations"], arrays["activations"], 1000),
         unit_search=UnitSearchSnapshot("done", best=(FoundUnit(5, value, value, True),)),

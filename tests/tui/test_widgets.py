@@ -256,7 +256,7 @@ def test_plots_have_a_zero_line_only_where_zero_is_inside() -> None:
     assert [text.strip() for text in texts[2:]] in (["⣀" * 6, ""], ["", "⠉" * 6])
 
 
-def test_the_ghosts_line_is_dotted_and_in_its_own_colour() -> None:
+def test_the_ghosts_line_is_dotted_and_in_its_own_color() -> None:
     own, ghost = np.full((8, 1), 1.0), np.full((8, 1), 3.0)
     scales = fit_scales(np.concatenate([own, ghost]), np.array([1.0]), np.array([3.0]))
     above, below = draw_line_plots(own, ghost, scales, [STYLES.primary])

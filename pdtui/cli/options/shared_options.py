@@ -127,7 +127,7 @@ def minutes_option(name: str, default: float | None = None, note: str = "") -> D
 
 
 def import_option_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--activation``, ``--squash`` and ``--normaliser``; the command gets them as `import_options`."""
+    """Add ``--activation``, ``--squash`` and ``--normalizer``; the command gets them as `import_options`."""
 
     @click.option(
         "--activation",
@@ -140,13 +140,13 @@ def import_option_flags(command: Callable[..., Any]) -> Callable[..., Any]:
         help="How outputs become actions, if the policy's file does not state it.",
     )
     @click.option(
-        "--normaliser", default="", metavar="FILE", help="File with the observation statistics, or 'none'."
+        "--normalizer", default="", metavar="FILE", help="File with the observation statistics, or 'none'."
     )
     @wraps(command)
     def with_import_options(
-        *args: Any, activation: str | None, squash: str | None, normaliser: str, **others: Any
+        *args: Any, activation: str | None, squash: str | None, normalizer: str, **others: Any
     ) -> Any:
-        options = ImportOptions(activation or "", squash or "", normaliser)
+        options = ImportOptions(activation or "", squash or "", normalizer)
         return command(*args, import_options=options, **others)
 
     return with_import_options

@@ -31,10 +31,13 @@ def show_drive(config: DriveConfig, settings: UserSettings | None = None, *, wat
 def run_drive_screen(config: DriveConfig, settings: UserSettings, *, watching: bool = False) -> str:
     """Start the simulation's process, show it on the screen, and return one line on how the drive ended."""
     from pdtui.driving.drive_client import DriveClient
+    from pdtui.search.gain_tuning_process import GainTuningProcess
 
     connection = DriveClient(config)
+    tuning = GainTuningProcess(config)
     try:
         from pdtui.tui.drive_app import DriveApp
+        from pdtui.tui.graphics.terminal_graphics import find_terminal_graphics
 
         if not watching:
             click.echo(make_printable(f"starting {config.robot} …"), err=True)
@@ -46,9 +49,12 @@ def run_drive_screen(config: DriveConfig, settings: UserSettings, *, watching: b
             watching=watching,
             theme=settings.theme,
             keymap=settings.keymap,
+            tuning=tuning,
+            graphics=find_terminal_graphics() if connection.is_pictured else None,
         )
         message = app.run()
     finally:
+        tuning.close()
         last_words = connection.close()
     if app.return_code or connection.failed:
         said = message or last_words

@@ -130,18 +130,18 @@ def _cross_validate(outputs: Sequence[Floats], values: Sequence[Floats]) -> NDAr
     for left_out in range(len(outputs)):
         others = [number for number in range(len(outputs)) if number != left_out]
         x, y = (np.concatenate([some[number] for number in others]) for some in (outputs, values))
-        centred = outputs[left_out] - x.mean(axis=0)
+        centered = outputs[left_out] - x.mean(axis=0)
         away = values[left_out] - y.mean(axis=0)
         varied += (away**2).sum(axis=0)
         for number, weights in enumerate(_fit_ridge(x, y)):
-            missed[number] += ((away - centred @ weights) ** 2).sum(axis=0)
+            missed[number] += ((away - centered @ weights) ** 2).sum(axis=0)
     return np.asarray(1.0 - np.divide(missed, varied, out=np.ones_like(missed), where=varied > 0))
 
 
 def _fit_ridge(x: Floats, y: Floats) -> list[Floats]:
     """Return the weights for each penalty, shape (n, C) each (Hoerl and Kennard, 1970)."""
-    centred, away = x - x.mean(axis=0), y - y.mean(axis=0)
-    sizes, axes = np.linalg.eigh(centred.T @ centred)
-    products = axes.T @ (centred.T @ away)
+    centered, away = x - x.mean(axis=0), y - y.mean(axis=0)
+    sizes, axes = np.linalg.eigh(centered.T @ centered)
+    products = axes.T @ (centered.T @ away)
     unit = max(float(np.mean(sizes)), np.finfo(np.float64).tiny)
     return [axes @ (products / (np.maximum(sizes, 0.0) + penalty * unit)[:, None]) for penalty in _PENALTIES]

@@ -14,7 +14,7 @@ from pdtui.dissection.steering.steering_candidates import BASELINES, SteeringMet
 from pdtui.dissection.steering.steering_results import SteeringComparison, SteeringResult
 
 
-def summarise_steering(steering: SteeringComparison, attributes: Sequence[Attribute]) -> dict[str, Any]:
+def summarize_steering(steering: SteeringComparison, attributes: Sequence[Attribute]) -> dict[str, Any]:
     """Return a comparison as data for JSON."""
     return {
         "choosing": steering.choosing,
@@ -22,13 +22,13 @@ def summarise_steering(steering: SteeringComparison, attributes: Sequence[Attrib
         "cases": 2 * len(steering.columns),
         "attributes": [attributes[column].name for column in steering.columns],
         "methods": [
-            _summarise_method(method, tried, [one for one in steering.results if one.method is method])
+            _summarize_method(method, tried, [one for one in steering.results if one.method is method])
             for method, tried in steering.tried.items()
         ],
         "probes": {
             attributes[one.column].name: {"layer": one.layer, "r2": one.r2} for one in steering.probes
         },
-        "results": [_summarise_result(one, attributes) for one in steering.results],
+        "results": [_summarize_result(one, attributes) for one in steering.results],
     }
 
 
@@ -97,7 +97,7 @@ def describe_steering(summary: dict[str, Any]) -> str:
     )
 
 
-def _summarise_method(
+def _summarize_method(
     method: SteeringMethod, tried: int, results: Sequence[SteeringResult]
 ) -> dict[str, Any]:
     """Return how many results count, and the medians of those."""
@@ -115,7 +115,7 @@ def _summarise_method(
     }
 
 
-def _summarise_result(one: SteeringResult, attributes: Sequence[Attribute]) -> dict[str, Any]:
+def _summarize_result(one: SteeringResult, attributes: Sequence[Attribute]) -> dict[str, Any]:
     measured = one.measured
     return {
         "attribute": attributes[one.column].name,

@@ -33,6 +33,7 @@ class ReplayResult:
         description: what differs between robot and policy and the session's description of them, in words;
             if anything does, no step is run.
         missing: the control steps that the session lacks, as half-open ranges.
+        left: recorded control steps that were not compared because the time was over.
     """
 
     steps: int
@@ -52,10 +53,11 @@ class ReplayResult:
     beyond_rounding: StreamDifference | None = None
     description: tuple[str, ...] = ()
     missing: tuple[tuple[int, int], ...] = ()
+    left: int = 0
 
     @property
     def identical(self) -> bool:
-        """Whether every bit of every recorded stream is the same in every step that was recorded."""
+        """Whether every bit of every recorded stream is the same in every step that was compared."""
         return self.first_difference is None and not self.description
 
     @property
@@ -75,7 +77,8 @@ class ReplayResult:
         if self.description:
             return f"differs: description: {'; '.join(self.description)}"
         if self.identical:
-            return f"identical: {self.steps} steps"
+            said = f"identical: {self.steps} step{'' if self.steps == 1 else 's'}"
+            return f"{said}; the time was over before the other {self.left}" if self.left else said
         where = f"step {self.first_difference} of {self.total}"
         if self.damaged or self.tolerance is None:
             return f"differs: {self._damage(where)}"

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 import time
-from collections.abc import Callable
 from dataclasses import replace
 
 from pdtui.core.closable import Closable
-from pdtui.core.errors import PdtuiError, format_error_in_one_line
+from pdtui.core.processes.background_worker import BackgroundWorker
 from pdtui.core.processes.worker_pool import WorkerProcess
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.ghost.ghost_simulation import GhostStart, answer_when_loaded, build_ghost_loop
@@ -31,17 +29,15 @@ class UnitSearchProcess(Closable):
     """
 
     def __init__(self, config: DriveConfig) -> None:
-        self._config = replace(config, recording="", viewer=None, watched=None)
-        self._worker: WorkerProcess | None = None
-        self._thread: threading.Thread | None = None
-        self._closed = False
+        config = replace(config, recording="", viewer=None, watched=None)
+        self._worker = BackgroundWorker("the search for units", build_ghost_loop, config)
         self.state: UnitSearchSnapshot | None = None
         """How the present search stands; None before the first."""
 
     @property
     def is_searching(self) -> bool:
         """Whether a search is under way."""
-        return self._thread is not None and self._thread.is_alive()
+        return self._worker.is_busy
 
     def search(
         self, request: UnitSearchRequest, start: GhostStart, column: int, ranges: NaturalRanges | None
@@ -55,11 +51,10 @@ class UnitSearchProcess(Closable):
             ranges: what the units put out by themselves.
         """
         self.state = UnitSearchSnapshot("loading", request=request)
-        work = self._search
-        self._thread = threading.Thread(
-            target=self._guard, args=(lambda: work(request, start, column, ranges),), daemon=True
+        self._worker.start(
+            lambda worker: self._search(worker, request, start, column, ranges),
+            lambda said: self.fail(request, f"no search: {said}"),
         )
-        self._thread.start()
 
     def fail(self, request: UnitSearchRequest, reason: str) -> None:
         """Note that there is no search."""
@@ -67,27 +62,16 @@ class UnitSearchProcess(Closable):
 
     def close(self) -> None:
         """Kill the process."""
-        self._closed = True
-        if self._worker is not None:
-            self._worker.process.kill()
-
-    def _guard(self, work: Callable[[], None]) -> None:
-        try:
-            work()
-        except Exception as error:
-            said = str(error) if isinstance(error, PdtuiError) else format_error_in_one_line(error)
-            self._worker = None
-            if self.state is not None and not self._closed:
-                self.state = replace(self.state, condition="failed", message=f"no search: {said}")
+        self._worker.close()
 
     def _search(
-        self, request: UnitSearchRequest, start: GhostStart, column: int, ranges: NaturalRanges | None
+        self,
+        worker: WorkerProcess,
+        request: UnitSearchRequest,
+        start: GhostStart,
+        column: int,
+        ranges: NaturalRanges | None,
     ) -> None:
-        if self._worker is None:
-            self._worker = WorkerProcess("the search for units", build_ghost_loop, self._config)
-        worker = self._worker
-        if self._closed:
-            worker.process.kill()
         worker.send(answer_when_loaded)
         worker.receive()
         worker.send(rank_candidates, start, ranges)

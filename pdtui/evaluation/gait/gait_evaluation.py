@@ -113,7 +113,7 @@ def evaluate_gait(
             progress(done, len(seeds))
     if not walks:
         raise RobotError(f"{built.robot.name}: no walk of {len(seeds)} lasted {SHORTEST_WALK:g} s")
-    return _summarise(built, tuple(seeds), steps, walks, count_outcomes(outcomes, built.robot.outcomes))
+    return _summarize(built, tuple(seeds), steps, walks, count_outcomes(outcomes, built.robot.outcomes))
 
 
 def _walk(
@@ -137,7 +137,7 @@ def _walk(
     return compute_walk_metrics(robot, links, np.array(poses)[: len(contacts)], contacts), outcome
 
 
-def _summarise(
+def _summarize(
     built: ControlLoop, seeds: tuple[int, ...], steps: int, walks: list[WalkMetrics], outcomes: OutcomeCounts
 ) -> GaitEvaluation:
     robot, over = built.robot, MeanWithDeviation.of

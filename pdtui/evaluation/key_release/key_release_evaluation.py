@@ -108,7 +108,7 @@ def evaluate_key_releases(
         loop.policy.name,
         tuple(seeds),
         FOLLOWED_STEPS,
-        tuple(summarise_key_release(name, seeds, times, traces, column) for name in names),
+        tuple(summarize_key_release(name, seeds, times, traces, column) for name in names),
     )
 
 
@@ -119,7 +119,7 @@ def _plan_times(loop: ControlLoop, name: str, seed: int, held: int) -> RunTimes:
     return RunTimes(usual.press, steps, FOLLOWED_STEPS, usual.window, usual.bin, dt)
 
 
-def summarise_key_release(
+def summarize_key_release(
     name: str,
     seeds: Sequence[int],
     times: Mapping[tuple[str, int], RunTimes],

@@ -60,7 +60,7 @@ class TaskEpisode:
 
 @dataclass(frozen=True)
 class TaskRunResult:
-    """The judgement of one run.
+    """The judgment of one run.
 
     Attributes:
         verdict: The verdict on the task.

@@ -96,20 +96,20 @@ class TaskEvaluation:
     substitutes: tuple[TaskSubstituteSuccess, ...] = ()
 
 
-def summarise_tasks(plan: EvaluationPlan, results: TaskResults) -> tuple[TaskEvaluation, ...]:
-    """Summarise the runs of every task in each condition, the undisturbed rows first.
+def summarize_tasks(plan: EvaluationPlan, results: TaskResults) -> tuple[TaskEvaluation, ...]:
+    """Summarize the runs of every task in each condition, the undisturbed rows first.
 
     P-values are corrected over the undisturbed rows, and over the disturbed ones.
     """
     rows: list[TaskEvaluation] = []
     disturbed = [name for name in plan.conditions if name != UNDISTURBED.name]
     for table in ([UNDISTURBED.name], disturbed):
-        found = [_summarise(plan, behavior, name, results) for name in table for behavior in plan.tasked]
+        found = [_summarize(plan, behavior, name, results) for name in table for behavior in plan.tasked]
         if UNDISTURBED.name in table:
             follows = dict.fromkeys((run.behavior, run.after) for run in results if run.after)
             behaviors = plan.loop.map.behaviors
             found += [
-                _summarise(plan, behaviors[name], UNDISTURBED.name, results, after) for name, after in follows
+                _summarize(plan, behaviors[name], UNDISTURBED.name, results, after) for name, after in follows
             ]
         corrected = holm_correction([row.p_value for row in found])
         rows += [
@@ -119,7 +119,7 @@ def summarise_tasks(plan: EvaluationPlan, results: TaskResults) -> tuple[TaskEva
     return tuple(rows)
 
 
-def _summarise(
+def _summarize(
     plan: EvaluationPlan, behavior: Behavior, condition: str, results: TaskResults, after: str = ""
 ) -> TaskEvaluation:
     own = {
@@ -155,7 +155,7 @@ def _summarise(
         seed_scores=tuple(one.verdict.score for one in pressed),
         figures=average_figures(one.verdict for one in pressed),
         figures_by_itself=average_figures(one.verdict for one in untouched),
-        substitutes=_summarise_substitutes(plan, done, own),
+        substitutes=_summarize_substitutes(plan, done, own),
     )
 
 
@@ -163,7 +163,7 @@ def _count(plan: EvaluationPlan, results: Iterable[TaskRunResult]) -> OutcomeCou
     return count_outcomes((one.outcome for one in results), plan.loop.robot.outcomes)
 
 
-def _summarise_substitutes(
+def _summarize_substitutes(
     plan: EvaluationPlan, done: Sequence[bool], own: TaskResults
 ) -> tuple[TaskSubstituteSuccess, ...]:
     kinds: dict[str, dict[int, list[TaskRunResult]]] = {}

@@ -10,7 +10,7 @@ from pdtui.core.scenery import Traffic
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.paper.driving.key_effects import DEFAULT, KeyEffects, driving_behaviors
 from pdtui.paper.driving.key_operator import KeyOperator
-from pdtui.paper.driving.operator_memory import JudgementErrors
+from pdtui.paper.driving.operator_memory import JudgmentErrors
 from pdtui.paper.driving.sight_reader import SightReader
 from pdtui.paper.driving.steering_operator import SteeringOperator
 
@@ -37,9 +37,9 @@ class NoOperator:
 class KeyDriveOperator:
     """Presses keys of a drive that has not begun."""
 
-    def __init__(self, loop: ControlLoop, effects: KeyEffects, judgement: JudgementErrors) -> None:
+    def __init__(self, loop: ControlLoop, effects: KeyEffects, judgment: JudgmentErrors) -> None:
         self._loop, self._reader = loop, SightReader(loop.robot)
-        self._operator = KeyOperator(effects, loop.robot.control_dt, judgement)
+        self._operator = KeyOperator(effects, loop.robot.control_dt, judgment)
         self._behaviors = driving_behaviors(loop.map)
 
     def act(self, traffic: Traffic) -> Sequence[DriveEvent]:
@@ -55,9 +55,9 @@ class KeyDriveOperator:
 class WheelDriveOperator:
     """Steers and sets the throttle of a drive that has not begun, all the time or while it takes over."""
 
-    def __init__(self, loop: ControlLoop, judgement: JudgementErrors, *, always: bool) -> None:
+    def __init__(self, loop: ControlLoop, judgment: JudgmentErrors, *, always: bool) -> None:
         self._loop, self._reader = loop, SightReader(loop.robot)
-        self._operator = SteeringOperator(loop.robot.control_dt, judgement, always=always)
+        self._operator = SteeringOperator(loop.robot.control_dt, judgment, always=always)
 
     def act(self, traffic: Traffic) -> Sequence[DriveEvent]:
         step, controls = self._loop.step, self._operator.choose_controls(self._reader.look(traffic))
@@ -70,12 +70,12 @@ class WheelDriveOperator:
 
 
 def make_operator(
-    control: SharedControl, loop: ControlLoop, effects: KeyEffects | None, judgement: JudgementErrors
+    control: SharedControl, loop: ControlLoop, effects: KeyEffects | None, judgment: JudgmentErrors
 ) -> DriveOperator:
     """Return who operates a drive that has not begun; the keys' effects are needed where it presses keys."""
     if control == "keys":
         assert effects is not None
-        return KeyDriveOperator(loop, effects, judgement)
+        return KeyDriveOperator(loop, effects, judgment)
     if control == "alone":
         return NoOperator()
-    return WheelDriveOperator(loop, judgement, always=control == "human only")
+    return WheelDriveOperator(loop, judgment, always=control == "human only")

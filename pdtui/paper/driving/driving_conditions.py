@@ -29,7 +29,7 @@ from pdtui.paper.driving.driving_results import (
     DrivingExperimentResult,
     DrivingRow,
     compare_involvement,
-    summarise_row,
+    summarize_row,
 )
 from pdtui.paper.driving.key_effects import (
     MEASURING_SEEDS,
@@ -38,7 +38,7 @@ from pdtui.paper.driving.key_effects import (
     driving_behaviors,
     measure_key_effects,
 )
-from pdtui.paper.driving.operator_memory import sample_judgement_errors
+from pdtui.paper.driving.operator_memory import sample_judgment_errors
 from pdtui.paper.driving.score_journal import ScoreJournal
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import robot_file_stem
@@ -103,9 +103,9 @@ def evaluate_driving(
                 effects = {_name(config): one for config, one in zip(usable, found, strict=True)}
             jobs = list(_plan_jobs(usable, controls, scenes, repeats, effects, record))
             scores = _run_jobs(pool, jobs, kept, progress)
-            rows += _summarise(jobs, scores, repeats)
+            rows += _summarize(jobs, scores, repeats)
     rows += [
-        summarise_row(
+        summarize_row(
             policy, control, "person", [[score for score, *its in read if its == [policy, control]]]
         )
         for policy, control in dict.fromkeys((policy, control) for _, policy, control in read)
@@ -196,14 +196,14 @@ def _run_jobs(
     return scores
 
 
-def _summarise(
+def _summarize(
     jobs: Sequence[_DriveJob], scores: Mapping[str, DrivingScore], repeats: int
 ) -> Iterator[DrivingRow]:
     for policy, control in dict.fromkeys((job.policy, job.control) for job in jobs):
         mine = [job for job in jobs if (job.policy, job.control) == (policy, control)]
         groups = [[scores[job.key] for job in mine if job.repeat == repeat] for repeat in range(repeats)]
         driver = "" if control == "alone" else "program"
-        yield summarise_row(policy, control, driver, [group for group in groups if group])
+        yield summarize_row(policy, control, driver, [group for group in groups if group])
 
 
 def _measure_keys(car: _Car, config: DriveConfig) -> KeyEffects:
@@ -212,8 +212,8 @@ def _measure_keys(car: _Car, config: DriveConfig) -> KeyEffects:
 
 def _run_drive(car: _Car, job: _DriveJob) -> DrivingScore:
     loop = car.loop(job.config, job.scene)
-    judgement = sample_judgement_errors(job.repeat, TEST_STARTS.index(job.scene))
-    operator = make_operator(job.control, loop, job.effects, judgement)
+    judgment = sample_judgment_errors(job.repeat, TEST_STARTS.index(job.scene))
+    operator = make_operator(job.control, loop, job.effects, judgment)
     if job.folder is None:
         return drive_episode(loop, operator)
     path = job.folder / f"{robot_file_stem(job.policy)}-{job.scene}.rrd"

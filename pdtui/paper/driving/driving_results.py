@@ -15,7 +15,7 @@ from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.paper.driving.drive_operators import SharedControl
 from pdtui.paper.driving.driving_episode import DrivingScore
 from pdtui.paper.driving.key_effects import KeyEffects
-from pdtui.paper.repeat_statistics import RepeatStatistics, summarise_repeats
+from pdtui.paper.repeat_statistics import RepeatStatistics, summarize_repeats
 
 CONTROL_NAMES: dict[SharedControl, str] = {
     "alone": "alone",
@@ -87,14 +87,14 @@ class DrivingExperimentResult:
     sessions: tuple[str, ...]
 
 
-def summarise_row(
+def summarize_row(
     policy: str, control: SharedControl, driver: str, repeats: Sequence[Sequence[DrivingScore]]
 ) -> DrivingRow:
     """Return a row from the scores of each repeat's episodes."""
 
     def figure(name: str) -> RepeatStatistics:
         means = np.array([np.mean([float(getattr(one, name)) for one in scores]) for scores in repeats])
-        return summarise_repeats(means)
+        return summarize_repeats(means)
 
     scores = tuple(one for repeat in repeats for one in repeat)
     operated = control != "alone"

@@ -17,7 +17,7 @@ from pdtui.paper.driving.maneuver import (
     predict_times_to_conflict,
     slips_off,
 )
-from pdtui.paper.driving.operator_memory import JudgementErrors, OperatorMemory
+from pdtui.paper.driving.operator_memory import JudgmentErrors, OperatorMemory
 from pdtui.paper.driving.road_sight import LANE_WIDTH, RoadSight
 
 PRESSES_PER_SECOND = 3
@@ -57,12 +57,12 @@ class KeyOperator:
     Args:
         effects: What the keys do.
         dt: Duration of a control step, s.
-        judgement: How it judges what it sees.
+        judgment: How it judges what it sees.
     """
 
-    def __init__(self, effects: KeyEffects, dt: float, judgement: JudgementErrors | None = None) -> None:
-        self._dt, self._patience = dt, (judgement or JudgementErrors()).patience
-        self._memory = OperatorMemory(dt, judgement or JudgementErrors())
+    def __init__(self, effects: KeyEffects, dt: float, judgment: JudgmentErrors | None = None) -> None:
+        self._dt, self._patience = dt, (judgment or JudgmentErrors()).patience
+        self._memory = OperatorMemory(dt, judgment or JudgmentErrors())
         self._keys = KeyManeuvers(effects, dt)
         self._second = math.ceil(1.0 / dt - 1e-9)
         self._rolled, self._aim, self._askew = 0, 0.0, _ASKEW

@@ -1,4 +1,4 @@
-"""The operator's reaction time and judgement: what it saw a moment ago, carried on to now."""
+"""The operator's reaction time and judgment: what it saw a moment ago, carried on to now."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DISTANCE_SPREAD, _SPEED_SPREAD, _PATIENCE_SPREAD = 0.05, 0.1, 0.1
 
 
 @dataclass(frozen=True)
-class JudgementErrors:
+class JudgmentErrors:
     """How one operator judges: factors on the true values, 1 if it judges right.
 
     Attributes:
@@ -32,15 +32,15 @@ class JudgementErrors:
     patience: float = 1.0
 
 
-def sample_judgement_errors(repeat: int, scene: int) -> JudgementErrors:
-    """Return the judgement of the operator of a repeat in a scene.
+def sample_judgment_errors(repeat: int, scene: int) -> JudgmentErrors:
+    """Return the judgment of the operator of a repeat in a scene.
 
     Nobody judges distances and speeds exactly, nor twice alike; the standard deviations are 5 % of distances
     and 10 % of speeds and times.
     """
-    rng = purpose_generator(RandomPurpose.OPERATOR_JUDGEMENT, repeat, scene)
+    rng = purpose_generator(RandomPurpose.OPERATOR_JUDGMENT, repeat, scene)
     spreads = np.array([_DISTANCE_SPREAD, _SPEED_SPREAD, _PATIENCE_SPREAD])
-    return JudgementErrors(*(1.0 + spreads * np.clip(rng.standard_normal(3), -2.0, 2.0)).tolist())
+    return JudgmentErrors(*(1.0 + spreads * np.clip(rng.standard_normal(3), -2.0, 2.0)).tolist())
 
 
 class OperatorMemory:
@@ -48,11 +48,11 @@ class OperatorMemory:
 
     Args:
         dt: Duration of a control step, s.
-        judgement: How the operator judges what it sees.
+        judgment: How the operator judges what it sees.
     """
 
-    def __init__(self, dt: float, judgement: JudgementErrors) -> None:
-        self._dt, self._judgement = dt, judgement
+    def __init__(self, dt: float, judgment: JudgmentErrors) -> None:
+        self._dt, self._judgment = dt, judgment
         self._delay = math.ceil(REACTION_TIME / dt - 1e-9)
         self._seen: list[RoadSight] = []
 
@@ -73,8 +73,8 @@ class OperatorMemory:
         ahead, aside = seen.speed * math.cos(direction) * time, seen.speed * math.sin(direction) * time
         others = seen.others.copy()
         place = seen.line.points_at(np.array([seen.along]))
-        others[:, :2] = place + (others[:, :2] - place) * self._judgement.distance
-        others[:, 5] *= self._judgement.speed
+        others[:, :2] = place + (others[:, :2] - place) * self._judgment.distance
+        others[:, 5] *= self._judgment.speed
         return replace(
             seen,
             along=seen.along + ahead,

@@ -16,7 +16,7 @@ from pdtui.paper.driving.drive_operators import SharedControl, make_operator
 from pdtui.paper.driving.driving_episode import TEST_STARTS, drive_episode
 from pdtui.paper.driving.driving_results import DrivingExperimentResult
 from pdtui.paper.driving.key_effects import KeyEffects
-from pdtui.paper.driving.operator_memory import sample_judgement_errors
+from pdtui.paper.driving.operator_memory import sample_judgment_errors
 from pdtui.paper.driving.sight_reader import read_boxes
 from pdtui.robots.robot import Robot
 
@@ -92,9 +92,9 @@ def _drive(
     config: DriveConfig, robot: Robot | None, scene: str, control: SharedControl, effects: KeyEffects | None
 ) -> tuple[DriveWatcher, str, Robot]:
     loop = build_control_loop(replace(config, start=scene), robot)
-    judgement = sample_judgement_errors(0, TEST_STARTS.index(scene))
+    judgment = sample_judgment_errors(0, TEST_STARTS.index(scene))
     watcher = DriveWatcher()
-    score = drive_episode(loop, make_operator(control, loop, effects, judgement), watcher.watch)
+    score = drive_episode(loop, make_operator(control, loop, effects, judgment), watcher.watch)
     return watcher, score.outcome, loop.robot
 
 

@@ -26,7 +26,7 @@ from pdtui.paper.driving.maneuver import (
     slips_off,
     swerve,
 )
-from pdtui.paper.driving.operator_memory import JudgementErrors, OperatorMemory
+from pdtui.paper.driving.operator_memory import JudgmentErrors, OperatorMemory
 from pdtui.paper.driving.road_sight import CAR_HALF_LENGTH, CAR_HALF_WIDTH, LANE_WIDTH, ROAD_STEP, RoadSight
 
 CRUISING_SPEED = 10.0
@@ -67,14 +67,14 @@ class SteeringOperator:
 
     Args:
         dt: Duration of a control step, s.
-        judgement: How it judges what it sees.
+        judgment: How it judges what it sees.
         always: Whether it drives all the time, or takes over only where the car alone would come too close to
             something, until that is over.
     """
 
-    def __init__(self, dt: float, judgement: JudgementErrors | None = None, *, always: bool = False) -> None:
-        self._judgement, self._always = judgement or JudgementErrors(), always
-        self._memory = OperatorMemory(dt, self._judgement)
+    def __init__(self, dt: float, judgment: JudgmentErrors | None = None, *, always: bool = False) -> None:
+        self._judgment, self._always = judgment or JudgmentErrors(), always
+        self._memory = OperatorMemory(dt, self._judgment)
         self._dt, self._target, self._driving, self._quiet, self._halted = dt, 0, False, 0, 0
 
     def choose_controls(self, sight: RoadSight) -> ManualControlValues | None:
@@ -101,7 +101,7 @@ class SteeringOperator:
         expected = predict_times_to_conflict(
             seen, Maneuver("", ahead, swerve(seen, ahead, np.zeros_like(TIMES)))
         )
-        patience = self._judgement.patience
+        patience = self._judgment.patience
         return (
             expected.standing < PATIENCE_STANDING * patience
             or expected.moving < PATIENCE_MOVING * patience
@@ -120,7 +120,7 @@ class SteeringOperator:
         """Choose another lane if that postpones the next conflict; it is kept until it is reached."""
         self._target = min(self._target, seen.lanes - 1)
         now = self._expect(seen, self._target)
-        if now > PATIENCE_STANDING * self._judgement.patience:
+        if now > PATIENCE_STANDING * self._judgment.patience:
             return
         near = [lane for lane in (seen.lane - 1, seen.lane, seen.lane + 1) if 0 <= lane < seen.lanes]
         later = {lane: self._expect(seen, lane) for lane in near}
@@ -156,7 +156,7 @@ class SteeringOperator:
         here = np.zeros_like(TIMES)
         ahead = roll(max(seen.speed, 3.0), 0.0)
         goes = predict_times_to_conflict(seen, Maneuver("", ahead, here), ROOM_FOR_CROSSING)
-        if goes.crossing > PATIENCE_CROSSING * self._judgement.patience:
+        if goes.crossing > PATIENCE_CROSSING * self._judgment.patience:
             return False
         stops = predict_times_to_conflict(seen, Maneuver("", roll(seen.speed, -_HARD_BRAKING), here))
         return stops.crossing > goes.crossing

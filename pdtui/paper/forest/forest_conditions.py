@@ -29,7 +29,7 @@ from pdtui.paper.forest.forest_results import (
     ForestCondition,
     ForestExperimentResult,
     compare_conditions,
-    summarise_condition,
+    summarize_condition,
 )
 from pdtui.paper.forest.key_motion_fit import fit_key_motion_models
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
@@ -122,13 +122,13 @@ def evaluate_forest(
             runs[condition] = pool.map(_run_episode, jobs, tell)
             done += len(jobs)
     measured = [
-        summarise_condition(CONDITIONS[one], configs[one].policy or policy, runs[one], repeats)
+        summarize_condition(CONDITIONS[one], configs[one].policy or policy, runs[one], repeats)
         for one in runs
     ]
     if person_drives:
         driven = ", ".join(sorted({session_policy for _, _, session_policy in person_drives}))
         measured.append(
-            summarise_condition(PERSON, driven, [run for _, run, _ in person_drives], len(person_drives))
+            summarize_condition(PERSON, driven, [run for _, run, _ in person_drives], len(person_drives))
         )
     return ForestExperimentResult(
         name,

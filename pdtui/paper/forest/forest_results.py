@@ -16,7 +16,7 @@ from pdtui.core.outcome import Outcome, is_failure
 from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.paper.forest.forest_episode import ForestEpisodeScore
 from pdtui.paper.forest.key_motion_model import KeyMotionModel
-from pdtui.paper.repeat_statistics import RepeatStatistics, summarise_repeats
+from pdtui.paper.repeat_statistics import RepeatStatistics, summarize_repeats
 
 ForestCondition = Literal["alone", "operator", "placebo", "vision"]
 COMPARED: tuple[tuple[ForestCondition, ForestCondition], ...] = (
@@ -61,14 +61,14 @@ class ForestConditionRatio:
         condition, baseline: names of the two.
         distance: ratio of distances along x.
         collisions: ratio of numbers of collisions.
-        collisions_per_metre: the same per distance, since who gets farther meets more trees.
+        collisions_per_meter: the same per distance, since who gets farther meets more trees.
     """
 
     condition: str
     baseline: str
     distance: PairedRatio
     collisions: PairedRatio
-    collisions_per_metre: PairedRatio
+    collisions_per_meter: PairedRatio
 
 
 @dataclass(frozen=True)
@@ -98,14 +98,14 @@ class ForestExperimentResult:
     sessions: tuple[str, ...]
 
 
-def summarise_condition(
+def summarize_condition(
     condition: str, policy: str, runs: Sequence[ForestEpisodeScore], repeats: int
 ) -> ForestConditionSummary:
     """Return the figures of one condition; consecutive runs form a repeat."""
 
     def spread(name: str) -> RepeatStatistics:
         values = np.array([float(getattr(run, name)) for run in runs]).reshape(repeats, -1).mean(axis=1)
-        return summarise_repeats(values)
+        return summarize_repeats(values)
 
     falls = sum(is_failure(run.outcome) for run in runs)
     return ForestConditionSummary(
@@ -172,9 +172,9 @@ def forest_table(result: ForestExperimentResult) -> Group:
 
 
 def _ratios_table(ratios: Sequence[ForestConditionRatio]) -> Table:
-    table = new_table("Ratios [95 %], paired by forest", "", "distance", "collisions", "collisions per metre")
+    table = new_table("Ratios [95 %], paired by forest", "", "distance", "collisions", "collisions per meter")
     for row in ratios:
-        figures = (row.distance, row.collisions, row.collisions_per_metre)
+        figures = (row.distance, row.collisions, row.collisions_per_meter)
         cells = (format_mean_with_interval(one.value, one.low, one.high) for one in figures)
         table.add_row(f"{row.condition} / {row.baseline}", *cells)
     return table

@@ -1,7 +1,7 @@
 """Fits models of keys to drives with random keys.
 
 From many moments of the drives, the 1.2 s that follow are predicted, and a soft L1 norm of the errors is
-minimised, so that stumbles count less. The predictions span changes of keys, as those of the planner do.
+minimized, so that stumbles count less. The predictions span changes of keys, as those of the planner do.
 """
 
 from __future__ import annotations
@@ -91,13 +91,13 @@ def fit_key_motion_models(
 
     errors = (heading_errors, speed_errors, drift_errors)
     tables = [
-        _minimise(one, len(names), *bounds) for one, *bounds in zip(errors, _GUESS, _LOW, _HIGH, strict=True)
+        _minimize(one, len(names), *bounds) for one, *bounds in zip(errors, _GUESS, _LOW, _HIGH, strict=True)
     ]
     tables.append(np.array([[fell / max(presses, 1)] for fell, presses in falls]))
     return {name: KeyMotionModel(*row.tolist()) for name, row in zip(names, np.hstack(tables), strict=True)}
 
 
-def _minimise(
+def _minimize(
     errors: Callable[[Floats], Floats],
     choices: int,
     guess: Sequence[float],

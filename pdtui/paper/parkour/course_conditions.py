@@ -30,8 +30,8 @@ from pdtui.paper.parkour.course_results import (
     CourseConditionSummary,
     CourseExperimentResult,
     ObstaclePassage,
-    summarise_course_condition,
-    summarise_passages,
+    summarize_course_condition,
+    summarize_passages,
 )
 from pdtui.robots import robot_file_stem
 from pdtui.robots.parkour.parkour_course import OBSTACLE_KINDS, ObstacleKind
@@ -102,7 +102,7 @@ def evaluate_parkour(
             _run_passage, passages, lambda done, _: progress and progress(len(jobs) + done, total)
         )
     rows: list[CourseConditionSummary] = [
-        summarise_course_condition(
+        summarize_course_condition(
             CONDITIONS[one],
             policy,
             [score for score, job in zip(scores, jobs, strict=True) if job.condition == one],
@@ -112,7 +112,7 @@ def evaluate_parkour(
     ]
     if people:
         driven = ", ".join(sorted({its_policy for _, _, its_policy in people}))
-        rows.append(summarise_course_condition(PERSON, driven, [score for _, score, _ in people]))
+        rows.append(summarize_course_condition(PERSON, driven, [score for _, score, _ in people]))
     results = [
         ObstaclePassage(CONDITIONS[job.condition], job.kind, job.seed, done)
         for job, done in zip(passages, passed, strict=True)
@@ -123,7 +123,7 @@ def evaluate_parkour(
         steps,
         steps * dt,
         tuple(rows),
-        summarise_passages(results),
+        summarize_passages(results),
         tuple(map(str, sessions)),
     )
 

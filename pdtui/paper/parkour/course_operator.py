@@ -33,7 +33,7 @@ class CourseOperatorSettings:
             and ends a sidestep, m.
         glide: time for which the robot goes on aside as it did once it is let go, s.
         farthest_aside: distance from the middle of the lane from which it brings the robot back, m, as long
-            as what the next obstacle asks for is farther away than `recentring_room`, m.
+            as what the next obstacle asks for is farther away than `recentering_room`, m.
     """
 
     duck_distance: float = 0.95
@@ -44,7 +44,7 @@ class CourseOperatorSettings:
     end_sidestep: float = 0.15
     glide: float = 0.7
     farthest_aside: float = 1.2
-    recentring_room: float = 0.6
+    recentering_room: float = 0.6
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class CourseOperator:
         far = abs(y) > settings.farthest_aside or self._steps_aside
         if obstacle is None:
             return DEFAULT
-        if far and distance > self._action_distance(obstacle.kind) + settings.recentring_room:
+        if far and distance > self._action_distance(obstacle.kind) + settings.recentering_room:
             return self._go_aside(-y)
         match obstacle.kind:
             case "gate":

@@ -84,7 +84,7 @@ class CourseExperimentResult:
     sessions: tuple[str, ...]
 
 
-def summarise_course_condition(
+def summarize_course_condition(
     condition: str, policy: str, runs: Sequence[CourseScore]
 ) -> CourseConditionSummary:
     """Return the figures of one condition."""
@@ -105,7 +105,7 @@ def summarise_course_condition(
     )
 
 
-def summarise_passages(passages: Sequence[ObstaclePassage]) -> tuple[PassageCount, ...]:
+def summarize_passages(passages: Sequence[ObstaclePassage]) -> tuple[PassageCount, ...]:
     """Count the attempts by condition and kind, in their order."""
     counts: dict[tuple[str, ObstacleKind], list[bool]] = {}
     for one in passages:

@@ -149,6 +149,6 @@ def read_statistics_content(content: bytes, limit: int) -> FoundContent:
 
 
 HOW_TO_CONVERT = (
-    "in the Python that trained it: v = VecNormalize.load(FILE, env); numpy.savez('normaliser.npz', "
+    "in the Python that trained it: v = VecNormalize.load(FILE, env); numpy.savez('normalizer.npz', "
     "mean=v.obs_rms.mean, var=v.obs_rms.var, clip_obs=v.clip_obs, epsilon=v.epsilon)"
 )

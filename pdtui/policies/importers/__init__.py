@@ -17,7 +17,7 @@ from pdtui.policies.importers.rllib import import_rllib
 from pdtui.policies.importers.rsl_rl import import_rsl_rl
 from pdtui.policies.importers.stable_baselines3 import OTHER_NETWORKS, import_sb3
 from pdtui.policies.weights.import_options import (
-    NO_NORMALISER,
+    NO_NORMALIZER,
     NO_OPTIONS,
     ImportOptions,
     ObservationActionSpaces,
@@ -30,7 +30,7 @@ def import_network(
     import_options: ImportOptions = NO_OPTIONS,
     spaces: ObservationActionSpaces | None = None,
     *,
-    normaliser: Path | None = None,
+    normalizer: Path | None = None,
 ) -> PolicyNetwork:
     """Return the multilayer perceptron in a file that another program wrote.
 
@@ -38,7 +38,7 @@ def import_network(
         found: The content of the file, from `pdtui.policies.foreign`.
         import_options: Answers to what the file leaves open.
         spaces: Spaces of the world in which the policy is to act; they give bounds that a file may lack.
-        normaliser: File with the statistics of the observation.
+        normalizer: File with the statistics of the observation.
 
     Raises:
         PolicyError: The file cannot be imported; the message says what was found, or which option is needed.
@@ -46,13 +46,13 @@ def import_network(
     source = found.source
     try:
         policy = _read_policy(found, import_options)
-        if normaliser is not None and import_options.normaliser != NO_NORMALISER:
-            statistics = read_observation_statistics(normaliser, policy.layers[0].shape[1])
+        if normalizer is not None and import_options.normalizer != NO_NORMALIZER:
+            statistics = read_observation_statistics(normalizer, policy.layers[0].shape[1])
             policy = replace(policy, statistics=statistics)
         return assemble_network(policy, import_options, spaces, source)
     except PolicyError as error:
         text = str(error)
-        named = text.startswith(source) or (normaliser is not None and text.startswith(str(normaliser)))
+        named = text.startswith(source) or (normalizer is not None and text.startswith(str(normalizer)))
         raise error if named else PolicyError(f"{source}: {text}") from error
 
 

@@ -125,8 +125,8 @@ def _network_tensors(found: PartialPolicy, network: PolicyNetwork, source: str) 
     if "log_std" in tensors and found.log_std is not None:
         tensors["log_std"] = found.log_std.reshape(-1).float()
     if found.statistics is not None:
-        tensors["normaliser.mean"] = found.statistics.mean.float()
-        tensors["normaliser.std"] = found.statistics.std.float()
+        tensors["normalizer.mean"] = found.statistics.mean.float()
+        tensors["normalizer.std"] = found.statistics.std.float()
         if bool((found.statistics.std <= 0).any()):
             what = "statistics of the observation"
             raise PolicyError(f"{source}: {what}: expected positive standard deviations")

@@ -37,9 +37,9 @@ class LinearLayer:
 
 @dataclass(frozen=True)
 class ObservationStatistics:
-    """Mean and standard deviation, shape (observations,), by which observations are normalised.
+    """Mean and standard deviation, shape (observations,), by which observations are normalized.
 
-    The magnitude of normalised observations is limited to `clip` unless that is 0.
+    The magnitude of normalized observations is limited to `clip` unless that is 0.
     """
 
     mean: torch.Tensor
@@ -62,7 +62,7 @@ class PartialPolicy:
         low, high: Bounds of the action; empty where the file does not state them.
         log_std: Log standard deviation, shape (actions,), where it is a parameter.
         log_std_low, log_std_high, log_std_rule, mean_limit: As in `NetworkSpec`.
-        statistics: Statistics of the observation, if the policy normalises it.
+        statistics: Statistics of the observation, if the policy normalizes it.
     """
 
     origin: str

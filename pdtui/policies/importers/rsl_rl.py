@@ -23,7 +23,7 @@ from pdtui.policies.importers.partial_policy import (
 _EPSILON = 1e-2
 _STDS = ("std", "distribution.std_param")
 _LOG_STDS = ("log_std", "distribution.log_std_param")
-_NORMALISERS = ("actor_obs_normalizer", "obs_normalizer", "obs_norm_state_dict")
+_NORMALIZERS = ("actor_obs_normalizer", "obs_normalizer", "obs_norm_state_dict")
 
 
 def import_rsl_rl(tensors: Tensors) -> PartialPolicy | None:
@@ -50,7 +50,7 @@ def _find_log_std(named: Tensors) -> torch.Tensor | None:
 
 
 def _observation_statistics(named: Tensors) -> ObservationStatistics | None:
-    for prefix in _NORMALISERS:
+    for prefix in _NORMALIZERS:
         mean, std = named.get(f"{prefix}._mean"), named.get(f"{prefix}._std")
         if mean is not None and std is not None:
             return ObservationStatistics(mean.reshape(-1), std.reshape(-1) + _EPSILON)

@@ -25,7 +25,7 @@ from pdtui.policies.importers.partial_policy import (
     read_linear_layer,
     to_single_precision,
 )
-from pdtui.policies.weights.import_options import NO_NORMALISER, ImportOptions
+from pdtui.policies.weights.import_options import NO_NORMALIZER, ImportOptions
 from pdtui.policies.weights.policy_network import ACTIVATIONS
 
 _ORIGIN = "Stable-Baselines3 "
@@ -42,19 +42,19 @@ def import_sb3(found: ForeignFile, import_options: ImportOptions) -> PartialPoli
     source, data = found.source, found.facts
     tensors = to_single_precision(found.tensors)
     _check_flat(tensors, data, source)
-    if _is_normalised(data) and not import_options.normaliser:
+    if _is_normalized(data) and not import_options.normalizer:
         raise PolicyError(
             f"{source}: trained behind VecNormalize, whose statistics are another file: give them with "
-            f"--normaliser FILE, or --normaliser {NO_NORMALISER} if it normalised rewards only"
+            f"--normalizer FILE, or --normalizer {NO_NORMALIZER} if it normalized rewards only"
         )
     return _ArchiveReader(source, data, tensors).read_policy()
 
 
-def _is_normalised(data: dict[str, Any]) -> bool:
+def _is_normalized(data: dict[str, Any]) -> bool:
     """Whether the model was trained behind VecNormalize, as far as the readable part of the file shows.
 
-    PPO and A2C keep an unnormalised observation only behind VecNormalize. The off-policy algorithms always
-    keep one; behind VecNormalize it is in double precision and the normalised one is not, so their texts
+    PPO and A2C keep an unnormalized observation only behind VecNormalize. The off-policy algorithms always
+    keep one; behind VecNormalize it is in double precision and the normalized one is not, so their texts
     differ in length. If the world observes in single precision, this cannot be detected.
     """
     own, seen = data.get("_last_original_obs"), data.get("_last_obs")

@@ -57,7 +57,7 @@ class Policy:
     paper). Layers count in the order in which the network calls them; the units of a layer of any shape count
     in C order. The units of a recurrent layer are its output h: the next layer reads the overwritten h, while
     the state that the recurrent layer is fed in the next step keeps the natural one. (A cell's h is
-    recognised in the returned state if it is there by itself, not stacked with others.)
+    recognized in the returned state if it is there by itself, not stacked with others.)
 
     A network with a hidden state is called ``module(observation, state) -> (output, state)``. The state is
     part of the run: call `reset` when the world is reset, and `restore` when it is restored.

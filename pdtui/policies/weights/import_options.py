@@ -10,7 +10,7 @@ from pdtui.core.errors import PolicyError
 
 ACTIVATION_NAMES = ("tanh", "relu", "elu", "gelu", "silu", "leaky_relu", "selu", "sigmoid", "softplus")
 SQUASH_NAMES = ("none", "tanh", "clip")
-NO_NORMALISER = "none"
+NO_NORMALIZER = "none"
 
 
 @dataclass(frozen=True)
@@ -21,13 +21,13 @@ class ImportOptions:
         activation: Activation function of the hidden layers, one of `ACTIVATION_NAMES`; empty for the file's.
         squash: How an output becomes an action, one of `SQUASH_NAMES`: ``none`` takes it as it is, ``tanh``
             squashes it into the bounds, ``clip`` clips it to them; empty for what the file says.
-        normaliser: File with the statistics of the observation; ``none`` for no normalisation; empty for the
+        normalizer: File with the statistics of the observation; ``none`` for no normalization; empty for the
             statistics in the weights file, if any.
     """
 
     activation: str = ""
     squash: str = ""
-    normaliser: str = ""
+    normalizer: str = ""
 
     def __post_init__(self) -> None:
         for what, value, names in (

@@ -90,7 +90,7 @@ def find_file_inside_folders(name: str, folders: Sequence[Path], source: str) ->
     if outside:
         raise PolicyError(
             f"{source}: names the file '{name}', which lies outside of its folder and of the working "
-            f"directory; name it on the command line (--policy, --normaliser), or its folder in "
+            f"directory; name it on the command line (--policy, --normalizer), or its folder in "
             f"{POLICY_FOLDERS_VARIABLE}"
         )
     return None

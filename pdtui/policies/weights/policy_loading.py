@@ -21,7 +21,7 @@ from pdtui.policies.runtime.action_decoders import (
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.torchscript import ForwardPassLimitError, build_torchscript
 from pdtui.policies.weights.import_options import (
-    NO_NORMALISER,
+    NO_NORMALIZER,
     NO_OPTIONS,
     ImportOptions,
     ObservationActionSpaces,
@@ -118,7 +118,7 @@ def load_any_network(
         return network, hash_file(path)
     digest = found.sha256
     statistics = _find_statistics(path, import_options, folders)
-    network = import_network(found, import_options, spaces, normaliser=statistics)
+    network = import_network(found, import_options, spaces, normalizer=statistics)
     if import_options != NO_OPTIONS:
         statistics_digest = hash_file(statistics) if statistics else ""
         parts = (digest, import_options.activation, import_options.squash, statistics_digest)
@@ -132,7 +132,7 @@ def _check_agreement(path: Path, spec: NetworkSpec, import_options: ImportOption
     for what, stated, chosen in (
         ("activation", spec.activation, import_options.activation),
         ("squash", squash, import_options.squash),
-        ("normaliser", NO_NORMALISER, import_options.normaliser),
+        ("normalizer", NO_NORMALIZER, import_options.normalizer),
     ):
         if chosen and chosen != stated:
             raise PolicyError(f"{path}: its {what} is '{stated}' and cannot be chosen, found '{chosen}'")
@@ -140,8 +140,8 @@ def _check_agreement(path: Path, spec: NetworkSpec, import_options: ImportOption
 
 def _find_statistics(path: Path, import_options: ImportOptions, folders: Sequence[Path]) -> Path | None:
     """Return the statistics file that the options name, in a folder or beside the weights."""
-    name = import_options.normaliser
-    if not name or name == NO_NORMALISER:
+    name = import_options.normalizer
+    if not name or name == NO_NORMALIZER:
         return None
     found = find_file_beside(name, (*folders, path.parent)) or find_file_beside(
         str(path.parent / Path(name).name), ()

@@ -50,7 +50,7 @@ class NetworkSpec:
         log_std_low, log_std_high: Range of the log standard deviation.
         log_std_rule: How it is brought into the range: by clipping or by tanh.
         mean_limit: Limit of the magnitude of the mean before tanh; 0 for none.
-        observation_clip: Limit of the magnitude of normalised observations; 0 for none.
+        observation_clip: Limit of the magnitude of normalized observations; 0 for none.
     """
 
     robot: str
@@ -112,7 +112,7 @@ class NetworkSpec:
         return 1 if self.head == "categorical" else self.actions
 
 
-class Normaliser(nn.Module):
+class Normalizer(nn.Module):
     """Computes ``(observation − mean) / std``, clipped to ± `clip` unless that is 0."""
 
     mean: torch.Tensor
@@ -130,9 +130,9 @@ class Normaliser(nn.Module):
 
 
 class PolicyNetwork(nn.Module):
-    """The network: observation → normaliser → (linear → activation) × L → head.
+    """The network: observation → normalizer → (linear → activation) × L → head.
 
-    The normaliser is skipped unless the weights contain one. `log_std`, shape (actions,), exists where the
+    The normalizer is skipped unless the weights contain one. `log_std`, shape (actions,), exists where the
     specification says that it is a parameter.
     """
 
@@ -141,7 +141,7 @@ class PolicyNetwork(nn.Module):
     def __init__(self, spec: NetworkSpec) -> None:
         super().__init__()
         self.spec = spec
-        self.normaliser = Normaliser(spec.observations, spec.observation_clip)
+        self.normalizer = Normalizer(spec.observations, spec.observation_clip)
         widths = [spec.observations, *spec.layers]
         self.hidden = nn.ModuleList(nn.Linear(a, b) for a, b in pairwise(widths))
         self.activations = nn.ModuleList(ACTIVATIONS[spec.activation]() for _ in spec.layers)
@@ -149,7 +149,7 @@ class PolicyNetwork(nn.Module):
         self.head = nn.Linear(widths[-1], spec.actions * (2 if wide else 1))
         if spec.gaussian and spec.log_std == "parameter":
             self.register_buffer("log_std", torch.zeros(spec.actions))
-        self.normalises = False
+        self.normalizes = False
 
     def load_tensors(self, tensors: dict[str, torch.Tensor]) -> None:
         """Load weights by name.
@@ -161,14 +161,14 @@ class PolicyNetwork(nn.Module):
             if not bool(torch.isfinite(tensor).all()):
                 raise PolicyError(f"tensor '{name}': expected finite numbers, found NaN or infinity")
         self.load_state_dict(tensors)
-        mean, std = self.normaliser.mean, self.normaliser.std
+        mean, std = self.normalizer.mean, self.normalizer.std
         moved = bool((mean != 0).any() or (std != 1).any())
-        self.normalises = moved or self.normaliser.clip > 0
+        self.normalizes = moved or self.normalizer.clip > 0
 
     def stages(self) -> list[nn.Module]:
         """Return the submodules in the order in which `forward` calls them."""
         pairs = zip(self.hidden, self.activations, strict=True)
-        first: list[nn.Module] = [self.normaliser] if self.normalises else []
+        first: list[nn.Module] = [self.normalizer] if self.normalizes else []
         return [*first, *(stage for pair in pairs for stage in pair), self.head]
 
     def forward(self, observation: torch.Tensor) -> torch.Tensor:

@@ -20,7 +20,11 @@ from pdtui.policies.weights.policy_file_lookup import find_file_beside, find_pac
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork, check_tensor_shapes
 
 WEIGHTS = Path(__file__).parent / "shipped"
+CHECKPOINT_FOLDER = "checkpoints"
+"""Folder of the policies that a training run keeps on request, each named by its control steps."""
 _KEY = "pdtui"
+_NORMALIZER, _NORMALIZER_IN_FILES = "normalizer.", "normaliser."
+"""How the names of its tensors begin; files have kept the spelling with which the format began."""
 _MAX_HEADER = 1 << 20
 """Bytes of a file's header, which is read at once; that of a network of 100 layers has 20,000."""
 
@@ -67,7 +71,10 @@ def hash_file(path: Path) -> str:
 
 def save_network(path: Path, network: PolicyNetwork) -> None:
     """Write weights as float32 and their metadata; `PolicyError` if the file cannot be written."""
-    tensors = {name: tensor.detach().float().contiguous() for name, tensor in network.state_dict().items()}
+    tensors = {
+        name.replace(_NORMALIZER, _NORMALIZER_IN_FILES): tensor.detach().float().contiguous()
+        for name, tensor in network.state_dict().items()
+    }
     payload = save(tensors, metadata={_KEY: json.dumps(asdict(network.spec), sort_keys=True)})
     write_file(path, payload, PolicyError)
 
@@ -90,6 +97,7 @@ def load_network(path: Path) -> PolicyNetwork:
         spec.check_values()
         with torch.device("meta"):
             expected = PolicyNetwork(spec).state_dict()
+        tensors = {name.replace(_NORMALIZER_IN_FILES, _NORMALIZER): one for name, one in tensors.items()}
         check_tensor_shapes(expected, tensors)
         network = PolicyNetwork(spec)
         network.load_tensors(tensors)

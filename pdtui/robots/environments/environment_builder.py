@@ -64,5 +64,5 @@ def _describe_several(world: object) -> str:
         return "is a world of PettingZoo, or one like them"
     worlds = getattr(world, "num_envs", 1)
     if (isinstance(worlds, int) and worlds != 1) or isinstance(world, gymnasium.vector.VectorEnv):
-        return f"is vectorised: it runs {worlds} worlds at once"
+        return f"is vectorized: it runs {worlds} worlds at once"
     return ""

@@ -57,7 +57,7 @@ def resolve_environment_id(name: str, robots: Sequence[str]) -> str:
     if environment in gymnasium.registry:
         spec = gymnasium.registry[environment]
         if spec.entry_point is None and spec.vector_entry_point is not None:
-            raise RobotError(f"environment '{name}' is registered as vectorised only; {SINGLE_AGENT_ONLY}")
+            raise RobotError(f"environment '{name}' is registered as vectorized only; {SINGLE_AGENT_ONLY}")
         return environment
     if _PETTINGZOO_NAME.fullmatch(environment):
         raise RobotError(

@@ -21,7 +21,7 @@ _MIN_GAP = 0.9  # between two trunks, m: wide enough for the robot
 _FIRST_TREE = 2.5  # distance of the first tree from the start, m
 _TRIES_PER_TREE = 30
 _MAX_ROUGHNESS = 1.0  # m
-_MAX_DENSITY = 1.0  # trees per square metre, more than find room
+_MAX_DENSITY = 1.0  # trees per square meter, more than find room
 
 
 @dataclass(frozen=True)
@@ -102,13 +102,13 @@ def scatter_trees(rng: np.random.Generator, density: float) -> Floats:
 
     Args:
         rng: The random generator.
-        density: Trees per square metre, as far as there is room.
+        density: Trees per square meter, as far as there is room.
 
     Returns:
         x, y and radius of each, m, shape (N, 3), sorted by x.
 
     Raises:
-        RobotError: The density is not from 0 to 1 tree per square metre.
+        RobotError: The density is not from 0 to 1 tree per square meter.
     """
     if not 0.0 <= density <= _MAX_DENSITY:
         raise RobotError(f"expected a density of 0 to {_MAX_DENSITY:g} trees per m², found {density:g}")

@@ -25,7 +25,7 @@ def read_constructor_options(build: Callable[..., Any], *, of_bases: bool = True
     """
     found: dict[str, RobotOption] = {}
     descriptions: dict[str, str] = {}
-    for documented, function in _walk_initialisers(build, of_bases=of_bases):
+    for documented, function in _walk_initializers(build, of_bases=of_bases):
         descriptions = {**_read_descriptions(documented), **descriptions}
         for parameter, annotation in _annotated_parameters(function):
             option = _as_option(parameter, annotation)
@@ -47,7 +47,7 @@ def option_of_default(name: str, default: object) -> RobotOption | None:
     return RobotOption(name, (int, float) if type(default) is int else (type(default),), default=default)
 
 
-def _walk_initialisers(
+def _walk_initializers(
     build: Callable[..., Any], *, of_bases: bool
 ) -> Iterator[tuple[object, Callable[..., Any]]]:
     """Yield what is documented and what is called: a class, then those of its bases that are called, too."""
@@ -55,11 +55,11 @@ def _walk_initialisers(
         yield build, build
         return
     for kind in build.__mro__:
-        initialiser = vars(kind).get("__init__")
-        if not inspect.isfunction(initialiser):
+        initializer = vars(kind).get("__init__")
+        if not inspect.isfunction(initializer):
             continue
-        yield kind, initialiser
-        kinds = [one.kind for one in inspect.signature(initialiser).parameters.values()]
+        yield kind, initializer
+        kinds = [one.kind for one in inspect.signature(initializer).parameters.values()]
         if not of_bases or inspect.Parameter.VAR_KEYWORD not in kinds:
             return
 

@@ -45,5 +45,5 @@ def blocks_without_ramps() -> Any:
     shares = PGBlockDistConfig.BLOCK_TYPE_DISTRIBUTION_V2
     kept = {name: 0.0 if "Ramp" in name else share for name, share in shares.items()}
     total = sum(kept.values())
-    normalised = {name: share / total for name, share in kept.items()}
-    return type("BlocksWithoutRamps", (PGBlockDistConfig,), {"BLOCK_TYPE_DISTRIBUTION_V2": normalised})
+    normalized = {name: share / total for name, share in kept.items()}
+    return type("BlocksWithoutRamps", (PGBlockDistConfig,), {"BLOCK_TYPE_DISTRIBUTION_V2": normalized})

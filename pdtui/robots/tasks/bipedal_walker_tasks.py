@@ -35,7 +35,7 @@ def _count_airborne(trace: TaskRunTrace) -> int:
 
 
 def judge_jump(trace: TaskRunTrace) -> TaskVerdict:
-    """Judge whether both feet leave the ground, the hull rises by half a metre, and the robot walks on."""
+    """Judge whether both feet leave the ground, the hull rises by half a meter, and the robot walks on."""
     rise = float(trace["height"].max()) - trace.mean_before("height", _USUAL_STEPS)
     airborne = _count_airborne(trace)
     walks, speed = _walks(trace, trace.mean_before("vx", _USUAL_STEPS), _JUMP_STEPS)
@@ -77,7 +77,7 @@ def judge_stand_up(trace: TaskRunTrace) -> TaskVerdict:
 BIPEDAL_WALKER_TASKS = (
     Task(
         name="jump",
-        key="j",
+        key="i",
         says="jumps, lands and walks on",
         wanted="both feet up for 0.3 s, hull 0.5 m over its usual height, then walks on",
         walk=(60, 120),

@@ -74,7 +74,7 @@ def compare_sessions(a: SessionHeader, b: SessionHeader) -> SessionComparison:
         steps,
         (a.steps, b.steps),
         None if first is None else first.step,
-        counter.summarise(),
+        counter.summarize(),
         _describe_first_event(a.events, b.events, end),
         _list_circumstances(a, b),
         first,

@@ -162,7 +162,7 @@ def _takeover_columns(block: StepBlock, _: SessionHeader) -> Columns:
 
 
 def _pose_columns(block: StepBlock, header: SessionHeader) -> Columns:
-    """Return one row per drawn step and link: the centre and the orientation of its shape in the world."""
+    """Return one row per drawn step and link: the center and the orientation of its shape in the world."""
     count, links = len(block.pose_steps), header.info.links
     rounded, boxes = round_links(links), box_links(links)
     parts = []
@@ -183,7 +183,7 @@ def _pose_columns(block: StepBlock, header: SessionHeader) -> Columns:
         "link": _texts(names, "link of the robot"),
     }
     for column, name in enumerate(("x", "y", "z", "qw", "qx", "qy", "qz")):
-        unit, says = ("m", "centre of its shape") if column < 3 else ("", "orientation, a unit quaternion")
+        unit, says = ("m", "center of its shape") if column < 3 else ("", "orientation, a unit quaternion")
         columns[name] = ExportColumn(poses[:, column].astype(np.float32), unit, says)
     return columns
 

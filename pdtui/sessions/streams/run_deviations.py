@@ -110,7 +110,7 @@ class RunDeviationCounter:
                 return row
         return self._rows
 
-    def summarise(self) -> tuple[AttributeDeviation, ...]:
+    def summarize(self) -> tuple[AttributeDeviation, ...]:
         """Return the attributes that deviate, ordered from worst to best by spreads in the first step."""
         if not self._rows:
             return ()

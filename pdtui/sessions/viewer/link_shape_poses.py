@@ -38,7 +38,7 @@ def place_link_shapes(links: Sequence[Link], poses: Floats) -> dict[str, NDArray
     found: dict[str, Floats] = {}
     if rounded := round_links(links):
         placed = compute_link_poses(rounded, poses)
-        # The viewer's capsule starts at its translation and extends along z; ours is centred.
+        # The viewer's capsule starts at its translation and extends along z; ours is centered.
         found["Capsules3D:translations"] = capsule_ends(rounded, placed)[..., 0, :]
         found["Capsules3D:quaternions"] = placed[..., [4, 5, 6, 3]]
     if boxes := box_links(links):

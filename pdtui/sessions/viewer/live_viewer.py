@@ -25,7 +25,7 @@ class LiveViewer:
     Args:
         address: address of a viewer that listens.
         info: the drive.
-        application, recording_id: identifiers of the session, by which the viewer recognises its file.
+        application, recording_id: identifiers of the session, by which the viewer recognizes its file.
     """
 
     def __init__(self, address: ViewerAddress, info: DriveInfo, application: str, recording_id: str) -> None:

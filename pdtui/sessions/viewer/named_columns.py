@@ -10,14 +10,15 @@ from pdtui.core.step_record import StepRecord
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_schema import TABLE
 from pdtui.sessions.viewer.viewer_curves import SendRows
-from pdtui.sessions.writer.arrow_columns import ComponentColumn, number_list_column, stack_rows
+from pdtui.sessions.writer.arrow_columns import ComponentColumn, number_list_column, stack_rows, text_column
 
 
 class NamedColumnWriter:
-    """Writes attributes, reward, cost and action of each step, each in a column of its own, as float32.
+    """Writes attributes, reward, cost, action, episode and latched behaviors of each step, each in a column.
 
-    The drive itself has them in lists, where the view would number them: a column of its own takes a hundred
-    bytes per batch, which only the large batches of the viewer's data can afford.
+    Numbers are float32 there. The drive itself has them in lists, where the view would number them: a column
+    of its own takes a hundred bytes per batch, which only the large batches of the viewer's data can afford.
+    Activations stay in their list, as hundreds of columns could not be read.
     """
 
     def __init__(self, info: DriveInfo, send: SendRows) -> None:
@@ -40,6 +41,10 @@ class NamedColumnWriter:
             columns.append(number_list_column(name, values))
         actions = stack_rows([record.action for record in self._pending]).astype(np.float32)
         columns += _name_columns([f"action {number}" for number in range(actions.shape[1])], actions)
+        episodes = np.array([record.episode for record in self._pending], np.int64)
+        columns.append(number_list_column("episode", episodes))
+        latched = (", ".join(one.name for one in record.behaviors) for record in self._pending)
+        columns.append(text_column("behaviors", list(latched)))
         self._send(TABLE, [record.step for record in self._pending], columns)
         self._pending = []
 

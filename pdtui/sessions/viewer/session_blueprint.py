@@ -195,7 +195,7 @@ def _lay_out_measurements(info: DriveInfo, content: BlueprintContent) -> rrb.Ver
 
 
 def _plot_title(attributes: Sequence[Attribute]) -> str:
-    """Return a title of names and unit; many names that end in the same word are summarised by it."""
+    """Return a title of names and unit; many names that end in the same word are summarized by it."""
     names = [attribute.name for attribute in attributes]
     if len(names) > 4:
         last = {name.split()[-1] if name.split() else name for name in names}

@@ -91,7 +91,7 @@ class MessagePipe:
             raise self._error
 
     def _pass_on(self) -> None:
-        synchronised = time.monotonic()
+        synchronized = time.monotonic()
         while True:
             select.select([self._reading], [], [])
             with self._lock:
@@ -99,10 +99,10 @@ class MessagePipe:
             if self._ended:
                 return
             now = time.monotonic()
-            if now - synchronised >= _SYNC_SECONDS and self._error is None:
-                synchronised = now
+            if now - synchronized >= _SYNC_SECONDS and self._error is None:
+                synchronized = now
                 try:
-                    self.file.synchronise()
+                    self.file.synchronize()
                 except OSError as error:
                     self._error = error
 

@@ -51,7 +51,7 @@ class SessionFile:
         self._replaced: BinaryIO | None = None
         self._descriptor = -1
         self._waiting = bytearray()
-        self._unsynchronised = False
+        self._unsynchronized = False
         self.size = 0
         self.created = False
         if os.path.lexists(path):
@@ -70,7 +70,7 @@ class SessionFile:
         waiting, self._waiting = bytes(self._waiting), bytearray()
         self.size = 0
         self.write(waiting)
-        self._synchronise_folder()
+        self._synchronize_folder()
 
     def write(self, data: bytes) -> None:
         """Write whole messages; after a failure, which is an `OSError`, the file ends with those before."""
@@ -88,14 +88,14 @@ class SessionFile:
                 os.lseek(self._descriptor, self.size, os.SEEK_SET)
             raise
         self.size += len(data)
-        self._unsynchronised = True
+        self._unsynchronized = True
         if self._sync == "full":
-            self.synchronise()
+            self.synchronize()
 
-    def synchronise(self) -> None:
+    def synchronize(self) -> None:
         """Force what was written to the disk, unless the mode is ``off``."""
-        if self._unsynchronised and self._sync != "off" and self._descriptor >= 0:
-            self._unsynchronised = False
+        if self._unsynchronized and self._sync != "off" and self._descriptor >= 0:
+            self._unsynchronized = False
             os.fdatasync(self._descriptor)
 
     def follow_renamed_file(self) -> str:
@@ -128,12 +128,12 @@ class SessionFile:
     def _finish(self, replaced: Path | None) -> None:
         if self._descriptor < 0:
             return
-        self._unsynchronised = True
-        self.synchronise()
+        self._unsynchronized = True
+        self.synchronize()
         if replaced is not None:
             self.path.replace(replaced)
             self.path = replaced
-            self._synchronise_folder()
+            self._synchronize_folder()
         os.close(self._descriptor)
         self._descriptor = -1
 
@@ -148,9 +148,9 @@ class SessionFile:
             place += len(block)
         os.close(self._descriptor)
         self._descriptor, self.path = copy, path
-        self._synchronise_folder()
+        self._synchronize_folder()
 
-    def _synchronise_folder(self) -> None:
+    def _synchronize_folder(self) -> None:
         """Force the name of the file to the disk."""
         if self._sync != "off":
             folder = os.open(self.path.parent, os.O_RDONLY | os.O_DIRECTORY)

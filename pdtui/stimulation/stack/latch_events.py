@@ -34,7 +34,7 @@ def apply_latch_event(latch: BehaviorLatch, event: DriveEvent, attributes: Float
             latch.controller_of(event.name).set_target(event.value)
         case "factor":
             latch.set_factor(event.name, event.value)
-        case "kp" | "ki" | "kd":
+        case "kp" | "ki" | "kd" | "limit":
             latch.controller_of(event.name).set_gain(event.kind, event.value)
         case "unit":
             latch.held.hold(event.name, event.value)

@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 
 class PidTuning(NamedTuple):
-    """The gains of a controller as they are now."""
+    """The gains of a controller as they are now, and the limit of the magnitude c."""
 
     kp: float
     ki: float
     kd: float
+    limit: float
 
 
 class StackEntry(NamedTuple):

@@ -44,8 +44,9 @@ def list_palette_commands(app: DriveApp) -> Iterator[PaletteCommand]:
         )
     yield PaletteCommand("screenshot", "writes the screen as an SVG file", app.action_save_screen)
     for name, theme in list_themes().items():
-        says = f"{'dark' if theme.dark else 'light'}; `pdtui config` says how to keep it"
+        says = "dark, for this drive" if theme.dark else "light, for this drive"
         yield PaletteCommand(f"theme {name}", says, partial(setattr, app, "theme", name))
+    yield PaletteCommand("save theme", f"keeps {app.theme} as the setting", app.save_theme)
 
 
 class PaletteProvider(Provider):

@@ -55,6 +55,15 @@ class SpectraPane(SnapshotWidget):
         if old is not None and facts is not None and old.branches != facts.branches:
             self._connection.choose_spectra(self._choice)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether the pane is shown."""
+        return self._choice is not None
+
+    def leave(self) -> None:
+        """Close the pane."""
+        self._choose(None)
+
     def handle_request(self, request: str) -> None:
         """Open or close the pane, or go to the next attribute, or to the next of the ranked units."""
         count = 0 if self.facts is None else len(self.facts.attributes)

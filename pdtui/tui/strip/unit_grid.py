@@ -45,7 +45,7 @@ class UnitGrid:
     """The places of a layer's units, which run down, then right, on `rows` × `columns` pixels.
 
     Fewer units than pixels are drawn wider, so that a layer always fills its rows; if there are more units
-    than pixels, neighbours share one.
+    than pixels, neighbors share one.
     """
 
     units: int

@@ -1,4 +1,4 @@
-"""Colours that can be read on a background, whatever the theme."""
+"""Colors that can be read on a background, whatever the theme."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ _STEPS = 20
 
 
 def contrast_ratio(one: Color, other: Color) -> float:
-    """Return the contrast of two colours, from 1 to 21, as the same guidelines define it."""
+    """Return the contrast of two colors, from 1 to 21, as the same guidelines define it."""
     dark, light = sorted((_luminance(one), _luminance(other)))
     return (light + 0.05) / (dark + 0.05)
 
 
 def make_legible(color: Color, background: Color, contrast: float = TEXT_CONTRAST) -> Color:
-    """Return the colour, made lighter on a dark background and darker on a light one as far as needed."""
+    """Return the color, made lighter on a dark background and darker on a light one as far as needed."""
     end = Color(255, 255, 255) if _luminance(background) < 0.18 else Color(0, 0, 0)
     for step in range(_STEPS):
         mended = color.blend(end, step / _STEPS)

@@ -22,7 +22,7 @@ Result = TypeVar("Result")
 def list_themes() -> dict[str, Theme]:
     """Return pdtui's own theme and those of Textual, by their names.
 
-    Those whose colours are the terminal's own are left out: nothing can be drawn between two colours that
+    Those whose colors are the terminal's own are left out: nothing can be drawn between two colors that
     are not known.
     """
     return {THEME.name: THEME, **{name: theme for name, theme in BUILTIN_THEMES.items() if not theme.ansi}}
@@ -61,5 +61,5 @@ class ThemedApp(App[Result]):
         return super().pop_screen() if len(self.screen_stack) > 1 else AwaitComplete()
 
     def watch_theme(self, name: str) -> None:
-        """Paint with the colours of a theme that was chosen while the application runs."""
+        """Paint with the colors of a theme that was chosen while the application runs."""
         STYLES.adopt(list_themes()[name])

@@ -93,6 +93,16 @@ class TimelineBar(SnapshotWidget):
         length = 0 if self.facts is None else self.facts.length
         return max(self.present, length)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether a drive is shown as it was, and not as it is."""
+        watching = self.facts is not None and self.facts.length > 0
+        return not watching and self.snapshot is not None and self.snapshot.past is not None
+
+    def leave(self) -> None:
+        """Return to the present."""
+        self.seek(self.last)
+
     def seek(self, moment: int) -> None:
         """Ask for a moment, which the bar shows at once."""
         wanted = min(max(moment, 1), max(self.last, 1))

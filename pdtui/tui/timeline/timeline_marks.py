@@ -21,7 +21,7 @@ class TimelineMark(NamedTuple):
     Attributes:
         moment: number of control steps that had been done when it happened.
         sign: the character.
-        style: its colour.
+        style: its color.
         rank: the mark with the highest is shown where several are in a cell.
     """
 

@@ -11,6 +11,7 @@ from textual.binding import Binding
 from textual.strip import Strip
 
 from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchRequest
+from pdtui.search.gain_tuning_process import GainTuningState
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import ScreenRow, format_signed
 from pdtui.tui.snapshot_widget import SnapshotWidget
@@ -21,10 +22,29 @@ from pdtui.tui.unit_bench.ghost_differences import GhostDifferences
 _BIG = 5  # presses that a press with shift counts for
 
 
+class GainTuner(Protocol):
+    """Tunes the gains of a behavior beside the drive."""
+
+    @property
+    def state(self) -> GainTuningState | None:
+        """How the present tuning stands; None before the first."""
+
+    def tune(self, behavior: str) -> str:
+        """Begin to tune a behavior, unless a tuning is under way; return a notice for the user."""
+
+
 class BenchServices(Protocol):
-    """What the pages need of the bench."""
+    """What the pages need of the bench.
+
+    Attributes:
+        differences: by how much the drive differs from its ghost.
+        target: the map with what was saved into it during the drive.
+        tuning: tunes gains; None where nothing can.
+    """
 
     differences: GhostDifferences
+    target: StimulationMap
+    tuning: GainTuner | None
 
     def send(self, edit: str) -> None:
         """Send an edit to the drive."""
@@ -109,6 +129,10 @@ class BenchPage(SnapshotWidget, can_focus=True):
 
     def type_value(self, begun: str) -> None:
         """Let the user type the value of the marked row, which is begun with a text."""
+
+    def save(self) -> bool:
+        """Save what the page edits into the map, and return whether it edits anything of its own."""
+        return False
 
     def row_was_marked(self) -> None:
         """Do what follows from another row having been marked."""

@@ -19,7 +19,7 @@ from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchRequest
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.unit_bench.bench_entry import Answer, BenchEntry
-from pdtui.tui.unit_bench.bench_page import BenchPage
+from pdtui.tui.unit_bench.bench_page import BenchPage, GainTuner
 from pdtui.tui.unit_bench.bench_saving import (
     build_bench_behavior,
     check_behavior_key,
@@ -46,13 +46,13 @@ class BenchPane(Vertical):
         send: sends an edit to the drive.
         find_units: begins a search for units.
         say: shows a notice.
+        tuning: tunes gains; None where nothing can.
     """
 
     BINDINGS: ClassVar = [
-        Binding("escape", "close", "closes the bench", id="bench_close"),
         Binding("tab", "turn(1)", "the next page", id="bench_next"),
         Binding("shift+tab", "turn(-1)", "the page before", id="bench_previous"),
-        Binding("ctrl+s", "save", "saves the held units as a behavior of the map", id="bench_save"),
+        Binding("ctrl+s", "save", "saves the held units, or gains, into the map", id="bench_save"),
     ]
     facts: reactive[DriveFacts | None] = reactive(None, init=False, repaint=False, always_update=True)
     snapshot: reactive[DriveSnapshot | None] = reactive(None, init=False, repaint=False, always_update=True)
@@ -63,20 +63,18 @@ class BenchPane(Vertical):
         send: Callable[[str], None],
         find_units: Callable[[UnitSearchRequest], None],
         say: Callable[[str], None],
+        tuning: GainTuner | None = None,
     ) -> None:
         super().__init__(id="bench", disabled=True)  # so that none of it gets the keys while it is closed
-        self.map = self._target = stimulation_map
-        self.send, self.find_units, self.say = send, find_units, say
+        self.map = self.target = stimulation_map
+        self.send, self.find_units, self.say, self.tuning = send, find_units, say, tuning
         self.differences = GhostDifferences()
         self.pages = [page(stimulation_map, self, id=f"bench-{page.TAB}") for page in _PAGES]
         self._page = 0
         self._entry = BenchEntry(say, self._focus_page)
         self._saved_keys: dict[str, tuple[str, ...]] = {}
-
-    @property
-    def is_open(self) -> bool:
+        self.is_open = False
         """Whether the pane is shown."""
-        return bool(self.screen.has_class("-bench"))
 
     def compose(self) -> ComposeResult:
         for page in self.pages:
@@ -94,7 +92,7 @@ class BenchPane(Vertical):
         """Open or close the pane, or show other layers of the strip."""
         if request == "toggle":
             if self.is_open:
-                self.action_close()
+                self.leave()
             else:
                 self.open()
         elif not self._walk_layers(1 if request == "next layer" else -1):
@@ -103,18 +101,18 @@ class BenchPane(Vertical):
 
     def open(self) -> None:
         """Show the pane and give it the keys."""
-        self.disabled = False
+        self.disabled, self.is_open = False, True
         self.screen.add_class("-bench")
         self._focus_page()
         self.pages[self._page].row_was_marked()
 
-    def action_close(self) -> None:
-        """Leave the entry, or close the pane."""
+    def leave(self) -> None:
+        """Close the pane."""
         if self._entry.display:
             self._entry.action_leave()
         self.screen.remove_class("-bench")
         self.screen.set_focus(None)
-        self.disabled = True
+        self.disabled, self.is_open = True, False
         self.point_to(-1)
 
     def action_turn(self, direction: int) -> None:
@@ -166,14 +164,16 @@ class BenchPane(Vertical):
         self._entry.ask_number(what, before, take)
 
     def action_save(self) -> None:
-        """Ask for a name and a key, and save the units that are held as a behavior of the map."""
+        """Save what the page edits, or ask for a name and a key for a behavior that holds the units."""
+        if self.pages[self._page].save():
+            return
         held = self._held()
         if not held:
             self.say("no unit is held that could be saved")
             return
 
         def ask_key(name: str) -> str:
-            if wrong := check_behavior_name(self._target, name):
+            if wrong := check_behavior_name(self.target, name):
                 return wrong
             self.ask(f"key of '{name}'", "", lambda key: self._save(name, key, held))
             return ""
@@ -181,17 +181,17 @@ class BenchPane(Vertical):
         self.ask("name of a behavior for the held units", "", ask_key)
 
     def _save(self, name: str, key: str, held: Mapping[int, float]) -> str:
-        if wrong := check_behavior_key(self._target, key):
+        if wrong := check_behavior_key(self.target, key):
             return wrong
         assert self.facts is not None
         measured = describe_measurement(self.facts, self.differences)
         behavior = build_bench_behavior(name, key, held, self.facts.layers, measured.aim)
         try:
-            path = save_behavior(self._target, self.facts, behavior, measured.comments)
+            path = save_behavior(self.target, self.facts, behavior, measured.comments)
         except PdtuiError as error:
             return str(error)
-        behaviors = {**self._target.behaviors, name: behavior}
-        self._target = replace(self._target, source=str(path), behaviors=behaviors)
+        behaviors = {**self.target.behaviors, name: behavior}
+        self.target = replace(self.target, source=str(path), behaviors=behaviors)
         self._saved_keys[key] = tuple(
             write_edit("unit", format_unit(unit, self.facts.layers), value) for unit, value in held.items()
         )
@@ -204,7 +204,7 @@ class BenchPane(Vertical):
         return page.units.held()
 
     def _focus_page(self) -> None:
-        self.pages[self._page].focus()
+        self.screen.set_focus(self.pages[self._page])  # at once, as further keys may be on their way
 
     def _show_page(self) -> None:
         for number, page in enumerate(self.pages):

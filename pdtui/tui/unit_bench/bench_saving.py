@@ -1,9 +1,9 @@
-"""Saves what the bench holds as a behavior of the map."""
+"""Saves what the bench holds as a behavior of the map, and the gains of controllers."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,8 +14,8 @@ from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.core.units import describe_units, format_unit
 from pdtui.driving.drive_snapshot import DriveFacts
 from pdtui.stimulation.map_library import user_map_path
-from pdtui.stimulation.map_writer import add_behavior, compose_map, rewrite_map
-from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
+from pdtui.stimulation.map_writer import add_behavior, add_seeds, compose_map, replace_gains, rewrite_map
+from pdtui.stimulation.stimulation_map import Behavior, PidGains, StimulationMap
 from pdtui.tui.cell_text import format_signed
 from pdtui.tui.unit_bench.ghost_differences import GhostDifferences
 
@@ -91,18 +91,43 @@ def save_behavior(
     Raises:
         MapError: The map cannot be changed, or the file cannot be written.
     """
+
+    def add(text: str, source: str) -> str:
+        return add_behavior(text, behavior, source, comments)
+
+    return _change_map(stimulation_map, facts, add)
+
+
+def save_gains(
+    stimulation_map: StimulationMap, facts: DriveFacts, name: str, pid: PidGains, seeds: range | None
+) -> Path:
+    """Write the gains and the limit of a behavior into the map of a drive, and return the file.
+
+    The same as `save_behavior` goes for the file. If there are `seeds`, the gains were chosen on them.
+    """
+
+    def change(text: str, source: str) -> str:
+        changed = replace_gains(text, {name: pid}, source)
+        return changed if seeds is None else add_seeds(changed, [seeds], source)
+
+    return _change_map(stimulation_map, facts, change)
+
+
+def _change_map(
+    stimulation_map: StimulationMap, facts: DriveFacts, change: Callable[[str, str], str]
+) -> Path:
     path = Path(stimulation_map.source)
     if path.is_file():
         output = user_map_path(path)
         output.parent.mkdir(parents=True, exist_ok=True)
         source = str(path)
-        rewrite_map(path, lambda text: add_behavior(text, behavior, source, comments), output)
+        rewrite_map(path, lambda text: change(text, source), output)
         return output
     output = Path("maps") / f"{stimulation_map.robot}-bench.toml"
     if output.exists():
-        raise MapError(f"{output}: already exists; drive with --map {output} to add behaviors to it")
+        raise MapError(f"{output}: already exists; drive with --map {output} to change it")
     named = replace(stimulation_map, policy_hash=facts.policy_hash, source=str(output))
     output.parent.mkdir(parents=True, exist_ok=True)
     text = compose_map(named, ("Written by the unit bench of `pdtui drive`.",))
-    write_file(output, add_behavior(text, behavior, str(output), comments), MapError)
+    write_file(output, change(text, str(output)), MapError)
     return output

@@ -101,7 +101,7 @@ class ActivationHeatmap(SnapshotWidget):
             self.border_title = title
 
     def _levels(self, values: NDArray[np.float32], rows: int, columns: int) -> NDArray[np.int64]:
-        """Return the colour numbers of a layer's pixels, −1 for none, shape (rows, columns)."""
+        """Return the color numbers of a layer's pixels, −1 for none, shape (rows, columns)."""
         strongest = UnitGrid(len(values), rows, columns).spread(np.nan_to_num(values))
         share = np.clip(strongest / self._scale, -1.0, 1.0)
         level = np.round(share * HEAT_LEVELS).astype(np.int64) + HEAT_LEVELS

@@ -212,7 +212,7 @@ class AttributeTable(SnapshotWidget):
         return sorted(sorted(range(len(self.facts.attributes)), key=rank)[:count])
 
     def _targets(self) -> _Targets:
-        """Return target and colour of each attribute that a controller holds, by its index."""
+        """Return target and color of each attribute that a controller holds, by its index."""
         assert self.facts is not None
         names = [attribute.name for attribute in self.facts.attributes]
         targets: _Targets = {}

@@ -18,7 +18,7 @@ _SYMBOLS = {"space": "␣", EDIT_KEY: "◆"}
 
 
 class KeyPressAxis:
-    """The latest key presses, as marks on a time axis, in the colours of their behaviors."""
+    """The latest key presses, as marks on a time axis, in the colors of their behaviors."""
 
     def __init__(self) -> None:
         self._presses: deque[KeyPress] = deque(maxlen=_KEPT)

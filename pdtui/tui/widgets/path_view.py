@@ -1,4 +1,4 @@
-"""The path from above, in the colours of the behaviors active along it, and the ghost's."""
+"""The path from above, in the colors of the behaviors active along it, and the ghost's."""
 
 from __future__ import annotations
 
@@ -91,8 +91,8 @@ class PathView(SnapshotWidget):
         middle, zoom = self._frame(canvas, np.concatenate([shown[:, :2], framed]))
 
         def place(world: Floats) -> Floats:
-            centre = np.array([canvas.width / 2, canvas.height / 2])
-            dots: Floats = centre + (world - middle) * np.array([zoom, -zoom])
+            center = np.array([canvas.width / 2, canvas.height / 2])
+            dots: Floats = center + (world - middle) * np.array([zoom, -zoom])
             return dots
 
         for part in ("past", "present") if seconds is not None else ("past",):

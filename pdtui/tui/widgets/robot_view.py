@@ -137,23 +137,23 @@ class RobotView(SnapshotWidget):
         """Return a camera far enough away for the widest stretch that the robot has shown so far."""
         assert self.facts is not None
         self._extent = max(self._extent, measure_stretch(self.facts.links, root, ends))
-        extent, centre = self._extent, (canvas.width / 2, canvas.height / 2)
+        extent, center = self._extent, (canvas.width / 2, canvas.height / 2)
         if self._shows_road:
             return frame_road(root, canvas.width, canvas.height)
         assert self.snapshot is not None
         if self.view == "above" and self._looks_ahead(self.snapshot):
             area = self._view_ahead.frame(root[:2], extent, canvas.width, canvas.height)
             x, y = area.middle.tolist()
-            return PerspectiveCamera((x, y, 0.0), 90.0, AHEAD / 2 * extent, area.zoom, centre)
+            return PerspectiveCamera((x, y, 0.0), 90.0, AHEAD / 2 * extent, area.zoom, center)
         if self.view == "above":
             zoom = min(canvas.width, canvas.height) / (2.5 * extent)
             middle = (float(root[0]), float(root[1]), 0.0)
-            return PerspectiveCamera(middle, 90.0, extent, zoom, centre)
+            return PerspectiveCamera(middle, 90.0, extent, zoom, center)
         reach, forward = (_REACH_AHEAD, _FORWARD) if self.snapshot.traffic.kinds else (_REACH, 0.0)
         zoom = min(canvas.width / (reach * extent), canvas.height / (1.5 * extent))
         middle = (float(root[0]) + forward * canvas.width / zoom, float(root[1]), 0.45 * extent)
-        centre = canvas.width / 2, canvas.height * 0.47
-        return PerspectiveCamera(middle, _SIDE_ELEVATION, extent, zoom, centre)
+        center = canvas.width / 2, canvas.height * 0.47
+        return PerspectiveCamera(middle, _SIDE_ELEVATION, extent, zoom, center)
 
     def _draw_ground(self, canvas: BrailleCanvas, camera: PerspectiveCamera, root: Floats) -> None:
         """Draw a grid fixed to the world, whose lines pass by as the robot moves."""

@@ -69,7 +69,7 @@ def draw_sparklines(means: Floats, scales: PlotScales) -> list[str]:
 def draw_line_plots(own: Floats, ghost: Floats, scales: PlotScales, styles: Sequence[Style]) -> list[Strip]:
     """Return two lines per column of means (2 × cells, J): the drive's line, the ghost's and that of zero.
 
-    The ghost's is dotted, since cells that both cross have the colour of the drive's.
+    The ghost's is dotted, since cells that both cross have the color of the drive's.
     """
     points, plots = own.shape
     canvas = BrailleCanvas(points // DOTS_X, plots * ROWS_PER_PLOT)

@@ -23,7 +23,7 @@ _NUMBER, _ADDRESS = 8, 8  # widths of the columns, in cells
 
 
 class UnitTable(SnapshotWidget):
-    """Shows one unit per line, in the colour of the behavior that overwrites it."""
+    """Shows one unit per line, in the color of the behavior that overwrites it."""
 
     BORDER_TITLE = "stimulated units"
 

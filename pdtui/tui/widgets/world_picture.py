@@ -17,7 +17,7 @@ from pdtui.tui.cell_text import ScreenRow
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 
-# Of each colour, four bits are kept, so that neighbours are often the same.
+# Of each color, four bits are kept, so that neighbors are often the same.
 _KEPT_BITS, _MIDDLE = np.uint8(0xF0), np.uint8(0x08)
 
 
@@ -70,7 +70,7 @@ def fit_picture(picture: NDArray[np.uint8], most_rows: int, most_columns: int) -
 
 
 def _line(upper: NDArray[np.uint8], lower: NDArray[np.uint8]) -> list[Segment]:
-    """Return half blocks for two rows of pixels (columns, 3), equal neighbours in one segment."""
+    """Return half blocks for two rows of pixels (columns, 3), equal neighbors in one segment."""
     changes = (upper[1:] != upper[:-1]).any(axis=1) | (lower[1:] != lower[:-1]).any(axis=1)
     cuts = [0, *(np.flatnonzero(changes) + 1).tolist(), len(upper)]
     tops, bottoms = upper.tolist(), lower.tolist()

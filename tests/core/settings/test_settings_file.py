@@ -55,8 +55,8 @@ def test_two_keys_can_be_swapped() -> None:
         ('theme = ""', "c: theme: expected a text"),
         ("theme = 3", "c: theme: expected a text"),
         (
-            "colour = 1",
-            "c: colour: no such setting; available: theme, fps, folders.sessions, folders.maps, keys",
+            "color = 1",
+            "c: color: no such setting; available: theme, fps, folders.sessions, folders.maps, keys",
         ),
         ("[folders]\nweights = 'w'", "c: folders.weights: no such setting"),
         ("folders = 'w'", "c: folders: no such setting"),

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from pdtui.core.units import Stimulation
 from pdtui.dissection.dissection_result import Dissection
-from pdtui.dissection.dissection_summary import summarise_dissection
+from pdtui.dissection.dissection_summary import summarize_dissection
 from pdtui.dissection.steering.linear_probes import LinearProbe
 from pdtui.dissection.steering.steering_candidates import (
     SteeringMethod,
@@ -19,7 +19,7 @@ from pdtui.dissection.steering.steering_candidates import (
 )
 from pdtui.dissection.steering.steering_comparison import compare_steering
 from pdtui.dissection.steering.steering_results import SteeringComparison
-from pdtui.dissection.steering.steering_summary import steering_tables, summarise_steering
+from pdtui.dissection.steering.steering_summary import steering_tables, summarize_steering
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.intervention_rollout_plan import InterventionRolloutPlan
 from pdtui.probing.rollout_pool import RolloutPool
@@ -142,9 +142,9 @@ def test_an_intervention_of_a_roll_out_does_what_the_same_stimulation_does() -> 
 
 
 def test_a_dissection_reports_every_way_and_its_tables_fit_a_terminal(dissection: Dissection) -> None:
-    summary = json.loads(json.dumps(summarise_dissection(dissection), allow_nan=False))["steering"]
+    summary = json.loads(json.dumps(summarize_dissection(dissection), allow_nan=False))["steering"]
     assert summary == json.loads(
-        json.dumps(summarise_steering(dissection.steering, dissection.attributes), allow_nan=False)
+        json.dumps(summarize_steering(dissection.steering, dissection.attributes), allow_nan=False)
     )
     names = {one["method"] for one in summary["methods"]}
     assert {"matched unit", "direction", "imprint", "random unit", "random direction"} <= names

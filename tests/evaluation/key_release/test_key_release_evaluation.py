@@ -14,7 +14,7 @@ from pdtui.evaluation.held_run import HeldRunTrace
 from pdtui.evaluation.key_release.key_release_evaluation import (
     FOLLOWED_STEPS,
     evaluate_key_releases,
-    summarise_key_release,
+    summarize_key_release,
 )
 from pdtui.evaluation.key_release.key_release_table import key_release_table
 from pdtui.evaluation.protocol_settings import RunTimes
@@ -48,7 +48,7 @@ def test_falls_count_by_whether_they_come_before_or_after_the_release() -> None:
     seeds = range(len(held))
     traces = {("it", seed): trace for seed, trace in zip(seeds, held, strict=True)}
     traces |= {("", seed): trace for seed, trace in zip(seeds, alone, strict=True)}
-    row = summarise_key_release("it", seeds, {("it", seed): TIMES for seed in seeds}, traces, 0)
+    row = summarize_key_release("it", seeds, {("it", seed): TIMES for seed in seeds}, traces, 0)
     assert (row.failed_while_held, row.let_go, row.failed) == (2, 5, 2)
     assert row.low < 2 / 5 < row.high
     assert (row.failed_by_itself, row.by_itself) == (1, 6)

@@ -19,7 +19,7 @@ from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.paper.driving.drive_operators import NoOperator, make_operator
 from pdtui.paper.driving.driving_episode import read_episode, record_episode
-from pdtui.paper.driving.operator_memory import JudgementErrors
+from pdtui.paper.driving.operator_memory import JudgmentErrors
 from pdtui.paper.driving.road_sight import SIGHT
 from pdtui.paper.driving.sight_reader import SightReader, read_boxes
 from pdtui.policies.weights.policy_loading import load_policy
@@ -61,7 +61,7 @@ def map_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     spec = NetworkSpec("metadrive", 275, (8,), "tanh", 2, "mean", (-1.0,) * 2, (1.0,) * 2)
     network = PolicyNetwork(spec)
     tensors = {name: tensor * 0 for name, tensor in network.state_dict().items()}
-    tensors["normaliser.std"] += 1.0
+    tensors["normalizer.std"] += 1.0
     tensors["head.weight"][0, 0] = tensors["head.weight"][1, 1] = 1.0
     tensors["head.bias"] += network.head.bias.new_tensor([0.3, 1.0])
     network.load_tensors(tensors)
@@ -121,7 +121,7 @@ def test_a_drive_off_the_road_is_scored_recorded_and_scored_again(
 
 def test_the_wheel_keeps_the_car_on_the_road_and_counts_as_involvement(car: Robot, map_path: Path) -> None:
     loop = _loop(car, map_path)
-    operator = make_operator("human only", loop, None, JudgementErrors())
+    operator = make_operator("human only", loop, None, JudgmentErrors())
     records: list[StepRecord] = []
     traffic = car.read_traffic()
     for _ in range(STEPS):

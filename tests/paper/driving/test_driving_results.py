@@ -18,7 +18,7 @@ from pdtui.paper.driving.driving_results import (
     DrivingExperimentResult,
     compare_involvement,
     driving_table,
-    summarise_row,
+    summarize_row,
 )
 from pdtui.paper.driving.score_journal import ScoreJournal
 
@@ -46,7 +46,7 @@ ALONE = [[_score(number, 0) for number in range(6)]]
 
 def test_a_row_is_the_mean_and_spread_of_its_repeats() -> None:
     worse = [*KEYS[:2], [replace(one, outcome=Outcome.LEFT_ROAD) for one in KEYS[2]]]
-    row = summarise_row("ppo", "keys", "program", worse)
+    row = summarize_row("ppo", "keys", "program", worse)
     successes = [3 / 6, 3 / 6, 0.0]
     assert (row.success.mean, row.success.std) == pytest.approx((mean(successes), stdev(successes)))
     assert row.out_of_road.mean == pytest.approx(mean([1 / 6, 1 / 6, 1.0]))
@@ -60,18 +60,18 @@ def test_a_row_is_the_mean_and_spread_of_its_repeats() -> None:
 
 
 def test_a_policy_alone_has_no_spread_and_no_involvement() -> None:
-    row = summarise_row("ppo", "alone", "", ALONE)
+    row = summarize_row("ppo", "alone", "", ALONE)
     assert (row.success.mean, row.repeats, row.involvement) == (0.5, 1, None)
     assert math.isnan(row.success.std)
 
 
 def test_involvement_is_compared_in_the_same_drives() -> None:
     rows = [
-        summarise_row("ppo", "alone", "", ALONE),
-        summarise_row("ppo", "keys", "program", KEYS),
-        summarise_row("ppo", "takeover", "program", TAKEOVER),
-        summarise_row("sac", "keys", "program", KEYS),
-        summarise_row("ppo", "keys", "person", [KEYS[0]]),
+        summarize_row("ppo", "alone", "", ALONE),
+        summarize_row("ppo", "keys", "program", KEYS),
+        summarize_row("ppo", "takeover", "program", TAKEOVER),
+        summarize_row("sac", "keys", "program", KEYS),
+        summarize_row("ppo", "keys", "person", [KEYS[0]]),
     ]
     (compared,) = compare_involvement(rows)
     assert compared.policy == "ppo"
@@ -82,9 +82,9 @@ def test_involvement_is_compared_in_the_same_drives() -> None:
 
 def test_the_table_says_what_was_driven_and_what_was_not() -> None:
     rows = (
-        summarise_row("metadrive", "alone", "", ALONE),
-        summarise_row("metadrive", "keys", "program", KEYS),
-        summarise_row("metadrive", "keys", "person", [KEYS[0][:1]]),
+        summarize_row("metadrive", "alone", "", ALONE),
+        summarize_row("metadrive", "keys", "program", KEYS),
+        summarize_row("metadrive", "keys", "person", [KEYS[0][:1]]),
     )
     result = DrivingExperimentResult(
         "metadrive",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pdtui.paper.driving.key_operator import PRESSES_PER_SECOND, KeyOperator
-from pdtui.paper.driving.operator_memory import REACTION_TIME, sample_judgement_errors
+from pdtui.paper.driving.operator_memory import REACTION_TIME, sample_judgment_errors
 from pdtui.paper.driving.road_sight import RoadSight
 from pdtui.paper.driving.route_line import RouteLine
 from tests.paper.driving.sights import EFFECTS, LEFT_LANE, MIDDLE_LANE, RIGHT_LANE, car, cone, sight
@@ -102,8 +102,8 @@ def test_it_gets_a_car_going_that_stands_before_nothing_and_aside_before_somethi
 
 
 def test_no_two_operators_judge_alike_and_each_is_drawn_again() -> None:
-    drawn = [sample_judgement_errors(repeat, scene) for repeat in range(5) for scene in range(20)]
-    assert drawn == [sample_judgement_errors(repeat, scene) for repeat in range(5) for scene in range(20)]
+    drawn = [sample_judgment_errors(repeat, scene) for repeat in range(5) for scene in range(20)]
+    assert drawn == [sample_judgment_errors(repeat, scene) for repeat in range(5) for scene in range(20)]
     distances = np.array([one.distance for one in drawn])
     assert len({(one.distance, one.speed, one.patience) for one in drawn}) == 100
     assert abs(distances.mean() - 1.0) < 0.02

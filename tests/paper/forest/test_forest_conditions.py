@@ -72,7 +72,7 @@ def a1_map(tmp_path_factory: pytest.TempPathFactory) -> Path:
     network = PolicyNetwork(spec)
     network.load_tensors(
         {name: tensor * 0 for name, tensor in network.state_dict().items()}
-        | {"head.weight": network.head.weight.detach() * 0.02, "normaliser.std": network.normaliser.std}
+        | {"head.weight": network.head.weight.detach() * 0.02, "normalizer.std": network.normalizer.std}
     )
     weights = folder / "stands.safetensors"
     save_network(weights, network)
@@ -222,7 +222,7 @@ def test_ratios_pair_the_same_forests() -> None:
     for found, value in (
         (ratios[0].distance, 2.0),
         (ratios[0].collisions, 0.5),
-        (ratios[0].collisions_per_metre, 0.25),
+        (ratios[0].collisions_per_meter, 0.25),
     ):
         # Unpaired, the spread of the forests would make it wide.
         assert (found.value, found.low, found.high) == pytest.approx((value, value, value))

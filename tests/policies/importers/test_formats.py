@@ -119,20 +119,20 @@ def test_discrete_logits_choose(tmp_path: Path, observations: Draw) -> None:
 @pytest.mark.parametrize("generation", [1, 2, 3])
 def test_rsl_rl_checkpoints_of_three_generations(generation: int, tmp_path: Path, observations: Draw) -> None:
     actor, mean, std = mlp(5, 6, 2, activation=nn.ELU), torch.arange(5.0), torch.full((5,), 0.5)
-    normaliser = {"_mean": mean[None], "_var": std[None] ** 2, "_std": std[None], "count": torch.tensor(9)}
+    normalizer = {"_mean": mean[None], "_var": std[None] ** 2, "_std": std[None], "count": torch.tensor(9)}
     weights = actor.state_dict()
     checkpoint: dict[str, Any] = {"iter": 7, "infos": None, "optimizer_state_dict": {"state": {}}}
     if generation == 3:
         model = {f"mlp.{k}": v for k, v in weights.items()} | {"distribution.std_param": torch.ones(2)}
-        model |= {f"obs_normalizer.{k}": v for k, v in normaliser.items()}
+        model |= {f"obs_normalizer.{k}": v for k, v in normalizer.items()}
         checkpoint |= {"actor_state_dict": model, "critic_state_dict": {"mlp.0.weight": torch.zeros(6, 5)}}
     else:
         model = {f"actor.{k}": v for k, v in weights.items()} | {"std": torch.ones(2)}
         model |= {f"critic.{k}": v for k, v in mlp(5, 4, 1).state_dict().items()}
         if generation == 2:
-            model |= {f"actor_obs_normalizer.{k}": v for k, v in normaliser.items()}
+            model |= {f"actor_obs_normalizer.{k}": v for k, v in normalizer.items()}
         else:
-            checkpoint["obs_norm_state_dict"] = normaliser
+            checkpoint["obs_norm_state_dict"] = normalizer
         checkpoint["model_state_dict"] = model
     torch.save(checkpoint, tmp_path / "model_7.pt")
     policy = load_policy(tmp_path / "model_7.pt", import_options=ImportOptions("elu"))

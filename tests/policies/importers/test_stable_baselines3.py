@@ -100,7 +100,7 @@ def test_a_trained_off_policy_model_needs_no_statistics_that_it_never_had(
         np.testing.assert_allclose(policy.act(observation).action, expected, atol=1e-5)
 
 
-def normalised(tmp_path: Path) -> tuple[Any, Any, Path]:
+def normalized(tmp_path: Path) -> tuple[Any, Any, Path]:
     from stable_baselines3.common.env_util import make_vec_env
     from stable_baselines3.common.vec_env import VecNormalize
 
@@ -113,11 +113,11 @@ def normalised(tmp_path: Path) -> tuple[Any, Any, Path]:
 
 
 def test_vecnormalize_is_asked_for_and_applied(tmp_path: Path, observations: Draw) -> None:
-    model, env, path = normalised(tmp_path)
-    with pytest.raises(PolicyError, match=r"behind VecNormalize.*--normaliser FILE, or --normaliser none"):
+    model, env, path = normalized(tmp_path)
+    with pytest.raises(PolicyError, match=r"behind VecNormalize.*--normalizer FILE, or --normalizer none"):
         load_policy(path)
     with pytest.raises(PolicyError, match=r"stats\.pkl: a pickle.*numpy\.savez"):
-        load_policy(path, import_options=ImportOptions(normaliser=str(tmp_path / "stats.pkl")))
+        load_policy(path, import_options=ImportOptions(normalizer=str(tmp_path / "stats.pkl")))
     statistics = {
         "mean": env.obs_rms.mean.tolist(),
         "var": env.obs_rms.var.tolist(),
@@ -126,10 +126,10 @@ def test_vecnormalize_is_asked_for_and_applied(tmp_path: Path, observations: Dra
     }
     (tmp_path / "stats.json").write_text(json.dumps(statistics))
     np.savez(tmp_path / "stats.npz", **statistics)
-    bare = load_policy(path, import_options=ImportOptions(normaliser="none"))
+    bare = load_policy(path, import_options=ImportOptions(normalizer="none"))
     for name in ("stats.json", "stats.npz"):
         # Found beside the weights, by its name alone.
-        policy = load_policy(path, import_options=ImportOptions(normaliser=name))
+        policy = load_policy(path, import_options=ImportOptions(normalizer=name))
         assert policy.sha256 != bare.sha256
         for observation in observations(3):
             expected, _ = model.predict(env.normalize_obs(observation), deterministic=True)

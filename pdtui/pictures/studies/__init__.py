@@ -1,0 +1,1 @@
+"""Pictures of studies over many policies and checkpoints."""

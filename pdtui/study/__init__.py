@@ -1,0 +1,1 @@
+"""Studies over many policies and checkpoints. Nothing but their commands needs them."""

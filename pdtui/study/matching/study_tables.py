@@ -1,0 +1,87 @@
+"""What `pdtui study matching` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rich.table import Table
+
+from pdtui.core.console.text_tables import new_table
+from pdtui.study.matching.matching_study_plan import StudiedPolicy
+from pdtui.study.matching.study_data import MatchingStudyData
+from pdtui.study.matching.study_page import answer_in_one_sentence, variant_headers, variant_rows
+from pdtui.study.matching.study_statistics import MEASURES, StudyResult
+
+
+@dataclass(frozen=True)
+class StudySummary:
+    """The result as a table and as JSON."""
+
+    data: MatchingStudyData
+    result: StudyResult
+
+    @property
+    def answer(self) -> str:
+        """One sentence."""
+        return answer_in_one_sentence(self.data, self.result)
+
+    def table(self) -> Table:
+        """Return the table of the variants."""
+        plan = self.data.plan
+        count = f"{len(self.result.figures)} of the {len(plan.policies)} policies wanted"
+        table = new_table(f"Matching and steering: {count}", *variant_headers(plan.settings.best))
+        for row in variant_rows(self.result):
+            table.add_row(*row)
+        return table
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything as JSON data."""
+        result = self.result
+        references = ("random", "probing", "probing_correlation", "ceiling")
+        return {
+            "answer": str(result.answer),
+            "sentence": self.answer,
+            "wanted": len(self.data.plan.policies),
+            "policies": [asdict(one) for one in self.data.policies],
+            "variants": {
+                name: {measure: asdict(one) for measure, one in zip(MEASURES, means, strict=True)}
+                for name, means in result.variants.items()
+            },
+            **{name: asdict(getattr(result, name)) for name in references},
+            "figures": [
+                {**asdict(one), "variants": dict(zip(result.variants, one.variants.tolist(), strict=True))}
+                for one in result.figures
+            ],
+        }
+
+
+@dataclass(frozen=True)
+class ListedPolicies:
+    """The policies of a plan: whether each is trained, and the command that trains it."""
+
+    rows: Sequence[tuple[str, bool, str]]
+
+    def table(self) -> Table:
+        """Return them as a table."""
+        table = new_table("", "policy", "trained", "command", left=("policy", "trained", "command"))
+        for name, trained, command in self.rows:
+            table.add_row(name, "yes" if trained else "no", command or "it comes with pdtui")
+        return table
+
+    def as_list(self) -> list[dict[str, Any]]:
+        """Return them as JSON data."""
+        return [{"policy": name, "trained": trained, "command": one} for name, trained, one in self.rows]
+
+
+def list_trained_policies(
+    found: Iterable[StudiedPolicy], missing: Iterable[StudiedPolicy], folder: str
+) -> ListedPolicies:
+    """Return the policies that are trained, and then the others."""
+    return ListedPolicies(
+        [
+            *((one.name, True, one.command(folder)) for one in found),
+            *((one.name, False, one.command(folder)) for one in missing),
+        ]
+    )
