@@ -11,6 +11,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import RobotError
 from pdtui.driving.control_loop import ControlLoop
+from pdtui.paper.driving.maneuver import STRAIGHTENING_TIME
 from pdtui.paper.driving.road_sight import LANE_WIDTH
 from pdtui.paper.operator_behaviors import find_operator_behaviors
 from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
@@ -51,10 +52,18 @@ class KeyEffects:
     dt: float
     periods: Mapping[str, float] = field(default_factory=dict)
 
-    def moved(self, key: str, times: Floats) -> Floats:
-        """Return how far a lane key has moved the car to the left at times after the press, s."""
-        effect = np.array(self.left if key == LEFT else self.right)
-        return np.asarray(np.interp(times, np.arange(len(effect)) * self.dt, effect))
+    def pulse(self, key: str) -> float:
+        """Return how long a lane key acts, s."""
+        return self.periods.get(key, self.settling_time)
+
+    def turn(self, key: str) -> float:
+        """Return how fast a lane key turns the car to the left while it acts, rad/s.
+
+        It is that turn which moves a car as far as was measured if it straightens by itself meanwhile and
+        afterwards.
+        """
+        shift = max(self.left) if key == LEFT else min(self.right)
+        return shift / (self.speed * self.pulse(key) * STRAIGHTENING_TIME)
 
 
 def driving_behaviors(stimulation_map: StimulationMap) -> dict[str, Behavior]:

@@ -4,48 +4,51 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from pdtui.core.attributes import Floats
 from pdtui.paper.driving.key_effects import ACCELERATE, BRAKE, DEFAULT, LEFT, RIGHT, KeyEffects
+from pdtui.paper.driving.key_maneuvers import KeyManeuvers
 from pdtui.paper.driving.maneuver import (
     HORIZON,
-    TIMES,
+    INWARDS,
+    ROOM_FOR_CROSSING,
+    WEAVING,
     Maneuver,
     TimesToConflict,
-    distance_to_standing,
-    drift,
+    next_standing,
     predict_times_to_conflict,
-    roll,
-    sideways_past_standing,
+    slips_off,
 )
-from pdtui.paper.driving.operator_memory import REACTION_TIME, JudgmentErrors, OperatorMemory
-from pdtui.paper.driving.road_sight import RoadSight
+from pdtui.paper.driving.operator_memory import JudgmentErrors, OperatorMemory
+from pdtui.paper.driving.road_sight import LANE_WIDTH, RoadSight
 
 PRESSES_PER_SECOND = 3
 """Largest number of key presses in any second."""
-PATIENCE_STANDING, PATIENCE_MOVING, PATIENCE_EDGE = 3.4, 1.4, 2.0
-"""Times before a conflict at which it acts: with what stands, with what moves, and with an edge, s."""
-NEAR_STANDING = 20.0
-"""Distance from something that stands in the way at which it acts although the car is slow, m."""
-IMPROVEMENT, LAST_IMPROVEMENT = 1.0, 0.4
-"""Time by which a lane change must postpone the next conflict, s: usually, and in the last moment."""
-STOPPING_ROOM, CREEPING_ROOM = 18.0, 2.0
-"""Distances from something that stands at which a fast and a slow car are to stop, m: to change lanes
-afterwards, it needs room."""
-_SLOW, _FAST = 4.0, 8.0
-_SPEEDING_UP, _ROLLING = 2.0, 8.0
-"""How a car is expected to start, m/s², and the speed up to which, m/s."""
+PATIENCE_STANDING, PATIENCE_MOVING, PATIENCE_CROSSING, PATIENCE_EDGE = 4.0, 1.2, 3.2, 1.5
+"""Times before a conflict at which it acts: with what stands, with who drives along the road, with who
+crosses it, and with an edge, s."""
+URGENT = 1.1
+"""Time before a conflict at which it acts although it has just done something, s."""
+LAST_MOMENT = 0.7
+"""Time before a conflict with an edge at which it may brake, s."""
+IMPROVEMENT = 1.0
+"""Time by which a key must postpone the next conflict, s."""
+STOPPING_ROOM = 9.0
+"""Distance from something that stands at which the car is to stop, m: it needs room to pass it then."""
+_SLOW = 2.0
+"""Speed up to which a car turns back from an edge by itself, m/s."""
 _HALTED, _HALTED_TIME = 0.5, 2.0
 """Speed of a car that has halted, m/s, and the time after which it should have gone on, s."""
-_CLOSE = 4.0
-"""Distance from something that stands at which a halted car must first turn aside, m."""
-_BRAKED_TIME = 3.0
-"""Time after which it lets a stopped car go on unless somebody comes, s."""
-_LANE_KEY_TIME = 1.2
-"""Time after a lane key in which it does not brake early: what the key does is not to be seen yet, s."""
-_PACE_TIME = 1.6
-"""Time over which the car's speed matters for a lane change, s."""
+_NEAR_ENOUGH, _TOO_FAR = 0.3, 0.8
+"""How far from the middle of a lane a lane change may end, before it and beyond it, m."""
+_ASKEW = 0.3
+"""Angle to the road up to which a lane key may turn the car, rad."""
+_SIDEWAYS_ACCELERATION, _BEND_AHEAD = 5.5, (2.0, 5.0, 8.0)
+"""Acceleration to the side in a bend above which it brakes, m/s², and where it looks for one, m ahead."""
+_SETTLING = 0.6
+"""Time after a lane key in which the car settles in its lane, s."""
+_BRAKE_TIME, _BRAKED_TIME = 0.5, 4.0
+"""Time for which it brakes at least, and after which it lets a stopped car go on unless somebody comes, s."""
+_DOUBT = 0.4
+"""How much faster or slower somebody who crosses the road may turn than seen, rad/s."""
 
 
 class KeyOperator:
@@ -58,163 +61,165 @@ class KeyOperator:
     """
 
     def __init__(self, effects: KeyEffects, dt: float, judgment: JudgmentErrors | None = None) -> None:
-        self._effects, self._dt, self._judgment = effects, dt, judgment or JudgmentErrors()
-        self._memory = OperatorMemory(dt, self._judgment)
+        self._dt, self._patience = dt, (judgment or JudgmentErrors()).patience
+        self._memory = OperatorMemory(dt, judgment or JudgmentErrors())
+        self._keys = KeyManeuvers(effects, dt)
         self._second = math.ceil(1.0 / dt - 1e-9)
-        self._step, self._rolled = -1, 0
-        self._presses: list[tuple[int, str]] = []
+        self._rolled, self._aim, self._askew = 0, 0.0, _ASKEW
 
     def choose_key(self, sight: RoadSight) -> str:
         """Observe the road and return the task of the key to press now, or an empty string for none.
 
         ``default`` stands for the default key. Call it once per control step.
         """
-        self._step += 1
+        self._keys.step += 1
         seen = self._memory.recall(sight)
         if seen is None:
             return ""
         if seen.speed > _HALTED:
-            self._rolled = self._step
+            self._rolled = self._keys.step
         if self._hand_is_busy():
             return ""
-        key = self._choose(seen)
+        key = self._choose(self._keys.apply_own(seen))
         if key:
-            self._presses.append((self._step, key))
+            self._keys.press(key)
         return key
 
     def _hand_is_busy(self) -> bool:
-        presses = self._presses[-PRESSES_PER_SECOND:]
-        return len(presses) == PRESSES_PER_SECOND and self._step - presses[0][0] < self._second
+        presses = self._keys.presses[-PRESSES_PER_SECOND:]
+        return len(presses) == PRESSES_PER_SECOND and self._keys.step - presses[0][0] < self._second
 
     def _choose(self, seen: RoadSight) -> str:
-        if self._latched() == BRAKE:
+        latched, _ = self._keys.latched()
+        if latched == BRAKE:
             return self._release(seen)
-        if min((self._step - self._rolled) * self._dt, self._time_since(DEFAULT)) > _HALTED_TIME:
+        if min(self._halted_time(), self._keys.time_since(DEFAULT)) > _HALTED_TIME:
             return self._start_again(seen)
-        go_on = Maneuver("", roll(seen.speed, 0.0), self._beside(seen))
-        expected = predict_times_to_conflict(seen, go_on)
+        go_on = self._keys.go_on(seen)
+        if latched in (LEFT, RIGHT) and self._is_done(seen, latched, go_on):
+            return DEFAULT
+        if (key := {1: RIGHT, -1: LEFT}.get(slips_off(seen), latched)) != latched:
+            return self._steer(seen, key, seen.lane)
+        if not latched and (key := self._aside(seen)):
+            return key
+        if seen.speed**2 * max(abs(seen.bend(ahead)) for ahead in _BEND_AHEAD) > _SIDEWAYS_ACCELERATION:
+            return BRAKE
+        expected = predict_times_to_conflict(seen, go_on, ROOM_FOR_CROSSING)
         if not self._must_act(seen, expected):
             return ""
-        lanes, must_brake = self._lane_changes(seen), self._must_brake(seen, expected)
-        # In the last moment, a small improvement is better than to lose the speed that a lane change needs.
-        gain = LAST_IMPROVEMENT if must_brake else IMPROVEMENT
-        better = [one for one in lanes if _improves(predict_times_to_conflict(seen, one), expected, gain)]
-        if better:
-            return max(better, key=lambda one: _preference(seen, one)).name
-        if not must_brake:
+        outlooks = [(predict_times_to_conflict(seen, one), one) for one in self._options(seen, expected)]
+        good = [pair for pair in outlooks if _improves(pair[0], expected)]
+        if not good:
             return ""
-        if seen.speed < _SLOW and (aside := self._aside(seen)):
-            return aside
-        slower = Maneuver(BRAKE, roll(seen.speed, -self._effects.deceleration), drift(seen))
-        return max((go_on, slower, *lanes), key=lambda one: predict_times_to_conflict(seen, one).first).name
+        key = max(good, key=lambda pair: _preference(seen, *pair))[1].name
+        if key not in (LEFT, RIGHT):
+            return key
+        away = expected.edge == expected.first
+        lane = seen.lane if away else seen.lane + (1 if key == LEFT else -1)
+        return self._steer(seen, key, min(max(lane, 0), seen.lanes - 1))
+
+    def _options(self, seen: RoadSight, expected: TimesToConflict) -> list[Maneuver]:
+        """Return what may be done: keys for lanes, where nobody crosses the road, and in time the brake."""
+        options = []
+        if self._keys.latched()[0] in (LEFT, RIGHT):
+            options.append(self._keys.let_go(seen))
+        if expected.crossing > expected.first:
+            options += self._keys.lane_changes(seen)
+        if self._must_brake(seen, expected):
+            options.append(self._keys.brake(seen))
+        return options
 
     def _must_act(self, seen: RoadSight, expected: TimesToConflict) -> bool:
-        patience = self._judgment.patience
+        edge = expected.edge if abs(seen.heading) > WEAVING else math.inf
+        others = min(expected.standing, expected.moving, expected.crossing)
+        if min(others, edge) < URGENT:
+            return True
+        if self._keys.time_since(LEFT, RIGHT) < self._keys.change_time() + _SETTLING:
+            return False
         return (
-            expected.standing < PATIENCE_STANDING * patience
-            or expected.moving < PATIENCE_MOVING * patience
-            or expected.edge < PATIENCE_EDGE * patience
-            or distance_to_standing(seen) < NEAR_STANDING * patience
+            expected.standing < PATIENCE_STANDING * self._patience
+            or expected.moving < PATIENCE_MOVING * self._patience
+            or expected.crossing < PATIENCE_CROSSING * self._patience
+            or edge < PATIENCE_EDGE * self._patience
         )
 
     def _must_brake(self, seen: RoadSight, expected: TimesToConflict) -> bool:
         """Return whether the last moment to brake has come."""
-        stopping = seen.speed**2 / (2 * self._effects.deceleration) + 0.2 * seen.speed
-        room = float(np.interp(seen.speed, [_SLOW, _FAST], [CREEPING_ROOM, STOPPING_ROOM]))
-        if self._time_since(LEFT, RIGHT) < _LANE_KEY_TIME:
-            room = CREEPING_ROOM
-        patience = self._judgment.patience
+        room = self._keys.stopping_distance(seen.speed) + 0.2 * seen.speed + STOPPING_ROOM * self._patience
+        stands = math.isfinite(expected.standing) and next_standing(seen)[0] < room
+        slips = expected.edge < LAST_MOMENT * self._patience and abs(seen.heading) > WEAVING
         return (
-            distance_to_standing(seen) < stopping + room * patience
-            or expected.moving < PATIENCE_MOVING * patience
-            or expected.edge < PATIENCE_EDGE * patience
+            ((stands or slips) and seen.speed > _SLOW)
+            or expected.moving < PATIENCE_MOVING * self._patience
+            or expected.crossing < PATIENCE_CROSSING * self._patience
         )
 
-    def _release(self, seen: RoadSight) -> str:
-        """Return the default key once the car can go on, straight or with a lane change when it rolls."""
-        straight = Maneuver(DEFAULT, roll(seen.speed, _SPEEDING_UP, _ROLLING), drift(seen))
-        expected = predict_times_to_conflict(seen, straight)
-        if math.isinf(expected.first):
-            return DEFAULT
-        waited = min((self._step - self._rolled) * self._dt, self._time_since()) > _BRAKED_TIME
-        if math.isinf(expected.moving) and waited:
-            return DEFAULT
-        lanes = self._lane_changes(seen)
-        better = (_improves(predict_times_to_conflict(seen, one), expected, IMPROVEMENT) for one in lanes)
-        return DEFAULT if any(better) else ""
+    def _is_done(self, seen: RoadSight, key: str, go_on: Maneuver) -> bool:
+        """Return whether a lane key has done enough, and would do too much if it acted on."""
+        side = 1.0 if key == LEFT else -1.0
+        left_to_go = side * (self._aim - seen.beside)
+        let_go = self._keys.let_go(seen)
+        far = (
+            side * float(let_go.beside[-1]) > left_to_go - _NEAR_ENOUGH
+            and side * float(go_on.beside[-1]) > left_to_go + _TOO_FAR
+        )
+        return far or side * seen.heading > self._askew
+
+    def _steer(self, seen: RoadSight, key: str, lane: int) -> str:
+        """Note how far a lane key is to move the car, and return the key.
+
+        Into its own lane the car need only be turned back.
+        """
+        self._aim = seen.beside + seen.to_middle_of(lane)
+        self._askew = INWARDS if lane == seen.lane else _ASKEW
+        return key
 
     def _aside(self, seen: RoadSight) -> str:
-        """Return the key that moves a slow car past what stands in its way, on the side where less is to go.
+        """Return the key that turns a slow car away from what stands close ahead of it, if anything does."""
+        gap, beside = next_standing(seen)
+        if seen.speed > _SLOW or gap > STOPPING_ROOM:
+            return ""
+        side = -1.0 if beside > 0.0 else 1.0
+        if (seen.left if side > 0.0 else seen.right) < LANE_WIDTH or side * seen.heading > _ASKEW:
+            return ""
+        self._aim, self._askew = seen.beside + beside + side * LANE_WIDTH, _ASKEW
+        return LEFT if side > 0.0 else RIGHT
 
-        Nothing if a car is there, or while the key still works.
-        """
-        to_left, to_right = sideways_past_standing(seen)
-        rolls = roll(seen.speed, 0.0)
-        for distance, key in sorted([(to_left, LEFT), (to_right, RIGHT)]):
-            shift = distance if key == LEFT else -distance
-            shifted = Maneuver(key, rolls, np.full_like(TIMES, shift))
-            conflicts = predict_times_to_conflict(seen, shifted)
-            if math.isinf(conflicts.moving) and math.isinf(conflicts.edge):
-                return key if self._may_press(key) else ""
-        return ""
-
-    def _may_press(self, key: str) -> bool:
-        """Return whether a lane key may be pressed: again once it has ended, the other one once settled."""
-        other = RIGHT if key == LEFT else LEFT
-        pulse = self._effects.periods.get(key, self._effects.settling_time)
-        return self._time_since(key) >= pulse and self._time_since(other) >= self._effects.settling_time
-
-    def _lane_changes(self, seen: RoadSight) -> list[Maneuver]:
-        """Return what the keys for lanes would do now; none while the last one is still at work."""
-        rolls = roll(seen.speed, _SPEEDING_UP if seen.speed < _FAST else 0.0, _ROLLING)
-        pace = float(np.interp(_PACE_TIME, TIMES, rolls)) / _PACE_TIME
-        share = min(1.0, pace / self._effects.speed)
-        return [
-            Maneuver(key, rolls, drift(seen) + share * self._effects.moved(key, TIMES))
-            for key in (LEFT, RIGHT)
-            if self._may_press(key)
-        ]
-
-    def _beside(self, seen: RoadSight) -> Floats:
-        """Return how far the car moves to the left by itself and by the lane key that was pressed last.
-
-        A policy may steer against the key; once that is to be seen, the key counts no more.
-        """
-        key, since = (self._presses[-1][1], self._time_since()) if self._presses else ("", math.inf)
-        works = since < 2 * REACTION_TIME or (seen.heading > 0.0) == (key == LEFT)
-        if key in (LEFT, RIGHT) and since < self._effects.settling_time and works:
-            return self._effects.moved(key, since + TIMES) - self._effects.moved(key, np.array([since]))
-        return drift(seen)
+    def _release(self, seen: RoadSight) -> str:
+        """Return the key with which a braked car can go on: the default key, or one for a lane."""
+        if self._keys.time_since() < _BRAKE_TIME or (seen.speed > _SLOW and abs(seen.heading) > WEAVING):
+            return ""
+        options = [self._keys.let_go(seen), *self._keys.lane_changes(seen)]
+        outlooks = [(predict_times_to_conflict(seen, one, ROOM_FOR_CROSSING, _DOUBT), one) for one in options]
+        if outlooks[0][0].crossing == outlooks[0][0].first < math.inf:
+            outlooks = outlooks[:1]
+        free = [one.name for times, one in outlooks if math.isinf(times.first)]
+        if free:
+            return free[0]
+        stays = predict_times_to_conflict(seen, self._keys.brake(seen))
+        waited = min(self._halted_time(), self._keys.time_since()) > _BRAKED_TIME
+        if not waited and math.isinf(stays.first):
+            return ""
+        times, best = max(outlooks, key=lambda pair: _preference(seen, *pair))
+        nobody = math.isinf(min(times.moving, times.crossing))
+        return best.name if times.first > stays.first or (waited and nobody) else ""
 
     def _start_again(self, seen: RoadSight) -> str:
-        """Return the key that gets a halted car going: first aside if something is close ahead."""
-        if self._time_since() < _HALTED_TIME:
+        """Return the key that gets a halted car going: to a side if something is close ahead."""
+        if self._keys.time_since() < _HALTED_TIME:
             return ""
-        turned = bool(self._presses) and self._presses[-1][1] in (LEFT, RIGHT)
-        if turned or distance_to_standing(seen) > _CLOSE:
-            return ACCELERATE
         return self._aside(seen) or ACCELERATE
 
-    def _time_since(self, *keys: str) -> float:
-        """Return how long ago one of the keys was pressed, or any if none is named, s."""
-        steps = [step for step, key in self._presses if not keys or key in keys]
-        return (self._step - steps[-1]) * self._dt if steps else math.inf
-
-    def _latched(self) -> str:
-        if not self._presses:
-            return ""
-        step, key = self._presses[-1]
-        period = self._effects.periods.get(key)
-        over = period is not None and (self._step - step) * self._dt >= period
-        return "" if over or key == DEFAULT else key
+    def _halted_time(self) -> float:
+        return (self._keys.step - self._rolled) * self._dt
 
 
-def _improves(conflicts: TimesToConflict, expected: TimesToConflict, gain: float) -> bool:
-    """Return whether a lane change postpones the next conflict enough and stays on the road."""
-    now = min(expected.first, HORIZON - gain)
-    return conflicts.first > now + gain - 1e-9 and conflicts.edge > HORIZON / 2
+def _improves(conflicts: TimesToConflict, expected: TimesToConflict) -> bool:
+    """Return whether an option postpones the next conflict enough."""
+    return conflicts.first > min(expected.first, HORIZON - IMPROVEMENT) + IMPROVEMENT - 1e-9
 
 
-def _preference(seen: RoadSight, change: Maneuver) -> tuple[float, float]:
-    """Return how good a lane change is: late conflicts first, then room on its side."""
-    return predict_times_to_conflict(seen, change).first, seen.left if change.name == LEFT else seen.right
+def _preference(seen: RoadSight, times: TimesToConflict, option: Maneuver) -> tuple[float, float, float]:
+    """Return how good an option is: late conflicts first, then no key for a lane, then room on its side."""
+    room = seen.left if option.name == LEFT else seen.right
+    return min(times.first, HORIZON), {BRAKE: -1.0, DEFAULT: 1.0}.get(option.name, 0.0), room

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pdtui.core.attributes import Floats
 from pdtui.evaluation.protocol_settings import RandomPurpose, purpose_generator
 from pdtui.paper.driving.road_sight import RoadSight
 
 REACTION_TIME = 0.3
 """Age of what the operator sees when it acts, s."""
+_SWING_KEPT = 0.6
+"""Share of a turn that goes on meanwhile: a policy weaves."""
 _DISTANCE_SPREAD, _SPEED_SPREAD, _PATIENCE_SPREAD = 0.05, 0.1, 0.1
 
 
@@ -67,19 +68,20 @@ class OperatorMemory:
 
     def _carry_on(self, seen: RoadSight) -> RoadSight:
         time = self._delay * self._dt
-        ahead = seen.speed * math.cos(seen.heading) * time
-        aside = seen.speed * math.sin(seen.heading) * time
-        others = seen.others * np.array([self._judgment.distance, 1, 1, 1, *[self._judgment.speed] * 2])
-        others[:, :2] += others[:, 4:] * time - (ahead, aside)
+        turned = _SWING_KEPT * seen.swing * time
+        direction = seen.heading + turned / 2
+        ahead, aside = seen.speed * math.cos(direction) * time, seen.speed * math.sin(direction) * time
+        others = seen.others.copy()
+        place = seen.line.points_at(np.array([seen.along]))
+        others[:, :2] = place + (others[:, :2] - place) * self._judgment.distance
+        others[:, 5] *= self._judgment.speed
         return replace(
             seen,
+            along=seen.along + ahead,
+            beside=seen.beside + aside,
+            heading=seen.heading + turned,
             left=seen.left - aside,
             right=seen.right + aside,
             others=others,
-            road=_turn(seen.road - (seen.speed * time, 0.0), -seen.yaw_rate * time),
+            age=time,
         )
-
-
-def _turn(points: Floats, angle: float) -> Floats:
-    cosine, sine = math.cos(angle), math.sin(angle)
-    return np.asarray(points @ np.array([[cosine, sine], [-sine, cosine]]))

@@ -7,6 +7,9 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import RobotError
 
+_LEAST_LENGTH = 0.01
+"""Distance of two points, m, that counts as none."""
+
 
 class RouteLine:
     """The middle line of the roads that a car is to take.
@@ -21,9 +24,10 @@ class RouteLine:
     def __init__(self, points: Floats) -> None:
         steps = np.diff(points, axis=0)
         lengths = np.hypot(steps[:, 0], steps[:, 1])
-        if not (lengths > 0.0).any():
+        # Where two roads meet, their points may differ by nothing but rounding, in any direction.
+        kept = lengths > _LEAST_LENGTH
+        if not kept.any():
             raise RobotError(f"route: expected at least two different points, found {len(points)}")
-        kept = lengths > 0.0
         self._starts, self._lengths = points[:-1][kept], lengths[kept]
         self._directions = steps[kept] / self._lengths[:, None]
         self._alongs = np.concatenate([[0.0], np.cumsum(self._lengths)])

@@ -9,14 +9,13 @@ import numpy as np
 from pdtui.core.attributes import Floats, wrap_angle
 from pdtui.core.errors import RobotError
 from pdtui.core.scenery import Scenery, Traffic
-from pdtui.paper.driving.road_sight import ROAD_STEP, SIGHT, RoadSight
+from pdtui.paper.driving.road_sight import SIGHT, RoadSight
 from pdtui.paper.driving.route_line import RouteLine
 from pdtui.robots.robot import Robot
 
 _STEPS_OF_VELOCITY = 2
 """Control steps over which somebody's velocity is judged."""
-_ROAD_BEHIND = 10.0
-_OWN = ("speed", "heading", "yaw rate", "left distance", "right distance")
+_OWN = ("speed", "yaw rate", "left distance", "right distance")
 
 
 class SightReader:
@@ -40,59 +39,32 @@ class SightReader:
     def look(self, traffic: Traffic) -> RoadSight:
         """Return what there is to see now, with this traffic; call it once per control step."""
         line = self._route_line()
-        speed, heading, yaw_rate, left, right = self._robot.read_attributes()[self._columns].tolist()
-        place = self._robot.read_poses()[:1, :2]
-        low, high = (-math.inf, math.inf) if self._along is None else (self._along - 20.0, self._along + 20.0)
-        along, _, direction = line.locate(place, low, high)[0].tolist()
+        speed, yaw_rate, left, right = self._robot.read_attributes()[self._columns].tolist()
+        pose = self._robot.read_poses()[0]
+        low, high = (-math.inf, math.inf) if self._along is None else (self._along - 4.0, self._along + 8.0)
+        along, beside, direction = line.locate(pose[None, :2], low, high)[0].tolist()
         self._along = along
-        ahead = line.points_at(along + np.arange(0.0, SIGHT, ROAD_STEP))
-        turned = direction + heading
-        apart = ahead - place
-        road = np.stack(
-            [
-                math.cos(turned) * apart[:, 0] + math.sin(turned) * apart[:, 1],
-                math.cos(turned) * apart[:, 1] - math.sin(turned) * apart[:, 0],
-            ],
-            axis=1,
-        )
+        w, x, y, z = pose[3:]
+        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        heading = wrap_angle(yaw - direction)
         return RoadSight(
-            speed,
-            wrap_angle(heading),
-            yaw_rate,
-            left,
-            right,
-            self._others(traffic, line, place[0], along),
-            road,
+            line, along, beside, speed, heading, yaw_rate, left, right, self._others(traffic, pose[:2])
         )
 
-    def _others(self, traffic: Traffic, line: RouteLine, place: Floats, along: float) -> Floats:
+    def _others(self, traffic: Traffic, place: Floats) -> Floats:
         seen = read_boxes(self._robot.scenery, traffic)
         self._seen = [*self._seen[-_STEPS_OF_VELOCITY:], seen]
         before = self._seen[0]
         span = (len(self._seen) - 1) * self._dt
         near = {key: box for key, box in seen.items() if math.hypot(*(box[:2] - place)) < SIGHT}
         if not near:
-            return np.empty((0, 6))
+            return np.empty((0, 7))
         boxes = np.array(list(near.values()))
-        old = np.array([before.get(key, box)[:2] for key, box in near.items()])
-        moved = (boxes[:, :2] - old) / span if span else np.zeros_like(old)
-        part = (along - _ROAD_BEHIND - SIGHT, along + SIGHT)
-        here = line.locate(boxes[:, :2], *part)
-        own = line.locate(place[None], *part)[0]
-        angle, road = boxes[:, 2] - here[:, 2], here[:, 2]
-        cosine, sine = np.abs(np.cos(angle)), np.abs(np.sin(angle))
-        length, width = boxes[:, 3] / 2, boxes[:, 4] / 2
-        return np.stack(
-            [
-                here[:, 0] - own[0],
-                here[:, 1] - own[1],
-                cosine * length + sine * width,
-                sine * length + cosine * width,
-                np.cos(road) * moved[:, 0] + np.sin(road) * moved[:, 1],
-                np.cos(road) * moved[:, 1] - np.sin(road) * moved[:, 0],
-            ],
-            axis=1,
-        )
+        moved = boxes[:, :3] - np.array([before.get(key, box)[:3] for key, box in near.items()])
+        moved[:, 2] = [wrap_angle(angle) for angle in moved[:, 2]]
+        rates = moved / span if span else np.zeros_like(moved)
+        speeds = np.hypot(rates[:, 0], rates[:, 1])
+        return np.column_stack([boxes[:, :3], boxes[:, 3:5] / 2, speeds, rates[:, 2]])
 
     def _route_line(self) -> RouteLine:
         scenery = self._robot.scenery

@@ -10,19 +10,21 @@ import numpy as np
 from pdtui.core.attributes import Floats
 from pdtui.paper.driving.key_operator import (
     IMPROVEMENT,
-    NEAR_STANDING,
+    PATIENCE_CROSSING,
     PATIENCE_EDGE,
     PATIENCE_MOVING,
     PATIENCE_STANDING,
 )
 from pdtui.paper.driving.maneuver import (
     HORIZON,
+    ROOM_FOR_CROSSING,
     TIMES,
+    WEAVING,
     Maneuver,
-    distance_to_standing,
-    drift,
     predict_times_to_conflict,
     roll,
+    slips_off,
+    swerve,
 )
 from pdtui.paper.driving.operator_memory import JudgmentErrors, OperatorMemory
 from pdtui.paper.driving.road_sight import CAR_HALF_LENGTH, CAR_HALF_WIDTH, LANE_WIDTH, ROAD_STEP, RoadSight
@@ -37,8 +39,13 @@ _LOOK_AHEAD, _LOOK_AHEAD_TIME = 5.0, 0.9
 """Distance of the place that it steers to: at rest, m, and per speed, s."""
 _WHEELBASE, _LARGEST_ANGLE = 2.47, math.radians(40.0)
 """Distance between the axles, m, and the angle of the wheels at full steering, rad."""
-_BRAKING, _HEADWAY, _STANDSTILL_GAP = 3.0, 1.2, 4.0
-"""How hard it plans to brake, m/s², and its distance from who is in front: per speed, s, and at rest, m."""
+_BRAKING, _HARD_BRAKING, _HEADWAY, _STANDSTILL_GAP = 3.0, 10.0, 1.2, 4.0
+"""How hard it plans to brake, and can brake, m/s², and its distance from who is in front: per speed, s, and
+at rest, m."""
+_SLIPPING_SPEED = 3.0
+"""Speed to which it brakes near an edge, m/s."""
+_SOON = 0.5
+"""Time over which it judges how fast others get away, s."""
 _THROTTLE_GAIN = 0.3
 """Throttle per error of the speed, s/m."""
 _HANDS_OFF_AFTER = 5
@@ -90,13 +97,17 @@ class SteeringOperator:
         return self._drive(seen)
 
     def _must_act(self, seen: RoadSight) -> bool:
-        expected = predict_times_to_conflict(seen, Maneuver("", roll(seen.speed, 0.0), drift(seen)))
+        ahead = roll(seen.speed, 0.0)
+        expected = predict_times_to_conflict(
+            seen, Maneuver("", ahead, swerve(seen, ahead, np.zeros_like(TIMES)))
+        )
         patience = self._judgment.patience
         return (
             expected.standing < PATIENCE_STANDING * patience
             or expected.moving < PATIENCE_MOVING * patience
-            or expected.edge < PATIENCE_EDGE * patience
-            or distance_to_standing(seen) < NEAR_STANDING * patience
+            or expected.crossing < PATIENCE_CROSSING * patience
+            or (expected.edge < PATIENCE_EDGE * patience and abs(seen.heading) > WEAVING)
+            or slips_off(seen) != 0
             or self._halted * self._dt > 2.0
         )
 
@@ -125,19 +136,36 @@ class SteeringOperator:
         return predict_times_to_conflict(seen, Maneuver("", roll(speed, 0.0), beside)).first
 
     def _drive(self, seen: RoadSight) -> ManualControlValues:
-        beside = seen.to_middle_of(self._target) + _middle(seen)
-        distance = _LOOK_AHEAD + _LOOK_AHEAD_TIME * seen.speed
-        x, y = _place_ahead(seen.road, distance, beside)
+        road = seen.road_ahead()
+        beside = seen.to_middle_of(self._target) + seen.beside
+        slips = slips_off(seen) != 0
+        distance = _LOOK_AHEAD + (0.0 if slips else _LOOK_AHEAD_TIME * seen.speed)
+        x, y = _place_ahead(road, distance, beside)
         angle = math.atan(2.0 * _WHEELBASE * y / max(x * x + y * y, 1.0))
-        speed = min(CRUISING_SPEED, _bend_speed(seen.road), self._following_speed(seen))
-        throttle = _THROTTLE_GAIN * (speed - seen.speed)
+        speed = min(CRUISING_SPEED, _bend_speed(road), self._following_speed(seen))
+        stops = self._must_let_pass(seen) or (slips and seen.speed > _SLIPPING_SPEED)
+        throttle = -1.0 if stops else _THROTTLE_GAIN * (speed - seen.speed)
+        if abs(seen.heading) > math.pi / 2:  # it was turned round, and the place is behind it
+            angle = -math.copysign(_LARGEST_ANGLE, seen.heading)
         return ManualControlValues(
             float(np.clip(angle / _LARGEST_ANGLE, -1.0, 1.0)), float(np.clip(throttle, -1.0, 1.0))
         )
 
+    def _must_let_pass(self, seen: RoadSight) -> bool:
+        """Return whether somebody crosses the road so that it is better to stop."""
+        here = np.zeros_like(TIMES)
+        ahead = roll(max(seen.speed, 3.0), 0.0)
+        goes = predict_times_to_conflict(seen, Maneuver("", ahead, here), ROOM_FOR_CROSSING)
+        if goes.crossing > PATIENCE_CROSSING * self._judgment.patience:
+            return False
+        stops = predict_times_to_conflict(seen, Maneuver("", roll(seen.speed, -_HARD_BRAKING), here))
+        return stops.crossing > goes.crossing
+
     def _following_speed(self, seen: RoadSight) -> float:
         """Return the speed at which the car does not run into what is in front of it on its way, m/s."""
-        ahead, beside, half_length, half_width, speed, _ = seen.others.T
+        now, soon = np.moveaxis(seen.foresee(np.array([0.0, _SOON])), 1, 0)
+        ahead, beside, half_length, half_width = now.T
+        speed = (soon[:, 0] - ahead) / _SOON
         gaps = ahead - half_length - CAR_HALF_LENGTH
         to = seen.to_middle_of(self._target)
         reach = half_width + CAR_HALF_WIDTH + 0.3
@@ -152,11 +180,6 @@ class SteeringOperator:
         return float(
             np.min(np.minimum(np.sqrt(ahead_speed**2 + 2 * _BRAKING * room), ahead_speed + room / _HEADWAY))
         )
-
-
-def _middle(seen: RoadSight) -> float:
-    """Return how far the car's middle is to the left of the road's, m."""
-    return (seen.right - seen.left) / 2
 
 
 def _place_ahead(road: Floats, distance: float, beside: float) -> tuple[float, float]:

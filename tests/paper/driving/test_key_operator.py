@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from pdtui.paper.driving.key_operator import PRESSES_PER_SECOND, KeyOperator
 from pdtui.paper.driving.operator_memory import REACTION_TIME, sample_judgment_errors
 from pdtui.paper.driving.road_sight import RoadSight
+from pdtui.paper.driving.route_line import RouteLine
 from tests.paper.driving.sights import EFFECTS, LEFT_LANE, MIDDLE_LANE, RIGHT_LANE, car, cone, sight
 
 DELAY = 3
@@ -79,7 +81,7 @@ def test_it_does_not_press_more_often_than_a_hand_can() -> None:
     blocked = sight(cone(20.0, 0), car(3.0, 1, 10.0), car(3.0, -1, 10.0))
     keys = _keys([blocked, sight(speed=5.0)] * 150)
     pressed = [step for step, key in enumerate(keys) if key]
-    assert len(pressed) > 80
+    assert len(pressed) > 60
     assert min(np.diff(pressed)) < 3
     for first, later in zip(pressed, pressed[PRESSES_PER_SECOND:], strict=False):
         assert later - first >= 10
@@ -106,3 +108,36 @@ def test_no_two_operators_judge_alike_and_each_is_drawn_again() -> None:
     assert len({(one.distance, one.speed, one.patience) for one in drawn}) == 100
     assert abs(distances.mean() - 1.0) < 0.02
     assert 0.03 < distances.std() < 0.07
+
+
+def test_it_stops_in_time_for_a_car_that_crosses_the_road_and_goes_on_when_it_has_passed() -> None:
+    def crossing(aside: float, speed: float, ahead: float = 16.0) -> RoadSight:
+        return sight(car(ahead, aside, 8.0, yaw=np.pi / 2), speed=speed)
+
+    assert _first_key(crossing(-4.0, 8.0)) == "brake"
+    assert _first_key(crossing(4.0, 8.0)) == ""
+    keys = _keys([crossing(-4.0, 8.0)] * 4 + [crossing(-3.0, 0.0, 8.0)] * 10 + [crossing(4.0, 0.0, 8.0)] * 6)
+    assert [key for key in keys if key] == ["brake", "default"]
+    assert keys.index("default") == 14 + DELAY
+
+
+def test_it_leads_the_car_back_from_an_edge_and_lets_go_once_it_has_turned() -> None:
+    slipping = sight(lane=LEFT_LANE, aside=1.4, heading=0.05)
+    turned = sight(lane=LEFT_LANE, aside=1.4, heading=-0.2)
+    keys = _keys([slipping] * 5 + [turned] * 6)
+    assert [key for key in keys if key] == ["lane right", "default"]
+    assert keys.index("default") == 5 + DELAY
+
+
+def test_it_ends_a_lane_change_that_turns_the_car_too_far() -> None:
+    before = sight(cone(30.0, 0), lane=RIGHT_LANE)
+    askew = sight(cone(25.0, 0), lane=RIGHT_LANE, heading=0.5, aside=0.5)
+    keys = [key for key in _keys([before] * 4 + [askew] * 5) if key]
+    assert keys == ["lane left", "default"]
+
+
+def test_it_brakes_before_a_bend_that_is_too_sharp() -> None:
+    angles = np.linspace(0.0, 3.0, 60)
+    bend = RouteLine(9.0 * np.stack([np.sin(angles), 1.0 - np.cos(angles)], axis=1))
+    assert _first_key(replace(sight(speed=5.0), line=bend)) == ""
+    assert _first_key(replace(sight(speed=9.0), line=bend)) == "brake"

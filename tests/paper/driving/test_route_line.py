@@ -43,6 +43,13 @@ def test_a_route_that_crosses_itself_is_told_apart_by_where_the_car_was() -> Non
     assert later.tolist() == pytest.approx([49.8, 0.0, -math.pi / 2])
 
 
+def test_points_that_differ_by_rounding_give_the_line_no_direction_of_their_own() -> None:
+    joined = np.array([[0.0, 0.0], [10.0, 0.0], [10.0 - 1e-7, 1e-7], [20.0, 0.0]])
+    assert RouteLine(joined).locate(np.array([[10.0, 1.0]]))[0].tolist() == pytest.approx(
+        [10.0, 1.0, 0.0], abs=1e-6
+    )
+
+
 def test_a_point_is_no_line() -> None:
     with pytest.raises(RobotError, match="at least two different points, found 3"):
         RouteLine(np.ones((3, 2)))

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pdtui.core.attributes import Floats
-from pdtui.paper.driving.road_sight import CAR_HALF_LENGTH, CAR_HALF_WIDTH, LANE_WIDTH, ROAD_STEP, RoadSight
+from pdtui.paper.driving.road_sight import CAR_HALF_LENGTH, CAR_HALF_WIDTH, LANE_WIDTH, RoadSight
+from pdtui.paper.driving.route_line import RouteLine
 from pdtui.paper.driving.steering_operator import ManualControlValues, SteeringOperator
-from tests.paper.driving.sights import LEFT_LANE, MIDDLE_LANE, cone, sight
+from tests.paper.driving.sights import LEFT_LANE, MIDDLE_LANE, STRAIGHT_LINE, cone, sight
 
 DT, WHEELBASE, FULL_LOCK = 0.1, 2.47, math.radians(40.0)
 
@@ -25,22 +26,19 @@ class StraightRoad:
     def look(self) -> RoadSight:
         """What there is to see; the middle lane's middle is at 0."""
         others = [
-            [x - self.along, y - self.beside, 0.3, 0.3, 0.0, 0.0]
-            for x, y in self.things.tolist()
-            if abs(x - self.along) < 50.0
+            [x, y, 0.0, 0.3, 0.3, 0.0, 0.0] for x, y in self.things.tolist() if abs(x - self.along) < 50.0
         ]
-        ahead: Floats = np.arange(0.0, 50.0, ROAD_STEP)
-        cosine, sine = math.cos(self.heading), math.sin(self.heading)
-        road = np.stack([cosine * ahead - sine * self.beside, -sine * ahead - cosine * self.beside], axis=1)
         half = 1.5 * LANE_WIDTH
         return RoadSight(
+            STRAIGHT_LINE,
+            self.along,
+            self.beside,
             self.speed,
             self.heading,
             0.0,
             half - self.beside,
             half + self.beside,
-            np.array(others).reshape(-1, 6),
-            road,
+            np.array(others).reshape(-1, 7),
         )
 
     def step(self, controls: ManualControlValues) -> None:
@@ -111,16 +109,9 @@ def test_it_sees_late() -> None:
 @pytest.mark.parametrize("lane", [LEFT_LANE, MIDDLE_LANE])
 def test_it_slows_down_for_a_bend(lane: int) -> None:
     straight = sight(lane=lane, speed=12.0)
-    angles = np.arange(0.0, 50.0, ROAD_STEP) / 12.0
-    bend = RoadSight(
-        12.0,
-        0.0,
-        0.0,
-        straight.left,
-        straight.right,
-        straight.others,
-        12.0 * np.stack([np.sin(angles), 1.0 - np.cos(angles)], axis=1),
-    )
+    angles = np.linspace(0.0, 5.0, 40)
+    line = RouteLine(12.0 * np.stack([np.sin(angles), 1.0 - np.cos(angles)], axis=1))
+    bend = replace(straight, line=line)
     controls = []
     for seen in (straight, bend):
         operator = SteeringOperator(DT, always=True)
