@@ -215,9 +215,7 @@ def soak(
                 last.append(size)
             else:
                 sent = draw_input(drawn)
-                while (
-                    find_mouse_row(sent) in rows
-                ):  # on the line of keys, where one quits and one branches off
+                while find_mouse_row(sent) in rows:  # keys: one quits, one branches off
                     sent = draw_input(drawn)
                 last.append(sent)
                 terminal.send(sent)
