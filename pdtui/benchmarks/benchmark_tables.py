@@ -99,9 +99,10 @@ def cluster_benchmark_tables(result: ClusterBenchmark) -> Group:
         )
         measured.add_row(f"bytes of a chunk of {size}, sent and answered", f"{cost.bytes:,}")
     measured.add_row(
-        f"overhead per roll-out, {result.per_chunk} in a chunk", f"{1000 * result.overhead:.2f} ms"
+        f"overhead per roll-out, {result.per_chunk} in a chunk",
+        f"{1000 * result.overhead_per_rollout:.2f} ms",
     )
-    measured.add_row("bytes per roll-out, sent and answered", f"{result.bytes:.0f}")
+    measured.add_row("bytes per roll-out, sent and answered", f"{result.bytes_per_rollout:.0f}")
     measured.add_row("bytes of the policy, once per node", f"{result.file_bytes:,}")
     batches = [f"{one.batch}: {one.rollouts} roll-outs" for one in result.simulated]
     simulated = new_table("Larger clusters: simulated, not measured", "nodes", "cores", *batches)

@@ -10,8 +10,8 @@ from statistics import median
 
 import numpy as np
 
+from pdtui.benchmarks.cluster_cost_model import ChunkCost, estimate_batch_time, interpolate_cost
 from pdtui.benchmarks.matching_benchmark import time_call_in_seconds
-from pdtui.benchmarks.simulated_cluster import ChunkCost, interpolate_cost, simulate_batch
 from pdtui.core.cluster.ray_cluster import RayCluster
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
 from pdtui.core.units import Stimulation
@@ -81,12 +81,12 @@ class ClusterBenchmark:
     simulated: tuple[SimulatedScaling, ...]
 
     @property
-    def overhead(self) -> float:
+    def overhead_per_rollout(self) -> float:
         """Time that an idle cluster adds to a roll-out of the usual chunk, s."""
         return self.usual.latency / self.per_chunk
 
     @property
-    def bytes(self) -> float:
+    def bytes_per_rollout(self) -> float:
         """Bytes per roll-out that are sent and answered, in the usual chunk."""
         return self.usual.bytes / self.per_chunk
 
@@ -143,7 +143,7 @@ def bench_cluster(
             cores = nodes * cores_per_node
             rollouts = choose_chunk_size(size, steps, lockstep=lockstep, cores=cores)
             cost = interpolate_cost(single, usual, (rollouts - 1) / max(1, per_chunk - 1))
-            seconds.append(simulate_batch(-(-size // rollouts), cores, cost, BYTES_PER_SECOND))
+            seconds.append(estimate_batch_time(-(-size // rollouts), cores, cost, BYTES_PER_SECOND))
         return SimulatedScaling(batch, size, tuple(seconds))
 
     return ClusterBenchmark(

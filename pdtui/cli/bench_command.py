@@ -190,7 +190,7 @@ def bench_memory_command(
     default=15.0,
     show_default=True,
     metavar="SECONDS",
-    help="How long to measure each of the loop without a screen, the screen, and the screen with a ghost.",
+    help="How long to measure each of three: the loop without a screen, the screen, the screen with a ghost.",
 )
 @json_option
 def bench_screen_command(

@@ -45,15 +45,15 @@ def dynamics_command(
 ) -> None:
     """Follow the motor primitives of ROBOT's policy through its training.
 
-    As in figure 5 of the paper. FOLDER is that of a run of `pdtui train --checkpoints`; several are runs of
-    other seeds. What was measured is kept there, so that a run that was interrupted goes on.
+    As in figure 5 of the paper. FOLDER is a run of `pdtui train --checkpoints`; give several for runs with
+    other seeds. Measurements are kept there, so that an interrupted run can be continued.
     """
     from pdtui.pictures.picture_paths import check_picture_paths
     from pdtui.pictures.studies.learning_course import draw_learning_course
     from pdtui.robots import require_robot_name
     from pdtui.spectra.matching_presets import find_matching_preset
     from pdtui.study.dynamics.checkpoint_measurement import measure_learning_dynamics
-    from pdtui.study.dynamics.dynamics_summary import describe_learning_course
+    from pdtui.study.dynamics.dynamics_summary import build_learning_course
     from pdtui.study.dynamics.learning_dynamics import DynamicsSettings
 
     check_picture_paths(pictures, overwrite)
@@ -62,7 +62,7 @@ def dynamics_command(
     for folder in folders:
         with progress_bar(f"checkpoints of {folder.name}", quiet=as_json) as advance:
             runs.append(measure_learning_dynamics(name, folder, settings, every=every, progress=advance))
-    shown = describe_learning_course(runs)
+    shown = build_learning_course(runs)
     draw_learning_course(pictures, shown)
     print_result(dict(shown.summary), as_json, lambda: shown.table)
     if pictures and not as_json:

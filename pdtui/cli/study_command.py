@@ -40,7 +40,7 @@ def study_command() -> None:
     "plan_path",
     type=FILE_PATH,
     metavar="FILE",
-    help="Plan of the study; default: that of the guide.",
+    help="Plan of the study; default: the plan of the guide's page.",
 )
 @click.option("--data", type=FILE_PATH, metavar="FILE", help="Analyze these data instead of measuring.")
 @click.option(
@@ -73,12 +73,12 @@ def study_matching_command(
     from pdtui.study.matching.study_data import read_study_data, write_study_data
     from pdtui.study.matching.study_page import check_page_files, write_study_page
     from pdtui.study.matching.study_statistics import analyze_study
-    from pdtui.study.matching.study_tables import StudySummary, list_trained_policies
+    from pdtui.study.matching.study_tables import StudySummary, list_policies
 
     if only_list:
         plan = load_matching_study_plan(plan_path or MATCHING_STUDY_PLAN)
         found, missing = find_trained_policies(plan, policies)
-        listed = list_trained_policies(found, missing, str(policies))
+        listed = list_policies(found, missing, str(policies))
         print_result(listed.as_list(), as_json, listed.table)
         return
     if guide is not None:

@@ -30,8 +30,7 @@ from pdtui.training.training_config import TrainingConfig
 # First seeds of the episodes that select the best weights, and of those that its published score comes from.
 SELECTION_SEEDS, REPORT_SEEDS = 1_000_000, 2_000_000
 _ITERATIONS_PER_REPORT = 16
-_CHECKPOINTS = 50
-"""Parts of a run after each of which the policy is kept on request."""
+_CHECKPOINTS = 50  # parts of a run after each of which the policy is kept on request
 Config = TypeVar("Config", bound=TrainingConfig)
 
 
@@ -175,20 +174,19 @@ class PolicyTrainer(ABC, Generic[Config]):
             report: Called with the control steps so far, the score if there was an evaluation, and the best.
         """
         config, iterations = self.config, 0
-        if not self.steps and self.has_initial_policy:
-            report(0, self._evaluate(), self._best_score())
         if not self.steps:
+            if self.has_initial_policy:
+                report(0, self._evaluate(), self._best_score())
             self._keep_checkpoint(0)
         while self.steps < config.total_steps:
-            taken = self.advance()
+            taken, score = self.advance(), None
             self.steps += taken
             self._keep_checkpoint(taken)
-            score = None
             if self.steps % config.evaluate_every < taken or self.steps >= config.total_steps:
                 score = self._evaluate()
                 jax.block_until_ready(self.state)
-                further = self.progress(), self.further_arrays()
-                save_checkpoint(self.checkpoint, self.state, self.batches, self.rng, *further)
+                kept = self.state, self.batches, self.rng, self.progress(), self.further_arrays()
+                save_checkpoint(self.checkpoint, *kept)
             iterations += 1
             if score is not None or iterations % _ITERATIONS_PER_REPORT == 0:
                 report(self.steps, score, self._best_score())
@@ -196,8 +194,7 @@ class PolicyTrainer(ABC, Generic[Config]):
 
     def to_robot(self, squashed: NDArray[np.float32]) -> NDArray[np.float32]:
         """Rescale actions from (−1, 1) to the robot's bounds."""
-        scaled = self._low + (squashed + 1.0) * 0.5 * (self._high - self._low)
-        return scaled.astype(np.float32)
+        return (self._low + (squashed + 1.0) * 0.5 * (self._high - self._low)).astype(np.float32)
 
     def make_own_batch(self, seed: int) -> RobotBatch | None:
         """Return the batch of all robots that the recipe has a class for, if it has one."""
@@ -206,10 +203,10 @@ class PolicyTrainer(ABC, Generic[Config]):
 
     def _score(self, actor: Actor, first_seed: int) -> ActorScore:
         seeds = range(first_seed, first_seed + self.config.evaluate_episodes)
-        steps = self.config.evaluate_steps
         if not self._evaluated:
             count = min(self.config.evaluate_robots, self.config.evaluate_episodes)
             self._evaluated = [self.make() for _ in range(count)]
+        steps = self.config.evaluate_steps
         return score_actor(self._evaluated, lambda seen: self.to_robot(actor(seen)), seeds, steps)
 
     def _evaluate(self) -> ActorScore:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pdtui.benchmarks.simulated_cluster import ChunkCost, interpolate_cost, simulate_batch
+from pdtui.benchmarks.cluster_cost_model import ChunkCost, estimate_batch_time, interpolate_cost
 from pdtui.probing.rollout_pool import choose_chunk_size
 
 COST = ChunkCost(compute=1.0, latency=0.25, driver=0.1, bytes=1000)
@@ -27,7 +27,7 @@ FAST = 1e12
 def test_a_batch_takes_as_long_as_its_slowest_part(
     chunks: int, cores: int, network: float, seconds: float
 ) -> None:
-    assert simulate_batch(chunks, cores, COST, network) == pytest.approx(seconds)
+    assert estimate_batch_time(chunks, cores, COST, network) == pytest.approx(seconds)
 
 
 def test_the_cost_of_a_chunk_between_two_sizes() -> None:

@@ -16,7 +16,7 @@ from pdtui.search.gains.gain_search import (
     point_from_gains,
     sample_gain_points,
 )
-from pdtui.search.gains.gain_tuning import ANGLE_STEPS, FARTHEST_ANGLE, draw_angle_targets, tune_gains
+from pdtui.search.gains.gain_tuning import ANGLE_STEPS, FARTHEST_ANGLE, sample_angle_targets, tune_gains
 from pdtui.search.gains.tracking_drives import TrackingDriveRunner
 from pdtui.search.gains.tracking_summary import choose_tracking_targets
 from pdtui.stimulation.stimulation_map import PidGains
@@ -86,9 +86,9 @@ def test_what_is_no_angle_is_stepped_about_its_natural_value() -> None:
 
 
 def test_an_angle_is_stepped_otherwise_on_every_seed() -> None:
-    drawn = [draw_angle_targets(seed) for seed in range(2000, 2020)]
+    drawn = [sample_angle_targets(seed) for seed in range(2000, 2020)]
     assert len(set(drawn)) == 20
-    assert drawn[0] == draw_angle_targets(2000)
+    assert drawn[0] == sample_angle_targets(2000)
     steps = np.abs(np.diff(drawn))
     assert (np.abs(drawn) <= FARTHEST_ANGLE).all()
     assert (steps >= ANGLE_STEPS[0] - 0.01).all()

@@ -28,7 +28,7 @@ from tests.study.planted_study import PLAN, plant_study, small_plan
     [
         (10, 1.0, StudyAnswer.YES, "Yes, matching finds what steers: on 10 policies, the first match is"),
         (10, 0.35, StudyAnswer.SELDOM, "Better than chance, but seldom: on 10 policies"),
-        (10, 0.0, StudyAnswer.NO, "No, matching does not find what steers: on 10 policies"),
+        (10, 0.0, StudyAnswer.NO, "No evidence that matching finds what steers: on 10 policies"),
         (5, 1.0, StudyAnswer.UNKNOWN, "Unknown: 5 policies that walk are too few"),
     ],
 )

@@ -24,7 +24,7 @@ cluster_option = click.option(
     "--cluster",
     metavar="auto|HOST:PORT",
     callback=_join_cluster,
-    help="Run on the Ray cluster with this head node, or with auto on the cluster of this machine.",
+    help="Run on the Ray cluster with this head node; auto: the one joined here, or one of its own.",
 )
 """``--cluster``; the command gets the `RayCluster`, or None."""
 

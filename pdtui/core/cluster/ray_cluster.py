@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from pdtui.core.closable import Closable
-from pdtui.core.cluster.node_worker import StateRecipe, collect_environment, describe_installation, run_job
+from pdtui.core.cluster.node_jobs import StateRecipe, collect_environment, describe_installation, run_job
 from pdtui.core.cluster.ray_worker import RayWorker, describe_ray_error
 from pdtui.core.errors import ClusterError, WorkerError
 from pdtui.core.processes.call_answer import take_answer
@@ -63,14 +63,14 @@ class RayCluster(Closable):
     @property
     def cores(self) -> int:
         """Number of cores that the cluster has now."""
-        ray = self.join()
+        ray = self.connect()
         resources: dict[str, float] = ray.cluster_resources()
         return int(resources.get("CPU", 0))
 
     def close(self) -> None:
         """Leave the cluster; one of this machine alone ends."""
         if self._joined:
-            self.join().shutdown()
+            self.connect().shutdown()
         self._files.clear()
         self._found = self._joined = False
 
@@ -88,7 +88,7 @@ class RayCluster(Closable):
             raise ClusterError(f"{path}: cannot be read: {error.strerror}") from error
         name = f"./{sha256(content).hexdigest()}/{path.name}"
         if name not in self._files:
-            self._files[name] = self.join().put(content)
+            self._files[name] = self.connect().put(content)
         return name
 
     def start_worker(self, name: str, build: Callable[..., Any], *arguments: Any) -> RayWorker:
@@ -100,7 +100,7 @@ class RayCluster(Closable):
         recipe = StateRecipe(
             build, arguments, describe_installation(), collect_environment(), dict(self._files)
         )
-        return [self.join().put(recipe)]
+        return [self.connect().put(recipe)]
 
     def as_completed(
         self, name: str, recipe: list[Any], function: Callable[..., Any], jobs: Sequence[Any]
@@ -117,7 +117,7 @@ class RayCluster(Closable):
             WorkerError: A job lost its process or its node `RUNS_PER_JOB` times.
             ClusterError: A node has other versions.
         """
-        ray = self.join()
+        ray = self.connect()
         remote = ray.remote(run_job).options(num_cpus=1, max_retries=RUNS_PER_JOB - 1, name=f"pdtui {name}")
         waiting = iter(enumerate(jobs))
         most = max(_LEAST_WAITING, _WAITING_PER_CORE * self.cores)
@@ -139,8 +139,8 @@ class RayCluster(Closable):
             if running:  # the end of this process may follow, and Ray does not like to be interrupted
                 ray.wait(list(running), num_returns=len(running), timeout=_CANCEL_SECONDS)
 
-    def join(self) -> Any:
-        """Join the cluster if this process has not yet, and return the module of Ray.
+    def connect(self) -> Any:
+        """Connect to the cluster if this process has not yet, and return the module of Ray.
 
         Raises:
             ClusterError: There is no cluster, or no node of it has cores.

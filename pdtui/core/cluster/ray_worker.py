@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from pdtui.core.closable import Closable
-from pdtui.core.cluster.node_worker import build_state
+from pdtui.core.cluster.node_jobs import build_state
 from pdtui.core.errors import WorkerError
 from pdtui.core.processes.call_answer import CallAnswer, answer_call, take_answer
 

@@ -33,7 +33,7 @@ class BackgroundWorker(Closable):
         """Whether a piece of work is under way."""
         return self._thread is not None and self._thread.is_alive()
 
-    def start(self, work: Callable[[WorkerProcess], None], note_failure: Callable[[str], None]) -> None:
+    def submit(self, work: Callable[[WorkerProcess], None], note_failure: Callable[[str], None]) -> None:
         """Begin a piece of work.
 
         Args:

@@ -51,7 +51,7 @@ class UnitSearchProcess(Closable):
             ranges: what the units put out by themselves.
         """
         self.state = UnitSearchSnapshot("loading", request=request)
-        self._worker.start(
+        self._worker.submit(
             lambda worker: self._search(worker, request, start, column, ranges),
             lambda said: self.fail(request, f"no search: {said}"),
         )

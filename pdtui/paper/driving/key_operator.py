@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from pdtui.paper.driving.key_effects import ACCELERATE, BRAKE, DEFAULT, LEFT, RIGHT, KeyEffects
-from pdtui.paper.driving.key_maneuvers import KeyManeuvers
 from pdtui.paper.driving.maneuver import (
     HORIZON,
     INWARDS,
@@ -17,6 +16,7 @@ from pdtui.paper.driving.maneuver import (
     predict_times_to_conflict,
     slips_off,
 )
+from pdtui.paper.driving.maneuver_predictor import ManeuverPredictor
 from pdtui.paper.driving.operator_memory import JudgmentErrors, OperatorMemory
 from pdtui.paper.driving.road_sight import LANE_WIDTH, RoadSight
 
@@ -63,7 +63,7 @@ class KeyOperator:
     def __init__(self, effects: KeyEffects, dt: float, judgment: JudgmentErrors | None = None) -> None:
         self._dt, self._patience = dt, (judgment or JudgmentErrors()).patience
         self._memory = OperatorMemory(dt, judgment or JudgmentErrors())
-        self._keys = KeyManeuvers(effects, dt)
+        self._keys = ManeuverPredictor(effects, dt)
         self._second = math.ceil(1.0 / dt - 1e-9)
         self._rolled, self._aim, self._askew = 0, 0.0, _ASKEW
 
@@ -80,7 +80,7 @@ class KeyOperator:
             self._rolled = self._keys.step
         if self._hand_is_busy():
             return ""
-        key = self._choose(self._keys.apply_own(seen))
+        key = self._choose(self._keys.predict_sight(seen))
         if key:
             self._keys.press(key)
         return key
@@ -90,7 +90,7 @@ class KeyOperator:
         return len(presses) == PRESSES_PER_SECOND and self._keys.step - presses[0][0] < self._second
 
     def _choose(self, seen: RoadSight) -> str:
-        latched, _ = self._keys.latched()
+        latched, _ = self._keys.find_active_key()
         if latched == BRAKE:
             return self._release(seen)
         if min(self._halted_time(), self._keys.time_since(DEFAULT)) > _HALTED_TIME:
@@ -121,7 +121,7 @@ class KeyOperator:
     def _options(self, seen: RoadSight, expected: TimesToConflict) -> list[Maneuver]:
         """Return what may be done: keys for lanes, where nobody crosses the road, and in time the brake."""
         options = []
-        if self._keys.latched()[0] in (LEFT, RIGHT):
+        if self._keys.find_active_key()[0] in (LEFT, RIGHT):
             options.append(self._keys.let_go(seen))
         if expected.crossing > expected.first:
             options += self._keys.lane_changes(seen)
@@ -134,7 +134,7 @@ class KeyOperator:
         others = min(expected.standing, expected.moving, expected.crossing)
         if min(others, edge) < URGENT:
             return True
-        if self._keys.time_since(LEFT, RIGHT) < self._keys.change_time() + _SETTLING:
+        if self._keys.time_since(LEFT, RIGHT) < self._keys.longest_lane_pulse() + _SETTLING:
             return False
         return (
             expected.standing < PATIENCE_STANDING * self._patience

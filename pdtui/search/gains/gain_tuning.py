@@ -146,7 +146,7 @@ def tune_gains(
         return results
 
 
-def draw_angle_targets(seed: int) -> tuple[float, ...]:
+def sample_angle_targets(seed: int) -> tuple[float, ...]:
     """Draw targets of an angle for one drive, rad: 0, and steps of `ANGLE_STEPS` either way."""
     rng, targets = np.random.default_rng(seed), [0.0]
     while len(targets) < _TARGETS:
@@ -183,7 +183,7 @@ def _tune_behavior(
     old, half = behavior.pid, len(seeds) // 2
     attribute = runner.attribute(old.attribute)
     if attribute.wraps:
-        targets = {seed: draw_angle_targets(seed) for seed in seeds}
+        targets = {seed: sample_angle_targets(seed) for seed in seeds}
     else:
         targets = dict.fromkeys(seeds, choose_tracking_targets(runner, behavior, seeds[: min(3, half)]))
     spans = np.array([targets[seed] for seed in seeds[:half]])

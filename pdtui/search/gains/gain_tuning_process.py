@@ -85,7 +85,7 @@ class GainTuningProcess(Closable):
         if self._worker.is_busy:
             return "a tuning is under way; it ends by itself"
         self.state = GainTuningState("loading", behavior)
-        self._worker.start(
+        self._worker.submit(
             lambda worker: self._tune(worker, behavior),
             lambda said: self._note(GainTuningState("failed", behavior, f"no tuning: {said}")),
         )

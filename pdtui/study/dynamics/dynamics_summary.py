@@ -32,7 +32,7 @@ def _correlations(run: LearningDynamics) -> dict[str, CorrelationInterval]:
     return {
         "discrepancy and return": run.correlate_with_discrepancy(run.returns),
         "discrepancy and success": run.correlate_with_discrepancy(run.success),
-        "discrepancy of all units and return": run.correlate_usual_with(run.returns),
+        "discrepancy of all units and return": run.correlate_with_mean_discrepancy(run.returns),
         "effect and return": run.correlate_with_effect(run.returns),
     }
 
@@ -51,7 +51,7 @@ def dynamics_table(runs: Sequence[LearningDynamics]) -> Table:
     return table
 
 
-def describe_learning_course(runs: Sequence[LearningDynamics]) -> LearningCourse:
+def build_learning_course(runs: Sequence[LearningDynamics]) -> LearningCourse:
     """Return what the pictures of some runs of one robot show."""
 
     def by_attribute(run: LearningDynamics, values: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, Any]:
@@ -59,7 +59,7 @@ def describe_learning_course(runs: Sequence[LearningDynamics]) -> LearningCourse
 
     discrepancies, effects, scores = [], [], []
     for run in runs:
-        own, all_units = run.normalized_discrepancies(), run.usual_normalized_discrepancies()
+        own, all_units = run.normalized_discrepancies(), run.normalized_mean_discrepancies()
         discrepancies.append(
             [
                 CourseCurve("final primitives", mean_known(own), by_attribute(run, own)),

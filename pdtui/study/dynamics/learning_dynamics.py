@@ -75,7 +75,7 @@ class CheckpointMeasurement:
         steps: Control steps of training.
         mean_return, success: Mean return, and share of the episodes that end without a failure.
         discrepancies: Discrepancy of each primitive and its attribute.
-        usual_discrepancies: Mean over all units of the discrepancy with each attribute.
+        mean_discrepancies: Mean over all units of the discrepancy with each attribute.
         effects: Largest mean effect of each primitive on its attribute, in size, in standard deviations of
             the attribute in the last checkpoint. A fall counts as none.
         random_effects: The same of a unit drawn at random.
@@ -85,7 +85,7 @@ class CheckpointMeasurement:
     mean_return: float
     success: float
     discrepancies: tuple[float, ...]
-    usual_discrepancies: tuple[float, ...]
+    mean_discrepancies: tuple[float, ...]
     effects: tuple[float, ...]
     random_effects: tuple[float, ...]
 
@@ -135,9 +135,9 @@ class LearningDynamics:
         """Return discrepancies from 0, the least of an attribute's course, to 1, shape (C, attributes)."""
         return _normalize(np.array([one.discrepancies for one in self.checkpoints]))
 
-    def usual_normalized_discrepancies(self) -> Floats:
+    def normalized_mean_discrepancies(self) -> Floats:
         """Return the same of the mean over all units, each normalized by its own course."""
-        return _normalize(np.array([one.usual_discrepancies for one in self.checkpoints]))
+        return _normalize(np.array([one.mean_discrepancies for one in self.checkpoints]))
 
     def effects(self, random: bool = False) -> Floats:
         """Return effects of the primitives, or of random units, shape (C, attributes)."""
@@ -147,9 +147,9 @@ class LearningDynamics:
         """Correlate the mean normalized discrepancy of each checkpoint with its score, shape (C,)."""
         return correlate_course(mean_known(self.normalized_discrepancies()), scores)
 
-    def correlate_usual_with(self, scores: Floats) -> CorrelationInterval:
+    def correlate_with_mean_discrepancy(self, scores: Floats) -> CorrelationInterval:
         """Correlate the same of all units with the scores."""
-        return correlate_course(mean_known(self.usual_normalized_discrepancies()), scores)
+        return correlate_course(mean_known(self.normalized_mean_discrepancies()), scores)
 
     def correlate_with_effect(self, scores: Floats) -> CorrelationInterval:
         """Correlate the mean effect of the primitives of each checkpoint with its score, shape (C,)."""

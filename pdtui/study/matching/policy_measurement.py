@@ -85,7 +85,7 @@ def measure_studied_policy(
         units = tuple(roles)
         choosing = _probe(prober, units, settings, False, stage("probe to choose"))
         held_out = _probe(prober, units, settings, True, stage("probe on held-out starts"))
-        measured = describe_measured_units(
+        measured = summarize_measured_units(
             plan, policy.name, episodes, pool, matchings, columns, roles, (choosing, held_out)
         )
         counted = replace(facts, units=pool.policy.units, rollouts=pool.rollouts)
@@ -135,7 +135,7 @@ def _probe(
     )
 
 
-def describe_measured_units(
+def summarize_measured_units(
     plan: MatchingStudyPlan,
     name: str,
     episodes: Sequence[MonitoredEpisode],

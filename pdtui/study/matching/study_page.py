@@ -14,13 +14,7 @@ from pdtui.core.errors import StudyError
 from pdtui.pictures.rerun_report_file import rows_to_markdown
 from pdtui.pictures.studies.compared_means import ComparedMean, ComparisonPanel, draw_compared_means
 from pdtui.study.matching.study_data import MatchingStudyData, PolicyFacts
-from pdtui.study.matching.study_statistics import (
-    MEASURES,
-    PolicyFigures,
-    StudyAnswer,
-    StudyResult,
-    TestedMean,
-)
+from pdtui.study.matching.study_statistics import MEASURES, PolicyMeans, StudyAnswer, StudyResult, TestedMean
 
 PAGE = "matching-study.md"
 _TEMPLATE = Path(__file__).with_name("study_page_template.md")
@@ -41,7 +35,7 @@ def answer_in_one_sentence(data: MatchingStudyData, result: StudyResult) -> str:
     words = {
         StudyAnswer.YES: "Yes, matching finds what steers",
         StudyAnswer.SELDOM: "Better than chance, but seldom",
-        StudyAnswer.NO: "No, matching does not find what steers",
+        StudyAnswer.NO: "No evidence that matching finds what steers",
     }
     return f"{words[result.answer]}: {means}."
 
@@ -140,7 +134,7 @@ def _group_table(data: MatchingStudyData, result: StudyResult, group: Callable[[
         if not figures:
             continue
 
-        def mean(read: Callable[[PolicyFigures], float], some: Sequence[PolicyFigures] = figures) -> str:
+        def mean(read: Callable[[PolicyMeans], float], some: Sequence[PolicyMeans] = figures) -> str:
             values = np.array([read(one) for one in some])
             known = values[np.isfinite(values)]
             return f"{known.mean():.2f}" if len(known) else "–"

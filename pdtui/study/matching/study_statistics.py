@@ -29,7 +29,7 @@ class StudyAnswer(StrEnum):
 
 
 @dataclass(frozen=True)
-class PolicyFigures:
+class PolicyMeans:
     """Means over the attributes of one policy.
 
     Attributes:
@@ -82,7 +82,7 @@ class StudyResult:
         answer: The answer by the rule of the plan.
     """
 
-    figures: tuple[PolicyFigures, ...]
+    figures: tuple[PolicyMeans, ...]
     variants: dict[str, tuple[TestedMean, ...]]
     random: TestedMean
     probing: TestedMean
@@ -163,13 +163,11 @@ def _mean(
     return TestedMean(float(values[known].mean()), low, high, difference, p, corrected)
 
 
-def _describe_policy(
-    name: str, measured: Sequence[MeasuredUnits], quantile: float, best: int
-) -> PolicyFigures:
+def _describe_policy(name: str, measured: Sequence[MeasuredUnits], quantile: float, best: int) -> PolicyMeans:
     rows = [_describe_attribute(one, quantile, best) for one in measured]
     variants = _nanmean(np.array([row[0] for row in rows]))
     others = _nanmean(np.array([row[1:] for row in rows], np.float64)).tolist()
-    return PolicyFigures(name, len(rows), variants, *others)
+    return PolicyMeans(name, len(rows), variants, *others)
 
 
 def _nanmean(values: Floats) -> Floats:
@@ -183,7 +181,7 @@ def _nanmean(values: Floats) -> Floats:
 def _describe_attribute(
     one: MeasuredUnits, quantile: float, best: int
 ) -> tuple[Floats, float, float, float, float]:
-    """Return the figures of one attribute, in the order of the fields of `PolicyFigures`."""
+    """Return the figures of one attribute, in the order of the fields of `PolicyMeans`."""
     choosing, first, second = (_strength(group) for group in one.effects)
     held_out_effects = one.effects[1:].mean(axis=0)
     held_out = _strength(held_out_effects)

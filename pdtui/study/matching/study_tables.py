@@ -75,7 +75,7 @@ class ListedPolicies:
         return [{"policy": name, "trained": trained, "command": one} for name, trained, one in self.rows]
 
 
-def list_trained_policies(
+def list_policies(
     found: Iterable[StudiedPolicy], missing: Iterable[StudiedPolicy], folder: str
 ) -> ListedPolicies:
     """Return the policies that are trained, and then the others."""

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pdtui.core.cluster.node_worker import lock_folder
+from pdtui.core.cluster.node_jobs import lock_folder
 from pdtui.core.cluster.ray_cluster import RayCluster
 from pdtui.core.errors import ClusterError, RobotError, WorkerError
 from pdtui.core.processes.worker_pool import WorkerPool
@@ -211,7 +211,7 @@ def test_worlds_on_a_cluster_step_alike_and_go_on_from_a_kept_state(cluster: Ray
 @pytest.mark.parametrize("address", ["nowhere", "127.0.0.1:1", "ray://127.0.0.1:10001", "127.0.0.1:99999999"])
 def test_an_address_without_a_cluster_is_told_in_one_line(address: str) -> None:
     with pytest.raises(ClusterError, match="cluster") as caught:
-        RayCluster(address).join()
+        RayCluster(address).connect()
     assert "\n" not in str(caught.value)
 
 

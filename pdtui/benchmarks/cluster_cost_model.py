@@ -37,7 +37,7 @@ def interpolate_cost(small: ChunkCost, large: ChunkCost, share: float) -> ChunkC
     )
 
 
-def simulate_batch(chunks: int, cores: int, cost: ChunkCost, bytes_per_second: float) -> float:
+def estimate_batch_time(chunks: int, cores: int, cost: ChunkCost, bytes_per_second: float) -> float:
     """Return the time that a batch of equal chunks takes, s.
 
     The driver sends one chunk after another, to whichever core is free first. It does nothing else at the

@@ -18,7 +18,7 @@ _SPEEDING_UP, _CRUISING = 2.0, 8.0
 """How a slow car is expected to get faster, m/s², and the speed up to which, m/s."""
 
 
-class KeyManeuvers:
+class ManeuverPredictor:
     """The keys pressed so far, and what each key would do now.
 
     Args:
@@ -40,17 +40,17 @@ class KeyManeuvers:
         steps = [step for step, key in self.presses if not keys or key in keys]
         return (self.step - steps[-1]) * self._dt if steps else math.inf
 
-    def latched(self) -> tuple[str, float]:
-        """Return the key that still acts, and for how long, s."""
+    def find_active_key(self) -> tuple[str, float]:
+        """Return the key that still acts, and the time left until it ends, s."""
         if not self.presses:
             return "", 0.0
         key = self.presses[-1][1]
         left = self._effects.periods.get(key, math.inf) - self.time_since()
         return (key, left) if left > 0.0 and key != DEFAULT else ("", 0.0)
 
-    def apply_own(self, seen: RoadSight) -> RoadSight:
+    def predict_sight(self, seen: RoadSight) -> RoadSight:
         """Return what is seen with what is to be expected of a key that was pressed after that moment."""
-        key, _ = self.latched()
+        key, _ = self.find_active_key()
         since = min(self.time_since(), REACTION_TIME)
         if key == BRAKE:
             slower = min(seen.speed, self._effects.deceleration * since)
@@ -60,8 +60,8 @@ class KeyManeuvers:
             return replace(seen, heading=seen.heading + turned)
         return seen
 
-    def change_time(self) -> float:
-        """Return how long the lane keys act at most, s."""
+    def longest_lane_pulse(self) -> float:
+        """Return how long the lane key that acts longer does, s."""
         return max(self._effects.pulse(LEFT), self._effects.pulse(RIGHT))
 
     def stopping_distance(self, speed: float) -> float:
@@ -70,7 +70,7 @@ class KeyManeuvers:
 
     def go_on(self, seen: RoadSight) -> Maneuver:
         """Return how the car goes on with the key that still acts."""
-        return self._turn(seen, *self.latched())
+        return self._turn(seen, *self.find_active_key())
 
     def let_go(self, seen: RoadSight) -> Maneuver:
         """Return how the car goes on after the default key."""
@@ -86,7 +86,7 @@ class KeyManeuvers:
 
         There must be a lane on that side, unless the car is turned away from it.
         """
-        latched, left = self.latched()
+        latched, left = self.find_active_key()
         return [
             self._turn(seen, key, count * self._effects.pulse(key))
             for key, side in ((LEFT, 1), (RIGHT, -1))
@@ -98,7 +98,7 @@ class KeyManeuvers:
     def _turn(self, seen: RoadSight, key: str, duration: float) -> Maneuver:
         """Return how the car goes on with a key for some time and without one afterwards."""
         ahead = roll(seen.speed, _SPEEDING_UP, max(seen.speed, _CRUISING))
-        latched, _ = self.latched()
+        latched, _ = self.find_active_key()
         turn_now = self._effects.turn(latched) if latched in (LEFT, RIGHT) else 0.0
         turn = self._effects.turn(key) if key in (LEFT, RIGHT) else 0.0
         begins = 0.0 if key == latched else KEY_DELAY
