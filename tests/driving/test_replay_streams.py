@@ -12,13 +12,13 @@ import pytest
 
 from pdtui.core.drive_events import DriveEvent
 from pdtui.core.errors import SessionError
+from pdtui.core.processes import installed_packages
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.replays.replay_result import ReplayResult
 from pdtui.driving.replays.step_by_step_comparison import StepByStepComparison
 from pdtui.driving.session_replay import replay_session
-from pdtui.sessions import environment_versions
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_schema import ActivationsKept
@@ -144,7 +144,7 @@ def test_a_forged_session_is_refused_here(forgery: str, drive: Drive, tmp_path: 
 
 def _replay_elsewhere(path: Path, monkeypatch: pytest.MonkeyPatch) -> ReplayResult:
     """Replay as if a library of another version were installed here."""
-    monkeypatch.setattr(environment_versions, "version", lambda _: "0.0.1")
+    monkeypatch.setattr(installed_packages, "version", lambda _: "0.0.1")
     return replay_session(path)
 
 

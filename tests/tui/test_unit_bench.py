@@ -300,9 +300,12 @@ async def test_an_overwritten_cell_is_marked_in_place_and_an_unnatural_output_as
         assert "0:40 0.10→0.50 " in strip
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
+@pytest.mark.parametrize(
+    ("value", "sizes"),
+    [(np.nan, ((81, 25), (3, 17), (1, 1), (80, 24))), (np.inf, ((200, 60),)), (1e300, ((80, 24),))],
+)
 async def test_odd_numbers_and_tiny_terminals_do_no_harm(
-    make_app: MakeApp, drive: Drive, value: float
+    make_app: MakeApp, drive: Drive, value: float, sizes: tuple[tuple[int, int], ...]
 ) -> None:
     facts, snapshots = drive
     first = snapshots[0]
@@ -322,7 +325,7 @@ async def test_odd_numbers_and_tiny_terminals_do_no_harm(
     app, connection = make_app([facts, *(replace(shot, step=step) for step in range(1, 6))])
     async with app.run_test(size=(80, 24)) as pilot:
         await played(pilot, connection)
-        for size in ((80, 24), (81, 25), (200, 60), (3, 17), (1, 1), (80, 24)):
+        for size in sizes:
             await pilot.resize_terminal(*size)
             for _ in range(4):
                 await pilot.press(*(["ctrl+e"] if not app.query_one("#bench").display else []), "tab")
