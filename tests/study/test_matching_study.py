@@ -176,7 +176,7 @@ def test_a_small_study_from_policies_to_the_page(trained: Path, tmp_path: Path) 
     options = ("--plan", trained / "plan.toml", "--policies", trained, "--folder", folder, "--workers", "1")
     first = _run(*options, "--guide", guide)
     assert first.exit_code == 0, first.output
-    assert "Matching and steering: 1 of the 3 policies planned" in first.stdout
+    assert "Matching and steering: 1 of the 3 policies wanted" in first.stdout
     assert "Unknown: one policy that walks is too few" in first.stdout
     page = (guide / "matching-study.md").read_text()
     assert "1 more were trained, but do not walk by the rule of the plan" in page
