@@ -47,7 +47,7 @@ def check_command(words: list[str], *, whole: bool) -> None:
         click.ClickException: a command, an option or an argument does not exist.
     """
     group: click.Command = main
-    context = click.Context(main, info_name="pdtui")
+    context = click.Context(main, info_name="pdtui", **main.context_settings)
     rest = list(words)
     while isinstance(group, click.Group) and rest and not rest[0].startswith("-"):
         name, *rest = rest

@@ -18,7 +18,7 @@ with 1.
 
 def render_command_reference(program: click.Group, name: str) -> str:
     """Return the Markdown of every command of a program, subcommands after their group."""
-    context = click.Context(program, info_name=name)
+    context = click.Context(program, info_name=name, **program.context_settings)
     return "\n".join([_HEAD, *_sections(program, context)])
 
 
