@@ -15,22 +15,12 @@ pytest.importorskip("jax", reason="the extra 'train' is not installed")
 
 from pdtui.training.remote.remote_robot_batch import RemoteRobotBatch
 from pdtui.training.robot_batch import RobotBatch
+from tests.batch_agreement import check_worlds_are_the_same
 
 
 def test_they_step_alike_and_go_on_from_a_kept_state() -> None:
     here, there = RobotBatch(partial(make_robot, "ant"), 2, 5), RemoteRobotBatch("ant", {}, 2, 5)
-    actions = np.random.default_rng(0).uniform(-1, 1, (12, 2, 8)).astype(np.float32)
-    for action in actions[:6]:
-        for mine, theirs in zip(here.step(action), there.step(action), strict=True):
-            np.testing.assert_array_equal(mine, theirs)
-    kept = there.state()
-    first = [there.step(action) for action in actions[6:]]
-    there.restore(kept)
-    for action, expected in zip(actions[6:], first, strict=True):
-        for again, rows, local in zip(there.step(action), expected, here.step(action), strict=True):
-            np.testing.assert_array_equal(again, rows)
-            np.testing.assert_array_equal(local, rows)
-    np.testing.assert_array_equal(here.observations, there.observations)
+    check_worlds_are_the_same(here, there)
     np.testing.assert_array_equal(here.restarted, there.restarted)
 
 

@@ -24,6 +24,7 @@ from pdtui.probing.start_states import collect_start_states
 from pdtui.robots import make_robot
 from pdtui.training.remote.spread_robot_batch import SpreadRobotBatch
 from pdtui.training.robot_batch import RobotBatch
+from tests.batch_agreement import check_worlds_are_the_same
 from tests.core.processes.test_worker_pool import count_calls, divide, fail_on_three, fail_to_build
 from tests.local_cluster import local_cluster
 
@@ -193,18 +194,7 @@ def test_roll_outs_are_those_of_one_machine_though_the_file_is_only_there(
 def test_worlds_on_a_cluster_step_alike_and_go_on_from_a_kept_state(cluster: RayCluster) -> None:
     here = RobotBatch(partial(make_robot, "ant"), 3, 5)
     there = SpreadRobotBatch("ant", {}, 3, 5, cluster, 2)
-    actions = np.random.default_rng(0).uniform(-1, 1, (12, 3, 8)).astype(np.float32)
-    for action in actions[:6]:
-        for mine, theirs in zip(here.step(action), there.step(action), strict=True):
-            np.testing.assert_array_equal(mine, theirs)
-    kept = there.state()
-    first = [there.step(action) for action in actions[6:]]
-    there.restore(kept)
-    for action, expected in zip(actions[6:], first, strict=True):
-        for again, rows, local in zip(there.step(action), expected, here.step(action), strict=True):
-            np.testing.assert_array_equal(again, rows)
-            np.testing.assert_array_equal(local, rows)
-    np.testing.assert_array_equal(here.observations, there.observations)
+    check_worlds_are_the_same(here, there)
     there.close()
 
 
