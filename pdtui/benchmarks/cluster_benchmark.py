@@ -12,14 +12,14 @@ import numpy as np
 
 from pdtui.benchmarks.cluster_cost_model import ChunkCost, estimate_batch_time, interpolate_cost
 from pdtui.benchmarks.matching_benchmark import time_call_in_seconds
+from pdtui.benchmarks.random_rollouts import draw_rollout_jobs
 from pdtui.core.cluster.ray_cluster import RayCluster
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
-from pdtui.core.units import Stimulation
 from pdtui.dissection.dissection_config import DissectionSettings
 from pdtui.policies.weights.weights_file import find_weights_file
 from pdtui.probing.rollout_pool import RolloutChunk, RolloutPool, choose_chunk_size
 from pdtui.probing.start_states import collect_start_states
-from pdtui.probing.stimulated_rollout import RolloutJob, RolloutOutcome
+from pdtui.probing.stimulated_rollout import RolloutOutcome
 from pdtui.robots import RobotSpec
 
 NODES = (1, 2, 4, 8, 16, 32, 64)
@@ -114,12 +114,8 @@ def bench_cluster(
         RolloutPool(robot, policy, cluster) as spread,
     ):
         starts = collect_start_states(alone.robot, alone.policy, _FIRST_SEED, _STARTS, at=_AT)
-        rng = np.random.default_rng(0)
         units = alone.policy.units
-        jobs: list[RolloutJob] = [
-            (Stimulation((int(rng.integers(units)),), (float(rng.normal(0, 3)),)), number % _STARTS)
-            for number in range(rollouts)
-        ]
+        jobs = draw_rollout_jobs(rollouts, units, _STARTS)
         pools = (alone, processes, spread)
         for pool in pools:  # starts the processes before the clock
             outcomes = pool.run(jobs, starts, steps, 0)

@@ -16,12 +16,11 @@ from pdtui.benchmarks.matching_benchmark import (
     measure_matching_memory,
     time_call_in_seconds,
 )
+from pdtui.benchmarks.random_rollouts import draw_rollout_jobs
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PdtuiError
-from pdtui.core.units import Stimulation
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
-from pdtui.probing.stimulated_rollout import RolloutJob
 from pdtui.robots import RobotSpec
 from pdtui.spectra.episode_monitor import MonitoredEpisode, monitor_episodes
 from pdtui.spectra.matching import UnitDiscrepancies, match_units
@@ -159,12 +158,8 @@ def bench_dissection(
 
 def measure_probing_rate(one: RolloutPool, two: RolloutPool, settings: DissectionBenchmarkSettings) -> Floats:
     """Return stimulated control steps per second with one and two workers, in turn, shape (rounds, 2)."""
-    rng = np.random.default_rng(0)
     starts = collect_start_states(one.robot, one.policy, 1100, 2, at=50)
-    jobs: list[RolloutJob] = [
-        (Stimulation((int(rng.integers(one.policy.units)),), (float(rng.normal(0, 3)),)), number % 2)
-        for number in range(settings.probes)
-    ]
+    jobs = draw_rollout_jobs(settings.probes, one.policy.units, len(starts))
     two.run(jobs, starts, 1, 0)  # start the worker processes before the clock
 
     def rate(pool: RolloutPool) -> float:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdtui.benchmarks.matching_benchmark import time_call_in_seconds
+from pdtui.benchmarks.random_rollouts import draw_rollout_jobs
 from pdtui.core.errors import PdtuiError
 from pdtui.core.processes.worker_pool import StepProgress
-from pdtui.core.units import Stimulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.rollout_batch import run_rollouts
 from pdtui.probing.rollout_pool import RolloutPool
@@ -115,13 +115,9 @@ def bench_rollouts(
 
 def _share_out(pool: RolloutPool, rollouts: int, steps: int) -> list[_RolloutShare]:
     """Return roll-outs in parts, each from the same few starts."""
-    rng = np.random.default_rng(0)
     starts = dict(enumerate(collect_start_states(pool.robot, pool.policy, _FIRST_SEED, _STARTS, at=_AT)))
     actions = {index: _walk_on(pool.robot, pool.policy, start, steps) for index, start in starts.items()}
-    jobs: list[RolloutJob] = [
-        (Stimulation((int(rng.integers(pool.policy.units)),), (float(rng.normal(0, 3)),)), number % _STARTS)
-        for number in range(rollouts)
-    ]
+    jobs = draw_rollout_jobs(rollouts, pool.policy.units, _STARTS)
     parts = [jobs[low : low + _PER_PART] for low in range(0, rollouts, _PER_PART)]
     return [_RolloutShare(part, starts, actions, steps) for part in parts]
 
