@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import pytest
@@ -13,21 +12,10 @@ from pdtui.driving.headless_drive import events_of_pressed_keys
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.unit_bench.unit_search_process import choose_best
 from pdtui.driving.unit_bench.unit_search_rollouts import rank_candidates, run_search_rollout
-from pdtui.driving.unit_bench.unit_search_snapshot import FoundUnit, UnitSearchRequest, UnitSearchSnapshot
+from pdtui.driving.unit_bench.unit_search_snapshot import FoundUnit, UnitSearchRequest
 from pdtui.driving.unit_bench.unit_searcher import UnitSearcher
 from pdtui.stimulation.stimulation_map import StimulationMap
-
-PATIENCE = 240.0
-
-
-def wait_until_over(searcher: UnitSearcher) -> UnitSearchSnapshot:
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        state = searcher.state
-        if state is not None and state.condition in ("done", "failed"):
-            return state
-        time.sleep(0.02)
-    raise AssertionError(f"the search was not over in {PATIENCE:g} s: {searcher.state}")
+from tests.waiting import wait_until_over
 
 
 def test_what_is_offered_does_in_the_drive_what_was_measured(small_map: StimulationMap) -> None:
@@ -38,7 +26,7 @@ def test_what_is_offered_does_in_the_drive_what_was_measured(small_map: Stimulat
     with UnitSearcher(config, drive) as searcher:
         assert searcher.begin(UnitSearchRequest("vx", 1.0, seconds=1.0), None) == ""
         assert "under way" in searcher.begin(UnitSearchRequest("vx", 1.0), None)
-        state = wait_until_over(searcher)
+        state = wait_until_over(lambda: searcher.state)
     assert (state.condition, state.step) == ("done", 20)
     assert 1 <= len(state.best) <= 3
     assert all(one.effect > 0.0 for one in state.best)
