@@ -6,7 +6,7 @@ command which the policy was trained to follow, and by a PID that sets the outpu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
@@ -33,12 +33,13 @@ from pdtui.search.gains.tracking_summary import (
     mean_errors_by_seed,
     summarize_tracking,
 )
+from pdtui.stimulation.interventions.intervention import Intervention, LayerVectors
 from pdtui.stimulation.stimulation_map import Behavior
 
 ATTRIBUTE = "yaw"
 PUSHED_SEEDS = 10
 """Largest number of seeds that are also run with pushes."""
-ControlInput = Literal["command", "units", "both"]
+ControlInput = Literal["command", "units", "interventions", "both"]
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,8 @@ class HeadingControllerResult:
     """The result of one behavior that holds the heading.
 
     Attributes:
-        input_kind: whether the PID sets commands, units or both.
-        inputs: names of the commands and units that it sets.
+        input_kind: whether the PID sets commands, units, interventions, or several of these.
+        inputs: names of the commands and units that it sets, and what its interventions do.
         other_commands: the commands that it leaves alone, and their values.
         ratio: its error over that of the map's behavior by command; None for that one, and without one.
         pushed: the same while the robot is pushed; None if not measured.
@@ -122,9 +123,26 @@ class HeadingPrecisionComparison:
 
 def describe_pid_output(behavior: Behavior) -> ControlInput:
     """Return what the PID of a behavior sets."""
-    if behavior.commands and behavior.magnitudes:
-        return "both"
-    return "command" if behavior.commands else "units"
+    kinds: dict[ControlInput, object] = {
+        "command": behavior.commands,
+        "units": behavior.magnitudes,
+        "interventions": behavior.interventions,
+    }
+    used = [kind for kind, inputs in kinds.items() if inputs]
+    return used[0] if len(used) == 1 else "both"
+
+
+def describe_intervention(one: Intervention, vectors: Mapping[str, LayerVectors]) -> str:
+    """Return in a few words what an intervention changes."""
+    match one.kind:
+        case "direction" | "affine":
+            count, layer = len(vectors[one.vectors].rows), vectors[one.vectors].layer
+            number = "one" if count == 1 else str(count)
+            return f"{number} direction{'s' if count > 1 else ''} of layer {layer}"
+        case "imprint":
+            return f"imprint of {' and '.join(dict.fromkeys((*one.values, *one.rates, *one.base)))}"
+        case _:
+            return ", ".join(one.values or one.ranges)
 
 
 def compare_heading_precision(
@@ -204,7 +222,11 @@ def _rows(
             loop.robot.name,
             loop.policy.name,
             describe_pid_output(behavior),
-            (*behavior.commands, *loop.map.units_of(behavior)),
+            (
+                *behavior.commands,
+                *loop.map.units_of(behavior),
+                *(describe_intervention(one, loop.map.vectors) for one in behavior.interventions),
+            ),
             {name: value for name, value in loop.robot.commands.items() if name not in behavior.commands},
             summarize_tracking(drives[number], unit),
             ratios[number],
