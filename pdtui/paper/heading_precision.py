@@ -6,9 +6,9 @@ command which the policy was trained to follow, and by a PID that sets the outpu
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.disturbance_conditions import find_condition, plan_pushes
 from pdtui.evaluation.target_tracking import find_pid_behaviors
+from pdtui.paper.pid_inputs import ControlInput, describe_pid_output, list_pid_inputs
 from pdtui.search.gains.tracking_drives import (
     STEPS_EACH,
     STEPS_UNTOUCHED,
@@ -33,13 +34,11 @@ from pdtui.search.gains.tracking_summary import (
     mean_errors_by_seed,
     summarize_tracking,
 )
-from pdtui.stimulation.interventions.intervention import Intervention, LayerVectors
 from pdtui.stimulation.stimulation_map import Behavior
 
 ATTRIBUTE = "yaw"
 PUSHED_SEEDS = 10
 """Largest number of seeds that are also run with pushes."""
-ControlInput = Literal["command", "units", "interventions", "both"]
 
 
 @dataclass(frozen=True)
@@ -121,30 +120,6 @@ class HeadingPrecisionComparison:
         }
 
 
-def describe_pid_output(behavior: Behavior) -> ControlInput:
-    """Return what the PID of a behavior sets."""
-    kinds: dict[ControlInput, object] = {
-        "command": behavior.commands,
-        "units": behavior.magnitudes,
-        "interventions": behavior.interventions,
-    }
-    used = [kind for kind, inputs in kinds.items() if inputs]
-    return used[0] if len(used) == 1 else "both"
-
-
-def describe_intervention(one: Intervention, vectors: Mapping[str, LayerVectors]) -> str:
-    """Return in a few words what an intervention changes."""
-    match one.kind:
-        case "direction" | "affine":
-            count, layer = len(vectors[one.vectors].rows), vectors[one.vectors].layer
-            number = "one" if count == 1 else str(count)
-            return f"{number} direction{'s' if count > 1 else ''} of layer {layer}"
-        case "imprint":
-            return f"imprint of {' and '.join(dict.fromkeys((*one.values, *one.rates, *one.base)))}"
-        case _:
-            return ", ".join(one.values or one.ranges)
-
-
 def compare_heading_precision(
     configs: Sequence[DriveConfig],
     seeds: Sequence[int],
@@ -222,11 +197,7 @@ def _rows(
             loop.robot.name,
             loop.policy.name,
             describe_pid_output(behavior),
-            (
-                *behavior.commands,
-                *loop.map.units_of(behavior),
-                *(describe_intervention(one, loop.map.vectors) for one in behavior.interventions),
-            ),
+            list_pid_inputs(behavior, loop.map),
             {name: value for name, value in loop.robot.commands.items() if name not in behavior.commands},
             summarize_tracking(drives[number], unit),
             ratios[number],

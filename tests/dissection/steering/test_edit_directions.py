@@ -45,9 +45,10 @@ def test_a_candidate_adds_what_the_edit_of_its_size_changes() -> None:
     observations = sample_walk_observations(Compass(), policy, 1000, steps=120)
     direction = fit_edit_direction(policy, observations, [EDIT], {"offset": 0.2})
     one, other = edit_direction_candidates([EDIT], {"offset": direction}, (1.0, -2.0))
-    assert (one.source, one.dose, other.dose) == ("offset", pytest.approx(0.2), pytest.approx(-0.4))
+    assert one.source == other.source == "offset"
+    assert [one.dose, other.dose] == pytest.approx([0.2, -0.4])
     assert isinstance(other.plan, InterventionRolloutPlan)
-    assert other.plan.intervention.coordinates == (pytest.approx(-2.0 * direction.length),)
+    assert list(other.plan.intervention.coordinates) == pytest.approx([-2.0 * direction.length])
 
 
 @pytest.mark.parametrize(
