@@ -1,4 +1,4 @@
-"""What the shipped maps of imprints and directions do, on one seed each; the guide has the figures of many."""
+"""What the shipped maps of imprints and directions do, on one seed each; the guide has more figures."""
 
 from __future__ import annotations
 
