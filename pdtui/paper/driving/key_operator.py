@@ -9,18 +9,16 @@ from pdtui.paper.driving.maneuver import (
     HORIZON,
     INWARDS,
     ROOM_FOR_CROSSING,
-    TIMES,
     WEAVING,
     Maneuver,
     TimesToConflict,
-    find_way_past,
-    gap_to_standing,
+    next_standing,
     predict_times_to_conflict,
     slips_off,
 )
 from pdtui.paper.driving.maneuver_predictor import ManeuverPredictor
 from pdtui.paper.driving.operator_memory import JudgmentErrors, OperatorMemory
-from pdtui.paper.driving.road_sight import RoadSight
+from pdtui.paper.driving.road_sight import LANE_WIDTH, RoadSight
 
 PRESSES_PER_SECOND = 3
 """Largest number of key presses in any second."""
@@ -49,9 +47,6 @@ _SETTLING = 0.6
 """Time after a lane key in which the car settles in its lane, s."""
 _BRAKE_TIME, _BRAKED_TIME = 0.5, 4.0
 """Time for which it brakes at least, and after which it lets a stopped car go on unless somebody comes, s."""
-_SOON, _SHORT = 2.5, 0.5
-"""Time before a conflict up to which it goes on braking, and time to the end of the brake's pulse that is too
-short to end it, s."""
 _DOUBT = 0.4
 """How much faster or slower somebody who crosses the road may turn than seen, rad/s."""
 
@@ -110,8 +105,6 @@ class KeyOperator:
         if seen.speed**2 * max(abs(seen.bend(ahead)) for ahead in _BEND_AHEAD) > _SIDEWAYS_ACCELERATION:
             return BRAKE
         expected = predict_times_to_conflict(seen, go_on, ROOM_FOR_CROSSING)
-        if latched == ACCELERATE and expected.first < PATIENCE_STANDING:
-            return DEFAULT
         if not self._must_act(seen, expected):
             return ""
         outlooks = [(predict_times_to_conflict(seen, one), one) for one in self._options(seen, expected)]
@@ -153,7 +146,7 @@ class KeyOperator:
     def _must_brake(self, seen: RoadSight, expected: TimesToConflict) -> bool:
         """Return whether the last moment to brake has come."""
         room = self._keys.stopping_distance(seen.speed) + 0.2 * seen.speed + STOPPING_ROOM * self._patience
-        stands = math.isfinite(expected.standing) and gap_to_standing(seen) < room
+        stands = math.isfinite(expected.standing) and next_standing(seen)[0] < room
         slips = expected.edge < LAST_MOMENT * self._patience and abs(seen.heading) > WEAVING
         return (
             ((stands or slips) and seen.speed > _SLOW)
@@ -183,12 +176,14 @@ class KeyOperator:
 
     def _aside(self, seen: RoadSight) -> str:
         """Return the key that turns a slow car away from what stands close ahead of it, if anything does."""
-        if seen.speed > _SLOW:
+        gap, beside = next_standing(seen)
+        if seen.speed > _SLOW or gap > STOPPING_ROOM:
             return ""
-        if not (way := find_way_past(seen, STOPPING_ROOM, _ASKEW)):
+        side = -1.0 if beside > 0.0 else 1.0
+        if (seen.left if side > 0.0 else seen.right) < LANE_WIDTH or side * seen.heading > _ASKEW:
             return ""
-        self._aim, self._askew = seen.beside + way, _ASKEW
-        return LEFT if way > 0.0 else RIGHT
+        self._aim, self._askew = seen.beside + beside + side * LANE_WIDTH, _ASKEW
+        return LEFT if side > 0.0 else RIGHT
 
     def _release(self, seen: RoadSight) -> str:
         """Return the key with which a braked car can go on: the default key, or one for a lane."""
@@ -196,26 +191,18 @@ class KeyOperator:
             return ""
         options = [self._keys.let_go(seen), *self._keys.lane_changes(seen)]
         outlooks = [(predict_times_to_conflict(seen, one, ROOM_FOR_CROSSING, _DOUBT), one) for one in options]
-        goes = outlooks[0][0]
-        if goes.crossing == goes.first < math.inf:
+        if outlooks[0][0].crossing == outlooks[0][0].first < math.inf:
             outlooks = outlooks[:1]
         free = [one.name for times, one in outlooks if math.isinf(times.first)]
         if free:
-            return "" if free[0] == DEFAULT and self._keys.find_active_key()[1] < _SHORT else free[0]
-        if math.isinf(min(goes.standing, goes.moving, goes.crossing)) and seen.speed < _HALTED:
-            # Only the edge is near, and a car that stands can be turned away from it.
-            return self._steer(seen, RIGHT if seen.left < seen.right else LEFT, seen.lane)
+            return free[0]
         stays = predict_times_to_conflict(seen, self._keys.brake(seen))
-        waited = self._halted_time() > _BRAKED_TIME
-        # A pulse of the brake that would end too early begins anew.
-        ends = self._keys.find_active_key()[1] < 1.5 * self._dt
-        stay = BRAKE if ends and min(goes.moving, goes.crossing) < min(_SOON, stays.first) else ""
+        waited = min(self._halted_time(), self._keys.time_since()) > _BRAKED_TIME
         if not waited and math.isinf(stays.first):
-            return stay
+            return ""
         times, best = max(outlooks, key=lambda pair: _preference(seen, *pair))
         nobody = math.isinf(min(times.moving, times.crossing))
-        sooner = times.first == stays.first and times.duration < stays.duration - IMPROVEMENT
-        return best.name if times.first > stays.first or sooner or (waited and nobody) else stay
+        return best.name if times.first > stays.first or (waited and nobody) else ""
 
     def _start_again(self, seen: RoadSight) -> str:
         """Return the key that gets a halted car going: to a side if something is close ahead."""
@@ -228,13 +215,11 @@ class KeyOperator:
 
 
 def _improves(conflicts: TimesToConflict, expected: TimesToConflict) -> bool:
-    """Return whether an option postpones the next conflict enough, or ends one that has begun."""
-    if conflicts.first == expected.first == TIMES[0]:
-        return conflicts.duration < expected.duration - IMPROVEMENT
+    """Return whether an option postpones the next conflict enough."""
     return conflicts.first > min(expected.first, HORIZON - IMPROVEMENT) + IMPROVEMENT - 1e-9
 
 
-def _preference(seen: RoadSight, times: TimesToConflict, option: Maneuver) -> tuple[float, ...]:
-    """Return how good an option is: late and short conflicts, no key for a lane, room on its side."""
+def _preference(seen: RoadSight, times: TimesToConflict, option: Maneuver) -> tuple[float, float, float]:
+    """Return how good an option is: late conflicts first, then no key for a lane, then room on its side."""
     room = seen.left if option.name == LEFT else seen.right
-    return min(times.first, HORIZON), -times.duration, {BRAKE: -1.0, DEFAULT: 1.0}.get(option.name, 0.0), room
+    return min(times.first, HORIZON), {BRAKE: -1.0, DEFAULT: 1.0}.get(option.name, 0.0), room

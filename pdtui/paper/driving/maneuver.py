@@ -19,7 +19,7 @@ STRAIGHTENING_TIME = 0.5
 """Time in which a policy turns the car back along the road, s."""
 WEAVING = 0.25
 """Angle to the road up to which a car straightens at once, rad."""
-_NEAR_EDGE, _SLIPPING_TIME, INWARDS = 0.6, 0.6, 0.1
+_NEAR_EDGE, _SLIPPING_TIME, INWARDS = 0.6, 0.4, 0.1
 """Distance from an edge of the road that is too small now or after some time, m and s, and the angle by which
 the car must at least turn away from it, rad."""
 GAP_AHEAD, GAP_BRAKED = 1.5, 0.5
@@ -28,8 +28,8 @@ _GAP_ASIDE, _GAP_TO_EDGE = 0.35, 0.5
 """Gaps that are too close, m: to others sideways, and from the car's middle to an edge."""
 ROOM_FOR_CROSSING = 1.5
 """How much more room to leave for those who cross the road, m."""
-_SWING_TIME, _TURNING_TIME = 0.1, 0.3
-"""Time in which the car ends a turn that nobody wants, and over which a turn counts as no weaving, s."""
+_SWING_TIME = 0.1
+"""Time in which the car ends a turn that nobody wants, s."""
 _TURNING_SPEED = 5.0
 """Speed below which it turns the more slowly the slower it is, m/s."""
 _LANE_LEFT = 1.0
@@ -95,11 +95,10 @@ def swerve(sight: RoadSight, ahead: Floats, turns: Floats, turn_now: float = 0.0
         turn_now: How fast a key turns it now, rad/s.
     """
     step = float(TIMES[1] - TIMES[0])
-    # The less it is turned and goes on turning, the more of that is only the policy's weaving.
-    turned = abs(sight.heading + _TURNING_TIME * (sight.swing - turn_now))
-    heading = sight.heading * min(1.0, max(turned, abs(sight.heading)) / WEAVING)
+    # The less it is turned, the more of that is only the policy's weaving.
+    heading = sight.heading * min(1.0, abs(sight.heading) / WEAVING)
     beside, before, places = 0.0, 0.0, []
-    own = sight.swing + heading / STRAIGHTENING_TIME - turn_now if turned > WEAVING else 0.0
+    own = sight.swing + heading / STRAIGHTENING_TIME - turn_now if abs(sight.heading) > WEAVING else 0.0
     for place, turn in zip(ahead.tolist(), turns.tolist(), strict=True):
         way, before = place - before, place
         share = min(1.0, way / step / _TURNING_SPEED)
@@ -132,13 +131,11 @@ def predict_times_to_conflict(
     apart, aside = ahead - maneuver.ahead, beside - maneuver.beside
     stands = sight.others[:, 5] < STANDING
     kinds = stands, sight.followers, ~stands & ~sight.followers
-    gap = maneuver.gap + np.where(kinds[2], room, 0.0)[:, None]
+    gap = np.where(kinds[2], maneuver.gap + room, maneuver.gap)[:, None]
     close = np.abs(apart) < half_length + CAR_HALF_LENGTH + gap
     close &= np.abs(aside) < half_width + CAR_HALF_WIDTH + _GAP_ASIDE
-    # Who comes from behind in the same lane keeps away by himself; who comes in another one does not look.
-    width = (sight.left + sight.right) / sight.lanes
-    same_lane = (sight.right + beside[:, :1]) // width == sight.right // width
-    follower = (ahead[:, :1] < 0.0) & same_lane
+    # Who comes from behind in the same lane keeps away by himself.
+    follower = (ahead[:, :1] < 0.0) & (np.abs(beside[:, :1]) < half_width[:, :1] + CAR_HALF_WIDTH)
     close &= ~follower | (np.abs(maneuver.beside) > _LANE_LEFT)
     standing, along, across = (_first_time(close[kind].any(axis=0)) for kind in kinds)
     duration = float(close.any(axis=0).sum() * (TIMES[1] - TIMES[0]))
@@ -153,17 +150,22 @@ def slips_off(sight: RoadSight) -> int:
     return side if soon < _NEAR_EDGE and turned > -INWARDS else 0
 
 
-def gap_to_standing(sight: RoadSight) -> float:
-    """Return the distance to the next thing that stands in the car's way if it goes straight on, m.
+def next_standing(sight: RoadSight) -> tuple[float, float]:
+    """Return where the next thing stands that is in the car's way if it goes straight on.
 
-    Infinite if there is none.
+    Returns:
+        Distance to it and how far its middle is to the left, m; infinite and 0 if there is none.
     """
     ahead, beside, half_length, half_width = sight.standing().T
     in_way = (ahead > 0.0) & (np.abs(beside) < half_width + CAR_HALF_WIDTH + _GAP_ASIDE / 2)
-    return float(np.min(ahead - half_length - CAR_HALF_LENGTH, where=in_way, initial=math.inf))
+    if not in_way.any():
+        return math.inf, 0.0
+    gaps = np.where(in_way, ahead - half_length - CAR_HALF_LENGTH, math.inf)
+    nearest = int(np.argmin(gaps))
+    return float(gaps[nearest]), float(beside[nearest])
 
 
-def find_way_past(sight: RoadSight, within: float, most_turned: float = math.inf) -> float:
+def find_way_past(sight: RoadSight, within: float) -> float:
     """Return how far to the left the car must get to pass what stands next in its way, m.
 
     Negative to the right; 0 if nothing stands there, or neither side has room.
@@ -171,9 +173,8 @@ def find_way_past(sight: RoadSight, within: float, most_turned: float = math.inf
     Args:
         sight: What there is to see.
         within: Distance up to which it counts, m.
-        most_turned: Angle to the road up to which the car may be turned to that side already, rad.
     """
-    gap = gap_to_standing(sight)
+    gap, _ = next_standing(sight)
     if gap > within:
         return 0.0
     ahead, beside, half_length, half_width = sight.standing().T
@@ -182,7 +183,6 @@ def find_way_past(sight: RoadSight, within: float, most_turned: float = math.inf
     ways = np.concatenate([places + reach, places - reach])
     free = (np.abs(ways[:, None] - places) > reach - 1e-6).all(axis=1)
     free &= (ways < sight.left - CAR_HALF_WIDTH) & (ways > CAR_HALF_WIDTH - sight.right)
-    free &= np.sign(ways) * sight.heading <= most_turned
     return float(min(ways[free], key=abs, default=0.0))
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pdtui.paper.driving.key_effects import BRAKE, DEFAULT, LEFT, RIGHT, KeyEffects
-from pdtui.paper.driving.maneuver import GAP_BRAKED, TIMES, WEAVING, Maneuver, roll, swerve
+from pdtui.paper.driving.maneuver import TIMES, WEAVING, Maneuver, roll, swerve
 from pdtui.paper.driving.operator_memory import REACTION_TIME
 from pdtui.paper.driving.road_sight import RoadSight
 
@@ -79,7 +79,7 @@ class ManeuverPredictor:
     def brake(self, seen: RoadSight) -> Maneuver:
         """Return how the car stops."""
         ahead = roll(seen.speed, -self._effects.deceleration)
-        return Maneuver(BRAKE, ahead, swerve(seen, ahead, np.zeros_like(TIMES)), GAP_BRAKED)
+        return Maneuver(BRAKE, ahead, swerve(seen, ahead, np.zeros_like(TIMES)))
 
     def lane_changes(self, seen: RoadSight) -> list[Maneuver]:
         """Return what the keys for lanes would do now, each pressed once or twice.
