@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args, get_type_hints
 
 import numpy as np
-from scipy.signal import get_window
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import PdtuiError
@@ -63,6 +62,8 @@ class MatchingPreset:
     @property
     def weights(self) -> Floats:
         """The window, divided by its sum, shape (length,)."""
+        from scipy.signal import get_window  # loads much of scipy, which a drive needs for its spectra only
+
         window: Floats = get_window(self.window, self.length)
         window /= window.sum()
         return window
