@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import threading
 import time
 from multiprocessing.connection import Connection
@@ -83,7 +84,7 @@ class DriveClient(DriveConnection):
         self._last_words = ""
         self.failed = False
         """Whether the drive ended with an error; set by `close`."""
-        self._asked = False
+        self._asked = self._started = False
         self._first: DriveFacts | None = None
         self.recording = ""
         """File that the drive is recorded into; empty until it was created."""
@@ -113,6 +114,7 @@ class DriveClient(DriveConnection):
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:
         first, self._first = self._first, None
         message = first or self._receive()
+        self._started = self._started or isinstance(message, DriveFacts)
         if isinstance(message, DriveFacts) and message.recorded:
             self.recording = message.recording
         if isinstance(message, DriveFacts) or (message is None and not self._asked):
@@ -150,6 +152,8 @@ class DriveClient(DriveConnection):
 
     def close(self) -> str:
         self._send("close", None)
+        if not (self._started or self._first):
+            self._process.terminate()  # what is still loading records nothing; a begun drive ends as usual
         deadline = time.monotonic() + _PATIENCE
         while not self._last_words and time.monotonic() < deadline:
             try:
@@ -165,6 +169,8 @@ class DriveClient(DriveConnection):
             self._process.kill()
             self._process.join()
         self._connection.close()
+        if not (self._last_words or self._started) and self._process.exitcode == -signal.SIGTERM:
+            self._last_words = "stopped before the first step"
         return self._last_words or self._describe_death()
 
     def _receive(self, timeout: float = 0.0) -> DriveFacts | DriveSnapshot | PdtuiError | str | None:

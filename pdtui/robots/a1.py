@@ -73,6 +73,7 @@ class A1(BulletRobot):
 
     name = "a1"
     title = "Unitree A1 (PyBullet)"
+    needed_package = "pybullet"
     feet = tuple(Foot(place, f"{leg}_toe", place, f"{place} contact") for leg, place in _LEGS.items())
     observation_edits = a1_observation_edits(_DT * _SUBSTEPS)
     tasks: tuple[Task, ...] = A1_TASKS

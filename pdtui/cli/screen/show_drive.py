@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pdtui.cli.screen.start_certainty import is_certain_to_start
 from pdtui.core.errors import ScreenError
 from pdtui.core.printable_text import make_printable
 from pdtui.core.settings.settings_file import read_settings, settings_path
@@ -29,7 +30,10 @@ def show_drive(config: DriveConfig, settings: UserSettings | None = None, *, wat
 
 
 def run_drive_screen(config: DriveConfig, settings: UserSettings, *, watching: bool = False) -> str:
-    """Start the simulation's process, show it on the screen, and return one line on how the drive ended."""
+    """Start the simulation's process, show it on the screen, and return one line on how the drive ended.
+
+    Where robot, policy or recording may still be refused, the screen opens once the simulation has them.
+    """
     from pdtui.driving.drive_client import DriveClient
     from pdtui.search.gains.gain_tuning_process import GainTuningProcess
 
@@ -39,9 +43,10 @@ def run_drive_screen(config: DriveConfig, settings: UserSettings, *, watching: b
         from pdtui.tui.drive_app import DriveApp
         from pdtui.tui.graphics.terminal_graphics import find_terminal_graphics
 
-        if not watching:
-            click.echo(make_printable(f"starting {config.robot} …"), err=True)
-        connection.wait_until_started()
+        if not is_certain_to_start(config):
+            if not watching:
+                click.echo(make_printable(f"starting {config.robot} …"), err=True)
+            connection.wait_until_started()
         app = DriveApp(
             connection,
             config.stimulation_map,
