@@ -24,6 +24,9 @@ BROWSER_VARIABLE = "TEXTUAL_DRIVER"
 def show_drive(config: DriveConfig, settings: UserSettings | None = None, *, watching: bool = False) -> None:
     """Drive on the screen, then print one line on how the drive ended."""
     require_terminal()
+    from pdtui.driving.drive_client import prepare_simulation
+
+    prepare_simulation(config.robot)  # what follows loads the screen
     settings = read_settings() if settings is None else settings
     require_settled_theme(settings)
     click.echo(make_printable(run_drive_screen(config, settings, watching=watching)))
