@@ -31,7 +31,7 @@ Shown = TypeVar("Shown")
 
 
 class PlainReactive(reactive[Shown]):
-    """A reactive that is cheap to read: at every reading, Textual's own looks for a method that computes it."""
+    """A reactive that is cheap to read: Textual's own looks for a method that computes it each time."""
 
     if not TYPE_CHECKING:
 
