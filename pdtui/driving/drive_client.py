@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _SIMULATION = "pdtui.driving.drive_process"
 """Module that loads PyTorch and the recording library, which the screen's process does without."""
+_LOADED_BY_PYARROW = "pandas"  # as soon as anything is recorded, where it is installed
 _NOT_BEGUN = "stopped before the first step"
 _PATIENCE = 60.0
 """Longest wait for the recording to be completed, s; after it, the process ends at once."""
@@ -71,7 +72,7 @@ class DriveConnection(Protocol):
 def prepare_simulation(robot: str = "") -> None:
     """Load what a drive needs in the background, and one of pdtui's own robots, so that it starts sooner."""
     module = find_own_robots().get(robot)
-    prepare_processes(_SIMULATION, *filter(None, (module,)))
+    prepare_processes(_SIMULATION, *filter(None, (module,)), _LOADED_BY_PYARROW)
 
 
 def _simulate(connection: Connection, config: DriveConfig) -> None:
