@@ -32,6 +32,15 @@ class BehaviorList(SnapshotWidget):
 
     BORDER_TITLE = "behaviors"
     _line_keys: tuple[str, ...] = ()
+    _first = _hidden = 0  # behavior from which on they are listed, and how many have no room
+
+    def on_mouse_scroll_down(self) -> None:
+        self._first = min(self._first + 1, self._hidden)
+        self.redraw()
+
+    def on_mouse_scroll_up(self) -> None:
+        self._first = max(self._first - 1, 0)
+        self.redraw()
 
     def on_click(self, event: events.Click) -> None:
         """Latch the behavior that was clicked."""
@@ -171,21 +180,23 @@ class BehaviorList(SnapshotWidget):
     ) -> tuple[list[Strip], list[int]]:
         """Return as many entries as fit, in the order of the map, and the number of the entry in each line.
 
-        Latched ones are kept first; the last line then says how many are hidden.
+        Latched ones are kept first, then those from where the list is scrolled to; the last line says how many
+        are hidden.
         """
         everything = range(len(entries))
         if sum(map(len, entries)) <= height:
+            self._first = self._hidden = 0
             strips = [strip for entry in entries for strip in entry]
             return strips, [index for index in everything for _ in entries[index]]
         room = height - 1
         chosen = []
-        for index in sorted(range(len(entries)), key=lambda index: (not latched[index], index)):
+        for index in sorted(everything, key=lambda index: (not latched[index], index < self._first, index)):
             if len(entries[index]) <= room:
                 room -= len(entries[index])
                 chosen.append(index)
         strips = [strip for index in sorted(chosen) for strip in entries[index]]
-        hidden = len(entries) - len(chosen)
-        more = ScreenRow(width).add(f"+{hidden} more: ? lists all", STYLES.muted)
+        self._hidden = len(entries) - len(chosen)
+        more = ScreenRow(width).add(f"+{self._hidden} more: ? lists all", STYLES.muted)
         return [*strips, more.strip()], [index for index in sorted(chosen) for _ in entries[index]]
 
 
