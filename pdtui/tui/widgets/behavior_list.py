@@ -180,8 +180,8 @@ class BehaviorList(SnapshotWidget):
     ) -> tuple[list[Strip], list[int]]:
         """Return as many entries as fit, in the order of the map, and the number of the entry in each line.
 
-        Latched ones are kept first, then those from where the list is scrolled to; the last line says how many
-        are hidden.
+        Latched ones are kept first, then those from where the list is scrolled to. The last line counts what
+        is hidden.
         """
         everything = range(len(entries))
         if sum(map(len, entries)) <= height:
