@@ -41,7 +41,7 @@ def test_what_differs_from_the_preset_is_named() -> None:
     assert str(find_matching_preset("authors")) == "authors"
 
 
-@pytest.mark.parametrize("length", [4, 30, 63, 128, 1000])
+@pytest.mark.parametrize("length", [30, 63, 128, 1000])
 @pytest.mark.parametrize("name", allowed_preset_values()["window"])
 def test_windows_are_those_of_scipy_to_the_last_bit(name: str, length: int) -> None:
     preset = find_matching_preset("authors", [f"window={name}", f"length={length}"])
