@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 
 Sides = tuple[Strip, Strip, Color, Style]
+_MOST_STYLES = 4096  # that a widget remembers
 LEAST_PAINTED = Size(16, 2)
 """Columns and lines of the smallest picture that is painted; a smaller widget shows its upper left part."""
 
@@ -64,7 +65,7 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         self._framed: list[Strip | None] = []
         self._painted_size = Size(0, 0)
         self._sides: Sides | None = None
-        self._based: dict[Style | None, Style] = {}
+        self._based: dict[int, tuple[Style | None, Style]] = {}
         self._borders: dict[int, Strip] = {}
         self.forget()
 
@@ -184,18 +185,28 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         framed = self._framed[row]
         if framed is None:
             left, right, background, base = self._sides or self._make_sides()
-            based = self._based
-            segments = []
-            for text, style, _ in self._strips[row]:
-                if style not in based:
-                    based[style] = style if style is not None and style.bgcolor is not None else base + style
-                segments.append(Segment(text, based[style]))
+            if len(self._based) > _MOST_STYLES:
+                self._based.clear()
+            known = self._based.get
+            segments = [
+                segment
+                if (based := known(id(segment.style)) or self._add_base(segment.style, base))[1]
+                is segment.style
+                else Segment(segment.text, based[1])
+                for segment in self._strips[row]
+            ]
             # All colors are true colors already; other filters, such as NO_COLOR's, still apply.
             filters = [one for one in self.get_line_filters() if not isinstance(one, ANSIToTruecolor)]
             for line_filter in filters:
                 segments = list(Strip(segments).apply_filter(line_filter, background))
             framed = self._framed[row] = Strip([*left, *segments, *right], self.outer_size.width)
         return framed
+
+    def _add_base(self, style: Style | None, base: Style) -> tuple[Style | None, Style]:
+        """Remember a style on the widget's background, and the style itself, so that its id stays its own."""
+        own = style if style is not None and style.bgcolor is not None else base + style
+        self._based[id(style)] = style, own
+        return style, own
 
     def _make_sides(self) -> Sides:
         width, gutter = self.outer_size.width, self.gutter
