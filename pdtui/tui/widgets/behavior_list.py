@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 from rich.style import Style
+from textual.geometry import Size
 from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from pdtui.stimulation.stimulation_map import Behavior
 
 _ECHO_SNAPSHOTS = 12  # after which a key that the drive did not mention is no longer shown as pressed
+_SHARE = 0.56  # of the height of its column, as in the style sheet
 _BAR = 10  # length of the bar of the time left, in cells
 _BLOCKS = " ▏▎▍▌▋▊▉"
 
@@ -47,6 +49,16 @@ class BehaviorList(SnapshotWidget):
         place = event.get_content_offset(self)
         if place is not None and place.y < len(self._line_keys) and self._line_keys[place.y]:
             self.post_message(KeyClicked(self._line_keys[place.y]))
+
+    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
+        """Return the lines that all behaviors take: two each where there is room, else one."""
+        del viewport, width
+        frame = self.gutter.height  # which the container comes without
+        room = int((container.height + frame) * _SHARE) - frame
+        count = len(self.map.behaviors)
+        controllers = sum(behavior.pid is not None for behavior in self.map.behaviors.values())
+        roomy = 2 * count + controllers + 2
+        return roomy if roomy <= room else max(1, min(count + controllers + 1, room))
 
     def forget(self) -> None:
         self._echoes: dict[str, int] = {}
