@@ -27,7 +27,7 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.torchscript import build_torchscript
 from pdtui.policies.weights import policy_loading
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions, ObservationActionSpaces
-from pdtui.policies.weights.weights_file import find_weights_file
+from pdtui.policies.weights.policy_file_lookup import find_weights_file
 from pdtui.robots import RobotSpec, open_robot
 from pdtui.robots.robot import Robot
 from pdtui.sessions.writer.session_file import ExistingFile

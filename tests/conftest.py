@@ -9,6 +9,7 @@ import pytest
 
 from pdtui.api import dissect
 from pdtui.dissection.dissection_result import Dissection
+from pdtui.driving.drive_client import prepare_simulation
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.policy_file_lookup import POLICY_FOLDERS_VARIABLE
 from pdtui.policies.weights.policy_loading import load_policy
@@ -18,6 +19,12 @@ from tests.real_viewer import RealViewer, real_viewer
 from tests.small_dissection import SMALL, small_network, write_policy
 from tests.small_map import SMALL_MAP, write_small_weights
 from tests.wired_policy import wired_file  # noqa: F401
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _processes_at_once() -> None:
+    """Load PyTorch and MuJoCo once for all processes that tests start."""
+    prepare_simulation("ant")
 
 
 @pytest.fixture(scope="session")

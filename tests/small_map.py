@@ -7,7 +7,8 @@ from pathlib import Path
 import torch
 
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
-from pdtui.policies.weights.weights_file import hash_file, save_network
+from pdtui.policies.weights.weights_file import save_network
+from pdtui.policies.weights.weights_header import hash_file
 
 SMALL_MAP = """\
 schema = 1

@@ -26,6 +26,7 @@ from pathlib import Path
 from pdtui.driving.replays.replay_result import ReplayResult
 from pdtui.driving.session_replay import replay_session
 from pdtui.sessions.session_reader import read_session
+from tests.process_tree import find_simulation
 from tests.terminal_inputs import draw_input
 
 SIZES = ((24, 80), (48, 160), (30, 100), (20, 60), (60, 200))
@@ -202,7 +203,7 @@ def soak(
     try:
         if not terminal.read_for(PATIENCE, until=b"m/s"):
             raise AssertionError("the screen did not come up")
-        simulation = _child(terminal.pid)
+        simulation = find_simulation(terminal.pid)
         last: list[bytes | tuple[int, int]] = []
         due = start = time.monotonic()
         rows = {SIZES[0][0]}
@@ -283,12 +284,6 @@ def _row(window: Window) -> str:
         f"simulation {window.simulation / 1e6:.1f} MB, {window.frames:.1f} frames/s, "
         f"{window.frame_ms:.1f} ms a frame"
     )
-
-
-def _child(pid: int) -> int:
-    """The simulation's process: the largest child (the other tracks resources)."""
-    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    return max(map(int, children), key=_resident)
 
 
 def _resident(pid: int) -> int:

@@ -167,9 +167,9 @@ def test_an_environments_options_are_recorded_as_well(tmp_path: Path) -> None:
 
 
 def test_converted_weights_fit_worlds_that_differ_by_options_and_others_when_asked(tmp_path: Path) -> None:
-    from pdtui.policies.weights.weights_file import WEIGHTS
+    from pdtui.policies.weights.policy_file_lookup import SHIPPED_WEIGHTS
 
-    weights, other = WEIGHTS / "bipedal_walker.safetensors", tmp_path / "other.safetensors"
+    weights, other = SHIPPED_WEIGHTS / "bipedal_walker.safetensors", tmp_path / "other.safetensors"
     alone = "--headless", "--steps", 3, "--no-record"
     weak = run("drive", "bipedal_walker", "--policy", weights, "--robot-option", "torque=80", *alone)
     assert weak.exit_code == 0, weak.output

@@ -15,7 +15,9 @@ from pdtui.core.outcome import Outcome, count_failures
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.session_replay import replay_session
-from pdtui.policies.weights.weights_file import find_weights_file, hash_file, load_network
+from pdtui.policies.weights.policy_file_lookup import find_weights_file
+from pdtui.policies.weights.weights_file import load_network
+from pdtui.policies.weights.weights_header import hash_file
 from pdtui.sessions.session_reader import read_session
 from pdtui.stimulation.map_library import find_map, shipped_folder
 from pdtui.stimulation.map_reader import load_map

@@ -23,7 +23,8 @@ from pdtui.driving.drive_snapshot import DriveFacts
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.driving.snapshot_builder import SnapshotBuilder
 from pdtui.policies.weights.policy_network import Head, NetworkSpec, PolicyNetwork
-from pdtui.policies.weights.weights_file import hash_file, save_network
+from pdtui.policies.weights.weights_file import save_network
+from pdtui.policies.weights.weights_header import hash_file
 from pdtui.robots import make_robot
 from pdtui.sessions.session_reader import read_session
 from pdtui.stimulation.map_reader import load_map

@@ -16,7 +16,7 @@ from pdtui.benchmarks.random_rollouts import draw_rollout_jobs
 from pdtui.core.cluster.ray_cluster import RayCluster
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
 from pdtui.dissection.dissection_config import DissectionSettings
-from pdtui.policies.weights.weights_file import find_weights_file
+from pdtui.policies.weights.policy_file_lookup import find_weights_file
 from pdtui.probing.rollout_pool import RolloutChunk, RolloutPool, choose_chunk_size
 from pdtui.probing.start_states import collect_start_states
 from pdtui.probing.stimulated_rollout import RolloutOutcome

@@ -6,7 +6,6 @@ name, and the wording of events in sessions are all derived from it.
 
 from __future__ import annotations
 
-import string
 from dataclasses import dataclass
 from typing import Literal
 
@@ -136,6 +135,18 @@ KEY_TABLE = (
         "layer_before", "pageup", "shows the layers before in the strip", action="bench('layer before')"
     ),
     ReservedKey("next_layer", "pagedown", "shows the next layers in the strip", action="bench('next layer')"),
+    ReservedKey(
+        "attributes_before",
+        "ctrl+up",
+        "shows the attributes before in the table",
+        action="pane('attributes', 'before')",
+    ),
+    ReservedKey(
+        "next_attributes",
+        "ctrl+down",
+        "shows the next attributes in the table",
+        action="pane('attributes', 'next')",
+    ),
     ReservedKey("zoom_in", "right_square_bracket", "shows less of the path", action="zoom_path(-1)"),
     ReservedKey("zoom_out", "left_square_bracket", "shows more of the path", action="zoom_path(1)"),
     ReservedKey(
@@ -227,23 +238,3 @@ RUN_KEYS = {row.key: row for row in KEY_TABLE if row.event is not None}
 """Keys that change a run, by Textual's name."""
 RESERVED_KEYS = {row.key: row.says for row in KEY_TABLE}
 """What each key that no map may use does, by Textual's name."""
-
-
-class KeyAllocator:
-    """Hands out keys that are neither reserved nor taken by other behaviors."""
-
-    def __init__(self, taken: set[str]) -> None:
-        self._taken: set[str] = {*taken, *RESERVED_KEYS}
-
-    def take_pair(self, name: str) -> tuple[str, str] | None:
-        """Return a capital letter, for more of something, and its small letter, for less, if any is free.
-
-        The first free letter of the first letters of the name's words, of the name, and of the alphabet. If
-        either case of a letter is taken or reserved, the letter is not free.
-        """
-        initials = "".join(word[0] for word in name.split())
-        for letter in (initials + name).lower() + string.ascii_lowercase:
-            if letter in string.ascii_lowercase and not {letter, letter.upper()} & self._taken:
-                self._taken |= {letter, letter.upper()}
-                return letter.upper(), letter
-        return None

@@ -13,7 +13,6 @@ from rich.text import Text
 from pdtui.core.atomic_file import check_writable, write_file
 from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.errors import MapError
-from pdtui.core.reserved_keys import KeyAllocator
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
 from pdtui.probing.rollout_pool import RolloutPool
@@ -25,6 +24,7 @@ from pdtui.search.task_rollout import StimulationWithDuration
 from pdtui.search.task_search import TaskSearch, TaskSearchResult
 from pdtui.search.task_search_settings import TaskSearchSettings
 from pdtui.stimulation.interventions.intervention import Onset
+from pdtui.stimulation.key_allocator import KeyAllocator
 from pdtui.stimulation.map_policy_lookup import relative_policy_name
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.map_robot_options import map_robot

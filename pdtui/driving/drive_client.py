@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import threading
 import time
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING, Protocol
 
 from pdtui.core.errors import PdtuiError
+from pdtui.core.processes.process_start import prepare_processes, start_process
 from pdtui.core.processes.worker_pool import describe_exit, end_with_parent
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.pacer import PaceRequest
 from pdtui.driving.unit_bench.unit_search_snapshot import UnitSearchRequest
+from pdtui.robots.robot_registry import find_own_robots
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
     from pdtui.driving.live_spectra.spectra_snapshot import SpectraChoice
 
+_SIMULATION = "pdtui.driving.drive_process"
+"""Module that loads PyTorch and the recording library, which the screen's process does without."""
+_LOADED_BY_PYARROW = "pandas"  # as soon as anything is recorded, where it is installed
+_NOT_BEGUN = "stopped before the first step"
 _PATIENCE = 60.0
 """Longest wait for the recording to be completed, s; after it, the process ends at once."""
 
@@ -61,12 +69,18 @@ class DriveConnection(Protocol):
         """End the drive, wait until its recording is complete, and return one line on how it ended."""
 
 
+def prepare_simulation(robot: str = "") -> None:
+    """Load what a drive needs in the background, and one of pdtui's own robots, so that it starts sooner."""
+    module = find_own_robots().get(robot)
+    prepare_processes(_SIMULATION, *filter(None, (module,)), _LOADED_BY_PYARROW)
+
+
 def _simulate(connection: Connection, config: DriveConfig) -> None:
     # The recording library would print over the screen when the disk is full or a viewer has gone.
     os.environ.setdefault("RUST_LOG", "off")
     # The drive ends by itself once the screen has gone, unless its world is stuck in a step.
     threading.Thread(target=end_with_parent, args=(_PATIENCE,), daemon=True).start()
-    from pdtui.driving import drive_process  # loads torch and the simulator, which the screen does without
+    from pdtui.driving import drive_process
 
     drive_process.serve_drive(connection, config)
 
@@ -75,23 +89,25 @@ class DriveClient(DriveConnection):
     """Starts the simulation's process; create it before the screen takes over the terminal."""
 
     def __init__(self, config: DriveConfig) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_simulate, args=(theirs, config), name="pdtui simulation")
-        self._process.start()
-        theirs.close()
+        self._connection, theirs = multiprocessing.Pipe()
+        self._process: BaseProcess | None = None
         self._last_words = ""
         self.failed = False
         """Whether the drive ended with an error; set by `close`."""
-        self._asked = False
+        self._asked = self._started = False
         self._first: DriveFacts | None = None
         self.recording = ""
         """File that the drive is recorded into; empty until it was created."""
+        prepare_simulation(config.robot)
+        # The screen need not wait until PyTorch is loaded.
+        self._starter = threading.Thread(target=self._start, args=(theirs, config), daemon=True)
+        self._starter.start()
 
     @property
     def pid(self) -> int:
-        """Process id of the simulation."""
-        return self._process.pid or 0
+        """Process id of the simulation; waits until it has one."""
+        self._starter.join()
+        return (self._process and self._process.pid) or 0
 
     @property
     def is_pictured(self) -> bool:
@@ -113,6 +129,7 @@ class DriveClient(DriveConnection):
     def poll_message(self) -> DriveFacts | DriveSnapshot | None:
         first, self._first = self._first, None
         message = first or self._receive()
+        self._started = self._started or isinstance(message, DriveFacts)
         if isinstance(message, DriveFacts) and message.recorded:
             self.recording = message.recording
         if isinstance(message, DriveFacts) or (message is None and not self._asked):
@@ -150,6 +167,12 @@ class DriveClient(DriveConnection):
 
     def close(self) -> str:
         self._send("close", None)
+        process = self._process
+        if process is None:  # it will find its screen gone
+            self._connection.close()
+            return self._last_words or _NOT_BEGUN
+        if not (self._started or self._first):
+            process.terminate()  # what is still loading records nothing; a begun drive ends as usual
         deadline = time.monotonic() + _PATIENCE
         while not self._last_words and time.monotonic() < deadline:
             try:
@@ -158,14 +181,24 @@ class DriveClient(DriveConnection):
                 message = error
             if isinstance(message, str | PdtuiError):
                 self._last_words, self.failed = str(message), isinstance(message, PdtuiError)
-            elif message is None and not self._process.is_alive():
+            elif message is None and not process.is_alive():
                 break
-        self._process.join(timeout=max(0.0, deadline - time.monotonic()))
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join()
+        process.join(timeout=max(0.0, deadline - time.monotonic()))
+        if process.is_alive():
+            process.kill()
+            process.join()
         self._connection.close()
+        if not (self._last_words or self._started) and process.exitcode == -signal.SIGTERM:
+            self._last_words = _NOT_BEGUN
         return self._last_words or self._describe_death()
+
+    def _start(self, theirs: Connection, config: DriveConfig) -> None:
+        try:
+            self._process = start_process("pdtui simulation", _SIMULATION, _simulate, theirs, config)
+        except OSError as error:
+            self._last_words = f"the simulation's process cannot be started: {error}"
+        finally:
+            theirs.close()
 
     def _receive(self, timeout: float = 0.0) -> DriveFacts | DriveSnapshot | PdtuiError | str | None:
         try:
@@ -183,5 +216,8 @@ class DriveClient(DriveConnection):
             return  # the process is gone; the next poll says why
 
     def _describe_death(self) -> str:
+        self._starter.join()
+        if self._process is None:
+            return self._last_words
         line = f"the simulation's process {describe_exit(self._process)}"
         return f"{line}; the recording up to then is in {self.recording}" if self.recording else line

@@ -74,6 +74,7 @@ class A1(BulletRobot):
 
     name = "a1"
     title = "Unitree A1 (PyBullet)"
+    needed_package = "pybullet"
     feet = tuple(Foot(place, f"{leg}_toe", place, f"{place} contact") for leg, place in _LEGS.items())
     observation_edits = a1_observation_edits(_DT * _SUBSTEPS)
     tasks: tuple[Task, ...] = A1_TASKS
@@ -82,16 +83,10 @@ class A1(BulletRobot):
     training_recipe = TrainingRecipe(
         options={"terrain": "rough", "top_speed": 2.0},
         settings={
-            "layers": (256, 256, 256, 256),
-            "processes": True,
-            "worlds": 32,
-            "chunk": 128,
-            "minibatch": 512,
-            "total_steps": 6_000_000,
-            "evaluate_every": 163_840,
-            "evaluate_steps": 400,
+            "layers": (256, 256, 256, 256), "processes": True, "worlds": 32, "chunk": 128,
+            "total_steps": 6_000_000, "evaluate_every": 163_840, "evaluate_steps": 400,
         },
-    )
+    )  # fmt: skip
     starts = ("plane", "rough", "forest")
     episode_steps = 400
     control_dt = _DT * _SUBSTEPS
@@ -109,8 +104,8 @@ class A1(BulletRobot):
         super().__init__()
         if terrain not in self.starts:
             raise RobotError(f"{self.name}: no terrain '{terrain}'; available: {', '.join(self.starts)}")
-        self._terrain, self._roughness, self._density = terrain, roughness, density
-        self._top_speed = top_speed
+        self._terrain, self._roughness = terrain, roughness
+        self._density, self._top_speed = density, top_speed
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (93,), np.float64)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (6,), np.float32)
         self._urdf = bullet_robot.bullet_data_folder() / "a1" / "a1.urdf"

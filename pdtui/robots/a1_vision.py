@@ -54,6 +54,7 @@ class A1Vision(A1):
 
     name = "a1-vision"
     title = "Unitree A1 with a depth camera (PyBullet)"
+    needed_package = "pybullet"
     tasks = ()
     training_recipe = replace(
         A1.training_recipe,

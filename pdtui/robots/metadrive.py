@@ -51,6 +51,7 @@ class MetaDrive(Robot):
 
     name = "metadrive"
     title = "car (MetaDrive)"
+    needed_package = "metadrive"
     starts = SCENE_STARTS
     goals = CAR_GOALS
     tasks = CAR_TASKS
@@ -111,7 +112,7 @@ class MetaDrive(Robot):
     )
 
     def __init__(self, scenes: str = "quiet", crashes_end: bool = False) -> None:
-        if importlib.util.find_spec("metadrive") is None:
+        if importlib.util.find_spec(self.needed_package) is None:
             raise RobotError("robot 'metadrive' needs Python before 3.12 and: pip install 'pdtui[driving]'")
         self._scenes, self._crashes_end = self.check_start(scenes), crashes_end
         self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (OBSERVATIONS,), np.float64)

@@ -73,6 +73,8 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
         outcomes: How its episodes can end by themselves. Tables say so even if none ended that way.
         state_arrays: Names of the Python attributes, all of them arrays, that belong to a robot's state.
         repeats_actions: Whether `restore` repeats the actions since the reset, which takes time.
+        needed_package: Module that a robot of pdtui's own needs and that may not be installed. It is written
+            out in the robot's class, where `find_needed_package` reads it without importing anything.
         build_options: Options with which `make_robot` built it; those that it does not name have defaults.
     """
 
@@ -94,6 +96,7 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     outcomes: tuple[Outcome, ...] = (Outcome.FELL,)
     state_arrays: tuple[str, ...] = ()
     repeats_actions: bool = False
+    needed_package: str = ""
     build_options: RobotOptions = NO_ROBOT_OPTIONS
 
     @property

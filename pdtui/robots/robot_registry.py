@@ -34,13 +34,29 @@ def find_own_robots() -> dict[str, str]:
     A robot is any class, in a module of this package, that assigns its name to ``name``.
     """
     package = __package__ or ""
-    files = (file for folder in sys.modules[package].__path__ for file in Path(folder).glob("*.py"))
     names = {
-        name: f"{package}.{file.stem}"
-        for file in files
-        for name in re.findall(r'^    name = "([^"]+)"$', file.read_text(encoding="utf-8"), re.MULTILINE)
+        name: f"{package}.{stem}"
+        for stem, text in _read_own_files().items()
+        for name in _find_assigned("name", text)
     }
     return dict(sorted(names.items()))
+
+
+def find_needed_package(name: str) -> str:
+    """Return the module that a robot of pdtui's own needs and that may not be installed; empty for none."""
+    _, _, stem = find_own_robots()[name].rpartition(".")
+    return next(iter(_find_assigned("needed_package", _read_own_files()[stem])), "")
+
+
+def _read_own_files() -> dict[str, str]:
+    folders = sys.modules[__package__ or ""].__path__
+    files = (file for folder in folders for file in Path(folder).glob("*.py"))
+    return {file.stem: file.read_text(encoding="utf-8") for file in files}
+
+
+def _find_assigned(attribute: str, text: str) -> list[str]:
+    """Return what the classes of a module assign to an attribute."""
+    return re.findall(rf'^    {attribute} = "([^"]+)"$', text, re.MULTILINE)
 
 
 def list_robot_names() -> list[str]:

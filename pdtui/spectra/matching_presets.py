@@ -7,15 +7,19 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args, get_type_hints
 
 import numpy as np
-from scipy.signal import get_window
 
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import PdtuiError
 
 Window = Literal["blackman", "hann", "hamming", "rectangular"]
 
-# Each window is a sum of this many cosines, and a constant fills as many bins from frequency 0 up.
-_COSINE_TERMS: dict[Window, int] = {"blackman": 3, "hann": 2, "hamming": 2, "rectangular": 1}
+# Each window is a sum of cosines with these weights, and a constant fills as many bins from frequency 0 up.
+_COSINES: dict[Window, tuple[float, ...]] = {
+    "blackman": (0.42, 0.5, 0.08),
+    "hann": (0.5, 0.5),
+    "hamming": (0.54, 1 - 0.54),
+    "rectangular": (1.0,),
+}
 
 
 @dataclass(frozen=True)
@@ -62,8 +66,16 @@ class MatchingPreset:
 
     @property
     def weights(self) -> Floats:
-        """The window, divided by its sum, shape (length,)."""
-        window: Floats = get_window(self.window, self.length)
+        """The window, divided by its sum, shape (length,).
+
+        It is `scipy.signal.get_window`'s to the last bit, without the second that loading that takes: a drive
+        whose spectra are looked at would feel it.
+        """
+        angles = np.linspace(-np.pi, np.pi, self.length + 1)
+        window = np.zeros(self.length + 1)
+        for times, weight in enumerate(_COSINES[self.window]):
+            window += weight * np.cos(times * angles)
+        window = window[:-1]
         window /= window.sum()
         return window
 
@@ -75,7 +87,7 @@ class MatchingPreset:
     @property
     def level_bins(self) -> int:
         """Number of bins, from frequency 0 up, that a constant fills with this window."""
-        return _COSINE_TERMS[self.window]
+        return len(_COSINES[self.window])
 
     @property
     def first_bin(self) -> int:

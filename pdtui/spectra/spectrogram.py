@@ -9,7 +9,6 @@ from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
-import scipy.fft
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
@@ -93,6 +92,8 @@ def short_time_transform(series: NDArray[Any], preset: MatchingPreset) -> Comple
     Returns:
         The transform in D whole windows and F bins, shape (N, D, F); D is 0 if T is shorter than a window.
     """
+    import scipy.fft  # a drive needs it only once its spectra are looked at
+
     if len(series) < preset.length:
         return np.empty((series.shape[1], 0, preset.bins), np.complex128)
     # With one series after the other, the transform reads memory in order. It costs as much as scipy's

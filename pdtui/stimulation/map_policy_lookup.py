@@ -1,4 +1,7 @@
-"""Finds the policy of a map: the one that the user names, or the one that the map names."""
+"""Finds the policy of a map: the one that the user names, or the one that the map names.
+
+The screen's process imports this module, so neither PyTorch nor a simulator may come with it.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,8 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
-from pdtui.policies.weights.import_options import (
-    NO_NORMALIZER,
-    NO_OPTIONS,
-    ImportOptions,
-    ObservationActionSpaces,
-)
+from pdtui.policies.weights.import_options import NO_NORMALIZER, NO_OPTIONS, ImportOptions
 from pdtui.policies.weights.policy_file_lookup import find_file_inside_folders, is_file, policy_search_folders
-from pdtui.policies.weights.policy_loading import load_policy
-from pdtui.robots import RobotSpec, open_robot
 from pdtui.stimulation.map_writer import compose_map, replace_policy
 from pdtui.stimulation.stimulation_map import StimulationMap
 
@@ -54,20 +50,6 @@ def locate_map_policy(
     if merged.normalizer != NO_NORMALIZER and not import_options.normalizer:
         merged = replace(merged, normalizer=_path_from_here(merged.normalizer, source))
     return replace(stimulation_map, policy=name, import_options=merged)
-
-
-def is_of_another_policy(
-    stimulation_map: StimulationMap, robot: RobotSpec, policy: str, import_options: ImportOptions = NO_OPTIONS
-) -> bool:
-    """Return whether a map was made for another policy of a robot than the one of this file or name.
-
-    Raises:
-        PdtuiError: The robot or the policy cannot be loaded.
-    """
-    with open_robot(robot) as world:
-        spaces = ObservationActionSpaces.of_world(world)
-    given = load_policy(policy, robot.name, import_options=import_options, spaces=spaces)
-    return given.sha256 != stimulation_map.policy_hash
 
 
 def relative_policy_name(

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from pdtui.core.errors import TrainingError
+from pdtui.policies.weights.policy_file_lookup import find_weights_file
 from pdtui.policies.weights.policy_network import PolicyNetwork
-from pdtui.policies.weights.weights_file import find_weights_file, load_network
+from pdtui.policies.weights.weights_file import load_network
 from pdtui.training.actor_conversion import Actor, make_numpy_actor, network_to_actor
 from pdtui.training.multilayer_perceptron import MlpParameters
 from pdtui.training.policy_imitation import fit_actor, imitate, make_demonstrator

@@ -129,7 +129,19 @@ class BrailleCanvas:
         for column, row, text, ink in self._characters:
             codes[row, column : column + len(text)] = [ord(character) for character in text]
             inks[row, column : column + len(text)] = ink
-        return [Strip(_runs(codes[row], inks[row], styles), self.columns) for row in range(self.rows)]
+        # Blanks take the ink to their left, which saves segments.
+        places = np.where(codes != _SPACE, np.arange(self.columns), 0)
+        shown = np.take_along_axis(inks, np.maximum.accumulate(places, axis=1), axis=1)
+        changes = shown[:, 1:] != shown[:, :-1]
+        text = codes.astype("<u4").tobytes().decode("utf-32-le")
+        strips = []
+        for row, own in enumerate(shown.tolist()):
+            line = text[row * self.columns : (row + 1) * self.columns]
+            cuts = [0, *(np.flatnonzero(changes[row]) + 1).tolist(), self.columns]
+            strips.append(
+                Strip([Segment(line[a:b], styles[own[a]]) for a, b in pairwise(cuts)], self.columns)
+            )
+        return strips
 
 
 def _near(starts: Floats, ends: Floats, width: int, height: int) -> NDArray[np.bool_]:
@@ -139,13 +151,3 @@ def _near(starts: Floats, ends: Floats, width: int, height: int) -> NDArray[np.b
     touching = (high >= 0).all(-1) & (low <= size).all(-1)
     near: NDArray[np.bool_] = touching & ((high - low) <= 4 * size.max()).all(-1)
     return near
-
-
-def _runs(codes: NDArray[np.uint32], inks: NDArray[np.int16], styles: Sequence[Style]) -> list[Segment]:
-    """Return segments of one ink each; blanks take the ink to their left, which saves segments."""
-    places = np.arange(len(codes))
-    inked = np.maximum.accumulate(np.where(codes != _SPACE, places, 0))
-    shown = inks[inked]
-    text = codes.astype("<u4").tobytes().decode("utf-32-le")
-    cuts = [0, *(np.flatnonzero(shown[1:] != shown[:-1]) + 1).tolist(), len(codes)]
-    return [Segment(text[a:b], styles[shown[a]]) for a, b in pairwise(cuts)]

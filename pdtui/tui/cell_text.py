@@ -11,12 +11,18 @@ from textual.strip import Strip
 from pdtui.core.printable_text import make_printable
 
 
+def measure_cells(text: str) -> int:
+    """Return the number of cells of printable text."""
+    return len(text) if text.isascii() else cell_len(text)
+
+
 def fit_cells(text: str, width: int) -> str:
     """Pad text on the right, or cut it with an ellipsis, to exactly `width` cells."""
     if width <= 0:
         return ""
-    if cell_len(text) <= width:
-        return text + " " * (width - cell_len(text))
+    length = measure_cells(text)
+    if length <= width:
+        return text + " " * (width - length)
     return set_cell_size(set_cell_size(text, width - 1).rstrip() + "…", width)
 
 
@@ -50,14 +56,15 @@ class ScreenRow:
 
     def add(self, text: str, style: Style, width: int | None = None, *, right: bool = False) -> ScreenRow:
         """Append text, fitted to `width` cells if given; what exceeds the line is cut."""
-        if width is not None:
-            text = " " * (width - cell_len(text)) + text if right else text
-            text = fit_cells(text, width)
-        if cell_len(text) > self.left:
-            text = fit_cells(text, self.left)
+        length = measure_cells(text)
+        if width is not None and length != width:
+            text = " " * (width - length) + text if right and length < width else fit_cells(text, width)
+            length = max(width, 0)
+        if length > self.left:
+            text, length = fit_cells(text, self.left), self.left
         if text:
             self._segments.append(Segment(text, style))
-            self.left -= cell_len(text)
+            self.left -= length
         return self
 
     def add_strip(self, strip: Strip) -> ScreenRow:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self, TypeVar
 
 from rich.segment import Segment
 from rich.style import Style
@@ -23,8 +23,26 @@ if TYPE_CHECKING:
 
 
 Sides = tuple[Strip, Strip, Color, Style]
+_MOST_STYLES = 4096  # that a widget remembers
 LEAST_PAINTED = Size(16, 2)
 """Columns and lines of the smallest picture that is painted; a smaller widget shows its upper left part."""
+
+
+Shown = TypeVar("Shown")
+
+
+class PlainReactive(reactive[Shown]):
+    """A reactive that is cheap to read: Textual's own looks for a method that computes it each time."""
+
+    if not TYPE_CHECKING:
+
+        def __get__(self, owner, owner_type=None):
+            if owner is None:
+                return self
+            try:
+                return vars(owner)[self.internal_name]
+            except KeyError:  # not set yet
+                return super().__get__(owner, owner_type)
 
 
 class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
@@ -35,8 +53,10 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
     """
 
     ALLOW_SELECT: ClassVar[bool] = False
-    facts: reactive[DriveFacts | None] = reactive(None, init=False, repaint=False, always_update=True)
-    snapshot: reactive[DriveSnapshot | None] = reactive(None, init=False, repaint=False, always_update=True)
+    facts: reactive[DriveFacts | None] = PlainReactive(None, init=False, repaint=False, always_update=True)
+    snapshot: reactive[DriveSnapshot | None] = PlainReactive(
+        None, init=False, repaint=False, always_update=True
+    )
 
     def __init__(self, stimulation_map: StimulationMap, *, id: str | None = None) -> None:
         super().__init__(id=id)
@@ -45,6 +65,8 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         self._framed: list[Strip | None] = []
         self._painted_size = Size(0, 0)
         self._sides: Sides | None = None
+        self._based: dict[int, tuple[Style | None, Style]] = {}
+        self._borders: dict[int, Strip] = {}
         self.forget()
 
     @abstractmethod
@@ -97,7 +119,17 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         for row in changed:
             self._framed[row] = None
         if changed:
-            self.refresh(*(Region(0, row, self._painted_size.width, 1) for row in changed))
+            # Textual would cut lines that are repaired without their frame.
+            left, width = -self.gutter.left, self.outer_size.width
+            self.refresh(*(Region(left, row, width, 1) for row in changed))
+
+    def refresh(
+        self, *regions: Region, repaint: bool = True, layout: bool = False, recompose: bool = False
+    ) -> Self:
+        """Have Textual repaint some lines, or all of them, as where the title has changed."""
+        if not regions:
+            self._borders = {}
+        return super().refresh(*regions, repaint=repaint, layout=layout, recompose=recompose)
 
     def _paint_strips(self) -> None:
         """Paint lines for the present size; framed lines of another size are dropped."""
@@ -110,13 +142,13 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
             if wide > width:
                 strips = [strip.crop(0, width) for strip in strips]
         if size != self._painted_size:
-            self._framed, self._sides = [None] * len(strips), None
+            self._framed, self._sides, self._borders = [None] * len(strips), None, {}
         self._strips, self._painted_size = strips, size
 
     def notify_style_update(self) -> None:
         """Drop what was painted with the old styles."""
         super().notify_style_update()
-        self._sides = None
+        self._sides, self._borders = None, {}
         self._framed = [None] * len(self._framed)
 
     def render_line(self, y: int) -> Strip:
@@ -129,7 +161,8 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         """Render the lines of the widget with its frame.
 
         Textual's own method resolves border, padding and background again for every changed line, which costs
-        as much as painting it. Here one empty line provides the sides of all.
+        as much as painting it, and asks for all lines of a widget of which one changed. Here one empty line
+        provides the sides of all, and the lines above and below are kept.
         """
         if self._painted_size != self.content_size:
             self._paint_strips()  # Textual may want lines of a new size before it tells the widget
@@ -140,7 +173,9 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
             if top <= y < bottom:
                 lines.append(self._frame_line(y - top))
             else:
-                lines += super().render_lines(Region(0, y, width, 1))
+                if y not in self._borders:
+                    self._borders[y] = super().render_lines(Region(0, y, width, 1))[0]
+                lines.append(self._borders[y])
         if crop.column_span != (0, width):
             lines = [line.crop(*crop.column_span) for line in lines]
         return lines
@@ -150,25 +185,34 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
         framed = self._framed[row]
         if framed is None:
             left, right, background, base = self._sides or self._make_sides()
-            content = Strip(
-                [
-                    segment
-                    if segment.style is not None and segment.style.bgcolor is not None
-                    else Segment(segment.text, base + segment.style)
-                    for segment in self._strips[row]
-                ]
-            )
-            for line_filter in self.get_line_filters():
-                # All colors are true colors already; other filters, such as NO_COLOR's, still apply.
-                if not isinstance(line_filter, ANSIToTruecolor):
-                    content = content.apply_filter(line_filter, background)
-            framed = self._framed[row] = Strip([*left, *content, *right], self.outer_size.width)
+            if len(self._based) > _MOST_STYLES:
+                self._based.clear()
+            known = self._based.get
+            segments = [
+                segment
+                if (based := known(id(segment.style)) or self._add_base(segment.style, base))[1]
+                is segment.style
+                else Segment(segment.text, based[1])
+                for segment in self._strips[row]
+            ]
+            # All colors are true colors already; other filters, such as NO_COLOR's, still apply.
+            filters = [one for one in self.get_line_filters() if not isinstance(one, ANSIToTruecolor)]
+            for line_filter in filters:
+                segments = list(Strip(segments).apply_filter(line_filter, background))
+            framed = self._framed[row] = Strip([*left, *segments, *right], self.outer_size.width)
         return framed
+
+    def _add_base(self, style: Style | None, base: Style) -> tuple[Style | None, Style]:
+        """Remember a style on the widget's background, and the style itself, so that its id stays its own."""
+        own = style if style is not None and style.bgcolor is not None else base + style
+        self._based[id(style)] = style, own
+        return style, own
 
     def _make_sides(self) -> Sides:
         width, gutter = self.outer_size.width, self.gutter
         (line,) = super().render_lines(Region(0, gutter.top, width, 1))
         background = self.background_colors[1]
+        self._based = {}
         self._sides = (
             line.crop(0, gutter.left),
             line.crop(width - gutter.right, width),

@@ -25,7 +25,10 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
     padding: 0;
 }
 #behaviors, #attributes, #units { padding: 0 1; }
-#attributes { height: 8; }
+/* The behaviors take what they need of their part, and the attributes the rest. */
+#behaviors { height: auto; max-height: 56%; }
+#attributes { height: 1fr; }
+.-bench #attributes { height: 8; }
 #units, #world, #spectra { display: none; }
 #heat { height: 3; border-bottom: none; border-left: none; border-right: none; padding: 0; }
 
@@ -42,7 +45,7 @@ SnapshotWidget { width: 1fr; height: 1fr; color: $foreground; }
 .-full #units { display: block; width: 46; }
 .-tall #below { height: 2fr; }
 .-tall #robot { height: 3fr; }
-.-tall #attributes { height: 18; }
+.-tall.-bench #attributes { height: 18; }
 .-tall #heat { height: 6; }
 
 #bench {

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from pdtui.core.attributes import Attribute
-from pdtui.core.reserved_keys import RESERVED_KEYS, KeyAllocator
+from pdtui.core.reserved_keys import RESERVED_KEYS
 from pdtui.dissection.attribute_movers import find_attribute_movers, movable_attribute_columns
 from pdtui.dissection.dissection_config import QUICK_DISSECTION
 from pdtui.probing.effect_probe import EffectProbe
@@ -16,6 +16,7 @@ from pdtui.probing.unit_selection import select_units_to_refine
 from pdtui.spectra.episode_monitor import MonitoredEpisode, monitor_episodes
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_matching_preset
+from pdtui.stimulation.key_allocator import KeyAllocator
 from tests.wired_policy import WIRED_MOTOR, WIRED_UNIT
 
 

@@ -19,7 +19,7 @@ from pdtui.dissection.dissection_searches import DissectionSearches
 from pdtui.dissection.dissection_summary import summarize_dissection
 from pdtui.dissection.dissection_text import render_dissection
 from pdtui.dissection.draft_map import draft_map
-from pdtui.policies.weights.weights_file import hash_file
+from pdtui.policies.weights.weights_header import hash_file
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.matching_hits import rank_correlation
 from pdtui.probing.measured_effects import PlanEffects

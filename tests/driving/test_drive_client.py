@@ -19,7 +19,7 @@ from pdtui.driving.drive_client import DriveClient
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.drive_snapshot import DriveFacts, DriveSnapshot
 from pdtui.driving.session_replay import replay_session
-from pdtui.policies.weights.weights_file import hash_file
+from pdtui.policies.weights.weights_header import hash_file
 from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session

@@ -11,7 +11,8 @@ import torch
 from pdtui.driving.session_replay import replay_session
 from pdtui.policies.runtime.action_decoders import make_action_decoder
 from pdtui.policies.runtime.policy import Policy
-from pdtui.policies.weights.weights_file import find_weights_file, load_network
+from pdtui.policies.weights.policy_file_lookup import find_weights_file
+from pdtui.policies.weights.weights_file import load_network
 from pdtui.stimulation.map_library import shipped_folder
 
 network = load_network(find_weights_file("ant"))

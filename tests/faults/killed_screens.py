@@ -15,6 +15,7 @@ from pdtui.sessions.session_integrity import examine_session
 from tests.faults.fault_bench import FaultBench
 from tests.faults.fault_tally import FalseReport, FaultTally, StepsLost
 from tests.faults.killed_simulations import SIGNALS
+from tests.process_tree import find_simulation, list_descendants
 from tests.soak import Terminal
 
 PATIENCE = 120.0
@@ -101,7 +102,7 @@ class _Screen(Terminal):
         return self
 
     def __exit__(self, *_: object) -> None:
-        simulations = _list_descendants(self.pid)
+        simulations = list_descendants(self.pid)
         self.close()
         _end(simulations)
 
@@ -118,8 +119,8 @@ class _Screen(Terminal):
 
     def kill(self, place: int, ending: signal.Signals) -> int:
         """Signal a target, wait until screen and simulation are gone, and return the screen's exit code."""
-        children = _list_descendants(self.pid)
-        simulation = max(children, key=_resident) if children else 0
+        children = list_descendants(self.pid)
+        simulation = find_simulation(self.pid)
         targets = [pid for pid in ((self.pid,), (simulation,), (self.pid, simulation))[place] if pid]
         for pid in targets or [self.pid]:
             os.kill(pid, ending)
@@ -136,21 +137,6 @@ class _Screen(Terminal):
             if time.monotonic() > deadline:
                 raise StepsLost(f"the simulation did not end in {PATIENCE:g} s")
         return ended.si_status
-
-
-def _list_descendants(pid: int) -> list[int]:
-    try:
-        children = [int(one) for one in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-    except FileNotFoundError:
-        return []
-    return children + [other for child in children for other in _list_descendants(child)]
-
-
-def _resident(pid: int) -> int:
-    try:
-        return int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    except (OSError, IndexError):
-        return 0
 
 
 def _is_alive(pid: int) -> bool:

@@ -10,8 +10,9 @@ import torch
 from safetensors.torch import save_file
 
 from pdtui.core.errors import PolicyError
+from pdtui.policies.weights.policy_file_lookup import find_weights_file
 from pdtui.policies.weights.policy_loading import load_policy
-from pdtui.policies.weights.weights_file import find_weights_file, load_network, save_network
+from pdtui.policies.weights.weights_file import load_network, save_network
 
 
 def test_what_is_saved_comes_back(weights: Path, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 from pdtui.cli import main
-from pdtui.policies.weights.weights_file import find_weights_file
+from pdtui.policies.weights.policy_file_lookup import find_weights_file
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.search.evolutionary_search import SharedTimeBudget
 from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations

@@ -14,12 +14,8 @@ from scipy import stats
 
 from pdtui.cli import main
 from pdtui.core.errors import StudyError
-from pdtui.policies.weights.weights_file import (
-    CHECKPOINT_FOLDER,
-    find_weights_file,
-    load_network,
-    save_network,
-)
+from pdtui.policies.weights.policy_file_lookup import find_weights_file
+from pdtui.policies.weights.weights_file import CHECKPOINT_FOLDER, load_network, save_network
 from pdtui.study.dynamics.learning_dynamics import (
     CheckpointMeasurement,
     LearningDynamics,

@@ -15,7 +15,8 @@ from scipy import stats
 
 from pdtui.cli import main
 from pdtui.core.errors import SeedError, StudyError
-from pdtui.policies.weights.weights_file import find_weights_file, load_network, save_network
+from pdtui.policies.weights.policy_file_lookup import find_weights_file
+from pdtui.policies.weights.weights_file import load_network, save_network
 from pdtui.study.matching.matching_study_plan import load_matching_study_plan, parse_matching_study_plan
 from pdtui.study.matching.study_data import ROLES, read_study_data, write_study_data
 from pdtui.study.matching.study_page import answer_in_one_sentence, compose_study_page

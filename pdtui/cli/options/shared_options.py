@@ -19,6 +19,8 @@ from pdtui.stimulation.seed_ranges import FIRST_SEARCH_SEED, parse_seed_range, r
 
 if TYPE_CHECKING:
     from pdtui.driving.drive_config import DriveConfig
+    from pdtui.robots import RobotSpec
+    from pdtui.stimulation.stimulation_map import StimulationMap
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -170,7 +172,7 @@ def build_drive_config(
     from pdtui.driving.drive_config import DriveConfig
     from pdtui.robots import RobotSpec, require_robot_name, robot_file_stem, trust_module
     from pdtui.stimulation.map_library import find_map, map_without_behaviors
-    from pdtui.stimulation.map_policy_lookup import is_of_another_policy, resolve_map_policy
+    from pdtui.stimulation.map_policy_lookup import resolve_map_policy
     from pdtui.stimulation.map_reader import load_map
 
     if map_name is None and robot.endswith(".toml"):
@@ -192,13 +194,23 @@ def build_drive_config(
             stimulation_map = load_map(path)
             drives_alone = map_name is None and without_map and policy and not options.get("force")
             world = RobotSpec(robot, {**stimulation_map.robot_options, **typed})
-            if drives_alone and is_of_another_policy(stimulation_map, world, policy, import_options):
+            if drives_alone and _is_of_another_policy(stimulation_map, world, policy, import_options):
                 told = f"{path}: made for another policy than {policy}; driving without behaviors"
                 click.echo(make_printable(told), err=True)
                 stimulation_map = map_without_behaviors(robot, policy)
     stimulation_map = apply_robot_options(stimulation_map, typed)
     stimulation_map = resolve_map_policy(stimulation_map, policy, import_options)
     return DriveConfig(robot, stimulation_map, seed, **options)
+
+
+def _is_of_another_policy(
+    stimulation_map: StimulationMap, world: RobotSpec, policy: str, import_options: ImportOptions
+) -> bool:
+    from pdtui.stimulation.choosing.policy_comparison import (
+        is_of_another_policy,
+    )  # loads torch, so not before
+
+    return is_of_another_policy(stimulation_map, world, policy, import_options)
 
 
 def check_judging_seeds(config: DriveConfig, seeds: range) -> None:

@@ -21,6 +21,9 @@ def show_home() -> None:
     require_terminal()
     settings = read_settings()
     require_settled_theme(settings)
+    from pdtui.driving.drive_client import prepare_simulation
+
+    prepare_simulation()  # meanwhile, the user chooses
     from pdtui.tui.home.home_app import HomeApp
     from pdtui.tui.home.home_contents import read_home_contents
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pdtui.cli.screen.start_certainty import is_certain_to_start
 from pdtui.core.errors import ScreenError
 from pdtui.core.printable_text import make_printable
 from pdtui.core.settings.settings_file import read_settings, settings_path
@@ -23,13 +24,19 @@ BROWSER_VARIABLE = "TEXTUAL_DRIVER"
 def show_drive(config: DriveConfig, settings: UserSettings | None = None, *, watching: bool = False) -> None:
     """Drive on the screen, then print one line on how the drive ended."""
     require_terminal()
+    from pdtui.driving.drive_client import prepare_simulation
+
+    prepare_simulation(config.robot)  # what follows loads the screen
     settings = read_settings() if settings is None else settings
     require_settled_theme(settings)
     click.echo(make_printable(run_drive_screen(config, settings, watching=watching)))
 
 
 def run_drive_screen(config: DriveConfig, settings: UserSettings, *, watching: bool = False) -> str:
-    """Start the simulation's process, show it on the screen, and return one line on how the drive ended."""
+    """Start the simulation's process, show it on the screen, and return one line on how the drive ended.
+
+    Where robot, policy or recording may still be refused, the screen opens once the simulation has them.
+    """
     from pdtui.driving.drive_client import DriveClient
     from pdtui.search.gains.gain_tuning_process import GainTuningProcess
 
@@ -39,9 +46,10 @@ def run_drive_screen(config: DriveConfig, settings: UserSettings, *, watching: b
         from pdtui.tui.drive_app import DriveApp
         from pdtui.tui.graphics.terminal_graphics import find_terminal_graphics
 
-        if not watching:
-            click.echo(make_printable(f"starting {config.robot} …"), err=True)
-        connection.wait_until_started()
+        if not is_certain_to_start(config):
+            if not watching:
+                click.echo(make_printable(f"starting {config.robot} …"), err=True)
+            connection.wait_until_started()
         app = DriveApp(
             connection,
             config.stimulation_map,

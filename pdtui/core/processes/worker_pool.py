@@ -20,6 +20,7 @@ from pdtui.core.closable import Closable
 from pdtui.core.cluster.ray_cluster import RayCluster, Workers
 from pdtui.core.errors import WorkerError, format_error_in_one_line
 from pdtui.core.processes.call_answer import CallAnswer, answer_call, take_answer
+from pdtui.core.processes.process_start import start_process
 
 State = TypeVar("State")
 Job = TypeVar("Job")
@@ -29,7 +30,7 @@ StepProgress = Callable[[int, int], None]
 
 
 class WorkerProcess(Closable):
-    """A spawned process that holds a state and answers function calls, one at a time.
+    """A process that holds a state and answers function calls, one at a time.
 
     It ends when this process ends, in whatever way, and leaves Ctrl-C to this process.
 
@@ -41,18 +42,12 @@ class WorkerProcess(Closable):
 
     def __init__(self, name: str, build: Callable[..., object], *arguments: Any) -> None:
         self.name = name
-        context = multiprocessing.get_context("spawn")
-        self.connection, theirs = context.Pipe()
-        self.process = context.Process(
-            target=_serve_calls, args=(theirs, build, arguments), name=f"pdtui {name}"
-        )
-        # Ctrl-C reaches the whole process group. The worker inherits a mask that blocks it from its first
-        # instruction on, so that only this process answers and no worker prints a traceback.
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        self.connection, theirs = multiprocessing.Pipe()
         try:
-            self.process.start()
+            self.process = start_process(
+                f"pdtui {name}", build.__module__, _serve_calls, theirs, build, arguments
+            )
         finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
             theirs.close()
         # A daemon would be ended in the same way, but could not start processes itself.
         Finalize(self, self.process.kill, exitpriority=0)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pdtui.core.attributes import BehaviorAim
-from pdtui.core.reserved_keys import KeyAllocator
 from pdtui.dissection.attribute_movers import AttributeMover
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.dissection.steering.steering_results import SteeringResult
 from pdtui.probing.intervention_rollout_plan import InterventionRolloutPlan
 from pdtui.stimulation.interventions.intervention import LayerVectors
+from pdtui.stimulation.key_allocator import KeyAllocator
 from pdtui.stimulation.stimulation_map import Behavior
 
 

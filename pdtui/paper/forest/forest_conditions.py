@@ -36,7 +36,7 @@ from pdtui.paper.forest.key_motion_fit import fit_key_motion_models
 from pdtui.paper.forest.key_motion_model import KeyMotionModel, ObservedDrive
 from pdtui.paper.forest.key_pressers import KeyPresser, OperatorPresser, PlaceboPresser
 from pdtui.paper.forest.scripted_operator import operator_keys
-from pdtui.policies.weights.weights_file import find_weights_file
+from pdtui.policies.weights.policy_file_lookup import find_weights_file
 from pdtui.robots import require_robot_name, robot_file_stem
 from pdtui.stimulation.stimulation_map import StimulationMap
 

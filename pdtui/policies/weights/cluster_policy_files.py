@@ -8,9 +8,8 @@ from pathlib import Path
 
 from pdtui.core.cluster.ray_cluster import RayCluster, Workers
 from pdtui.policies.weights.import_options import NO_OPTIONS, ImportOptions
-from pdtui.policies.weights.policy_file_lookup import PACKAGE_POLICIES
+from pdtui.policies.weights.policy_file_lookup import PACKAGE_POLICIES, find_weights_file
 from pdtui.policies.weights.policy_loading import find_statistics
-from pdtui.policies.weights.weights_file import find_weights_file
 
 
 def send_policy_files(

@@ -23,6 +23,23 @@ def list_shipped_policies() -> list[str]:
     return [*sorted(path.stem for path in SHIPPED_WEIGHTS.glob("*.safetensors")), *PACKAGE_POLICIES]
 
 
+def find_weights_file(name: str, folders: Sequence[Path] = ()) -> Path:
+    """Return the path of a weights file: as given, in one of the folders, or a shipped one by its name.
+
+    A name such as ``metadrive:expert`` is that of a policy that comes with another package. If there is none,
+    a `PolicyError` lists the shipped policies.
+    """
+    own = find_file_beside(name, folders)
+    if own is not None:
+        return own
+    if is_file(shipped := SHIPPED_WEIGHTS / f"{name}.safetensors"):
+        return shipped
+    if (packaged := find_package_policy(name)) is not None:
+        return packaged
+    known = ", ".join(sorted(path.stem for path in SHIPPED_WEIGHTS.glob("*.safetensors"))) or "none"
+    raise PolicyError(f"no policy '{name}': neither a file nor a shipped policy; shipped policies: {known}")
+
+
 def find_package_policy(name: str) -> Path | None:
     """Return the path of a policy in `PACKAGE_POLICIES`, None for another name.
 

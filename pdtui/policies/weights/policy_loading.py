@@ -26,15 +26,10 @@ from pdtui.policies.weights.import_options import (
     ImportOptions,
     ObservationActionSpaces,
 )
-from pdtui.policies.weights.policy_file_lookup import find_file_beside
+from pdtui.policies.weights.policy_file_lookup import find_file_beside, find_weights_file
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
-from pdtui.policies.weights.weights_file import (
-    find_weights_file,
-    hash_file,
-    is_own_format,
-    load_network,
-    save_network,
-)
+from pdtui.policies.weights.weights_file import load_network, save_network
+from pdtui.policies.weights.weights_header import hash_file, is_own_format
 
 PACKAGE_POLICY_OPTIONS = {"metadrive:expert": ImportOptions(activation="tanh", squash="clip")}
 """Answers to what the policies of other packages leave open; see `PACKAGE_POLICIES`."""

@@ -11,8 +11,9 @@ from pdtui.policies.runtime.live_network import hash_network
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.robots import RobotSpec, robot_file_stem
+from pdtui.stimulation.choosing.policy_comparison import is_of_another_policy
 from pdtui.stimulation.map_library import find_map, map_without_behaviors
-from pdtui.stimulation.map_policy_lookup import is_of_another_policy, resolve_map_policy
+from pdtui.stimulation.map_policy_lookup import resolve_map_policy
 from pdtui.stimulation.map_reader import load_map
 from pdtui.stimulation.stimulation_map import StimulationMap
 

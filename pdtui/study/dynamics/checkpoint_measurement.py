@@ -17,7 +17,7 @@ from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import movable_attribute_columns
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.policy_evaluation import evaluate_policy
-from pdtui.policies.weights.weights_file import hash_file
+from pdtui.policies.weights.weights_header import hash_file
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states

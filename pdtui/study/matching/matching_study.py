@@ -8,7 +8,8 @@ from pathlib import Path
 
 from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.errors import StudyError
-from pdtui.policies.weights.weights_file import find_weights_file, hash_file
+from pdtui.policies.weights.policy_file_lookup import find_weights_file
+from pdtui.policies.weights.weights_header import hash_file
 from pdtui.study.matching.matching_study_plan import MatchingStudyPlan, StudiedPolicy
 from pdtui.study.matching.policy_measurement import measure_studied_policy
 from pdtui.study.matching.study_data import (

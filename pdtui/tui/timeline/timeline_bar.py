@@ -147,13 +147,13 @@ class TimelineBar(SnapshotWidget):
         past = self.snapshot.past
         oldest = 0 if past is None else past.oldest
         row = ScreenRow(width).add(f" {self._format(self.moment)} ", STYLES.text, _LABEL, right=True)
-        signs = [self._base(cell, cells, oldest) for cell in range(cells)]
-        ranks = [-1] * cells
+        signs = self._bases(cells, oldest)
+        ranks, last = [-1] * cells, self.last
         for mark in self._marks:
-            cell = self._cell_of(mark.moment, cells)
+            cell = _find_cell(mark.moment, last, cells)
             if mark.rank >= ranks[cell]:
                 signs[cell], ranks[cell] = (mark.sign, mark.style), mark.rank
-        at = self._cell_of(self.moment, cells)
+        at = _find_cell(self.moment, last, cells)
         signs[at] = ("●" if past is None and self._asked is None else "◆", STYLES.accent)
         run, style = "", signs[0][1]
         for sign, own in signs:
@@ -162,16 +162,16 @@ class TimelineBar(SnapshotWidget):
                 run, style = "", own
             run += sign
         row.add(run, style)
-        return [row.add(f" {self._format(self.last)}", STYLES.muted).strip()]
+        return [row.add(f" {self._format(last)}", STYLES.muted).strip()]
 
-    def _base(self, cell: int, cells: int, oldest: int) -> tuple[str, Style]:
-        moment = cell * self.last // cells
-        if moment >= self.present:
-            return "─", STYLES.faint
-        return ("┈", STYLES.faint) if moment < oldest - 1 else ("━", STYLES.primary)
-
-    def _cell_of(self, moment: int, cells: int) -> int:
-        return min(cells - 1, max(0, moment * cells // max(1, self.last)))
+    def _bases(self, cells: int, oldest: int) -> list[tuple[str, Style]]:
+        """Return what stands in each cell: what can no longer be looked at, the run, and what is to come."""
+        last, present = self.last, self.present
+        lost = ("┈", STYLES.faint)
+        run = ("━", STYLES.primary)
+        to_come = ("─", STYLES.faint)
+        moments = [cell * last // cells for cell in range(cells)]
+        return [to_come if moment >= present else lost if moment < oldest - 1 else run for moment in moments]
 
     def _format(self, moment: int) -> str:
         assert self.facts is not None
@@ -197,3 +197,7 @@ class TimelineBar(SnapshotWidget):
         moment = self.last if cell == cells - 1 else round((cell + 0.5) * self.last / cells)
         if moment != self._asked:
             self.seek(moment)
+
+
+def _find_cell(moment: int, last: int, cells: int) -> int:
+    return min(cells - 1, max(0, moment * cells // max(1, last)))

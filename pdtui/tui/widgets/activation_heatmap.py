@@ -114,16 +114,17 @@ class ActivationHeatmap(SnapshotWidget):
         label = "/".join(starting).rjust(_LABEL - 1)[: _LABEL - 1] + " "
         segments = [Segment(label, STYLES.muted)]
         pairs = pixels[0] * 1000 + pixels[1]
-        own = {column: cell for (at, column), cell in cells.items() if at == line}
         cuts = {0, len(pairs), *(np.flatnonzero(pairs[1:] != pairs[:-1]) + 1).tolist()}
-        cuts |= {edge for column in own for edge in (column, column + 1)}
+        own = {column: cell for (at, column), cell in cells.items() if at == line}
+        cuts.update(edge for column in own for edge in (column, column + 1))
+        heat, (uppers, lowers) = STYLES.heat, pixels.tolist()
         for a, b in pairwise(sorted(cuts)):
             if a in own:
                 segments.append(Segment(*own[a]))
                 continue
-            upper, lower = int(pixels[0, a]), int(pixels[1, a])
-            text = "▀" if max(upper, lower) >= 0 else " "
-            style = _style(*(STYLES.heat[level] if level >= 0 else None for level in (upper, lower)))
+            upper, lower = uppers[a], lowers[a]
+            text = "▀" if upper >= 0 or lower >= 0 else " "
+            style = _style(heat[upper] if upper >= 0 else None, heat[lower] if lower >= 0 else None)
             segments.append(Segment(text * (b - a), style))
         return Strip(segments, _LABEL + pixels.shape[1])
 

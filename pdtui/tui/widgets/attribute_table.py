@@ -14,28 +14,23 @@ from pdtui.core.attributes import Floats, wrap_angle
 from pdtui.core.printable_text import make_printable
 from pdtui.driving.drive_snapshot import DriveSnapshot
 from pdtui.driving.ghost.ghost_snapshot import GhostPose
+from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import ScreenRow, format_number, format_signed
 from pdtui.tui.ghost_drawing import add_ghost_to_title
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 from pdtui.tui.widgets import sparklines
+from pdtui.tui.widgets.attribute_choice import AttributeChoice, is_force
 from pdtui.tui.widgets.attribute_history import AttributeHistory
 from pdtui.tui.widgets.key_press_axis import KeyPressAxis
 
 _SECONDS = 12.0  # length of the history that a plot shows
 _ROWS_KEPT = 4096  # control steps
-_VALUE, _UNIT, _TARGET, _END, _CHANGE = (
-    8,
-    6,
-    10,
-    7,
-    9,
-)  # widths of the columns with the space beside them, in cells
+_VALUE, _UNIT, _TARGET, _END = 8, 6, 10, 7  # widths of the columns with the space beside them, in cells
 _CHANGE = 9  # the same of a difference
 _LEAST_NAME, _LEAST_PLOT = 8, 12  # cells
 _WIDE = 50  # cells from which two lines have room for targets
 _WITHOUT = "without"
-_FORCES = ("N", "N m", "Nm")
 _Targets = dict[int, tuple[float, Style]]
 
 
@@ -63,11 +58,28 @@ class _Layout(NamedTuple):
 class AttributeTable(SnapshotWidget):
     """Shows each attribute in one line, or in two where there is room, or a ghost to compare with.
 
-    If not all fit, forces and torques are left out first. The last line is the time axis, with the keys; two
-    lines for each attribute leave it out where there is little room.
+    If not all fit, the table scrolls; forces and torques come last. The last line is the time axis, with the
+    keys; two lines for each attribute leave it out where there is little room.
     """
 
     BORDER_TITLE = "attributes"
+
+    def __init__(self, stimulation_map: StimulationMap, *, id: str | None = None) -> None:
+        super().__init__(stimulation_map, id=id)
+        self._choice = AttributeChoice(stimulation_map)
+
+    def handle_request(self, request: str) -> None:
+        """Show the next attributes, or those before."""
+        if self._choice.scroll_page(1 if request == "next" else -1):
+            self.redraw()
+
+    def on_mouse_scroll_down(self) -> None:
+        if self._choice.scroll(1):
+            self.redraw()
+
+    def on_mouse_scroll_up(self) -> None:
+        if self._choice.scroll(-1):
+            self.redraw()
 
     def forget(self) -> None:
         self._history: AttributeHistory | None = None
@@ -85,12 +97,15 @@ class AttributeTable(SnapshotWidget):
     def paint(self, width: int, height: int) -> list[Strip]:
         if self.facts is None or self._history is None:
             return [ScreenRow(width).add("waiting for the policy", STYLES.faint).strip()]
-        forces = sum(attribute.unit in _FORCES for attribute in self.facts.attributes)
+        forces = sum(is_force(attribute.unit) for attribute in self.facts.attributes)
         others = len(self.facts.attributes) - forces
         ghost = self.snapshot is not None and self.snapshot.ghost is not None
         lines = 2 if ghost or 2 * others < height else 1
         axis = lines == 1 or height % 2 == 1 or height >= 10
-        shown = self._choose((height - axis) // lines)
+        shown = self._choice.choose(self.facts, (height - axis) // lines)
+        more = f"+{self._choice.hidden} more: scroll" if self._choice.hidden else ""
+        if more != (self.border_subtitle or ""):
+            self.border_subtitle = more
         layout = self._lay_out(shown, width, lines)
         strips = (self._paint_pairs if lines > 1 else self._paint_lines)(shown, layout)
         if axis:
@@ -195,21 +210,6 @@ class AttributeTable(SnapshotWidget):
             lambda step: history.cell_of(step, layout.points, steps) // max(1, layout.lines),
         )
         return line.strip()
-
-    def _choose(self, count: int) -> list[int]:
-        """Return the indices of the attributes to show, in the robot's order."""
-        assert self.facts is not None
-        named = {primitive.attribute for primitive in self.map.primitives.values()}
-        for behavior in self.map.behaviors.values():
-            named |= {part.attribute for part in (behavior.aim, behavior.pid) if part is not None}
-
-        def rank(index: int) -> tuple[bool, bool, int]:
-            assert self.facts is not None
-            attribute = self.facts.attributes[index]
-            force = attribute.unit in _FORCES
-            return force, attribute.name not in named, index
-
-        return sorted(sorted(range(len(self.facts.attributes)), key=rank)[:count])
 
     def _targets(self) -> _Targets:
         """Return target and color of each attribute that a controller holds, by its index."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 from rich.style import Style
+from textual.geometry import Size
 from textual.strip import Strip
 
 from pdtui.core.printable_text import make_printable
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from pdtui.stimulation.stimulation_map import Behavior
 
 _ECHO_SNAPSHOTS = 12  # after which a key that the drive did not mention is no longer shown as pressed
+_SHARE = 0.56  # of the height of its column, as in the style sheet
 _BAR = 10  # length of the bar of the time left, in cells
 _BLOCKS = " ▏▎▍▌▋▊▉"
 
@@ -32,12 +34,31 @@ class BehaviorList(SnapshotWidget):
 
     BORDER_TITLE = "behaviors"
     _line_keys: tuple[str, ...] = ()
+    _first = _hidden = 0  # behavior from which on they are listed, and how many have no room
+
+    def on_mouse_scroll_down(self) -> None:
+        self._first = min(self._first + 1, self._hidden)
+        self.redraw()
+
+    def on_mouse_scroll_up(self) -> None:
+        self._first = max(self._first - 1, 0)
+        self.redraw()
 
     def on_click(self, event: events.Click) -> None:
         """Latch the behavior that was clicked."""
         place = event.get_content_offset(self)
         if place is not None and place.y < len(self._line_keys) and self._line_keys[place.y]:
             self.post_message(KeyClicked(self._line_keys[place.y]))
+
+    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
+        """Return the lines that all behaviors take: two each where there is room, else one."""
+        del viewport, width
+        frame = self.gutter.height  # which the container comes without
+        room = int((container.height + frame) * _SHARE) - frame
+        count = len(self.map.behaviors)
+        controllers = sum(behavior.pid is not None for behavior in self.map.behaviors.values())
+        roomy = 2 * count + controllers + 2
+        return roomy if roomy <= room else max(1, min(count + controllers + 1, room))
 
     def forget(self) -> None:
         self._echoes: dict[str, int] = {}
@@ -171,21 +192,23 @@ class BehaviorList(SnapshotWidget):
     ) -> tuple[list[Strip], list[int]]:
         """Return as many entries as fit, in the order of the map, and the number of the entry in each line.
 
-        Latched ones are kept first; the last line then says how many are hidden.
+        Latched ones are kept first, then those from where the list is scrolled to. The last line counts what
+        is hidden.
         """
         everything = range(len(entries))
         if sum(map(len, entries)) <= height:
+            self._first = self._hidden = 0
             strips = [strip for entry in entries for strip in entry]
             return strips, [index for index in everything for _ in entries[index]]
         room = height - 1
         chosen = []
-        for index in sorted(range(len(entries)), key=lambda index: (not latched[index], index)):
+        for index in sorted(everything, key=lambda index: (not latched[index], index < self._first, index)):
             if len(entries[index]) <= room:
                 room -= len(entries[index])
                 chosen.append(index)
         strips = [strip for index in sorted(chosen) for strip in entries[index]]
-        hidden = len(entries) - len(chosen)
-        more = ScreenRow(width).add(f"+{hidden} more: ? lists all", STYLES.muted)
+        self._hidden = len(entries) - len(chosen)
+        more = ScreenRow(width).add(f"+{self._hidden} more: ? lists all", STYLES.muted)
         return [*strips, more.strip()], [index for index in sorted(chosen) for _ in entries[index]]
 
 

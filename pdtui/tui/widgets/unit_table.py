@@ -26,6 +26,15 @@ class UnitTable(SnapshotWidget):
     """Shows one unit per line, in the color of the behavior that overwrites it."""
 
     BORDER_TITLE = "stimulated units"
+    _first = _hidden = 0  # unit from which on they are listed, and how many have no room
+
+    def on_mouse_scroll_down(self) -> None:
+        self._first = min(self._first + 1, self._hidden)
+        self.redraw()
+
+    def on_mouse_scroll_up(self) -> None:
+        self._first = max(self._first - 1, 0)
+        self.redraw()
 
     def paint(self, width: int, height: int) -> list[Strip]:
         if self.facts is None or self.snapshot is None or not self.snapshot.stimulated_units:
@@ -41,8 +50,10 @@ class UnitTable(SnapshotWidget):
         strips = [head.strip()]
         units = self.snapshot.stimulated_units
         room = height - 1 if len(units) < height else height - 2
+        self._hidden = max(0, len(units) - room)
+        self._first = min(self._first, self._hidden)
         natural = NaturalOutputs(self.facts, self.snapshot)
-        for view in units[:room]:
+        for view in units[self._first : self._first + room]:
             has = natural.has(view.unit, view.overwritten)
             name = names.get(view.unit, "")
             style = STYLES.behavior(self.row_of(name)) if name else STYLES.accent
@@ -57,16 +68,18 @@ class UnitTable(SnapshotWidget):
             if row.left > cell_len(make_printable(name)):
                 row.add(" " + make_printable(name), style)
             strips.append(row.strip())
-        if len(units) > room:
-            strips.append(ScreenRow(width).add(f"+{len(units) - room} more", STYLES.faint).strip())
+        if self._hidden:
+            strips.append(ScreenRow(width).add(f"+{self._hidden} more: scroll", STYLES.faint).strip())
         return strips
 
     def on_click(self, event: events.Click) -> None:
         """Pick the unit under the mouse."""
         offset = event.get_content_offset(self)
         units = () if self.snapshot is None else self.snapshot.stimulated_units
-        if offset is not None and 1 <= offset.y <= min(len(units), self.content_size.height - 1):
-            self.post_message(UnitPicked(units[offset.y - 1].unit))
+        if offset is not None and 1 <= offset.y <= min(
+            len(units) - self._first, self.content_size.height - 1
+        ):
+            self.post_message(UnitPicked(units[self._first + offset.y - 1].unit))
 
 
 def behaviors_of_units(

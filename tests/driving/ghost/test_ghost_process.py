@@ -22,6 +22,7 @@ from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_reader import read_session
 from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.core.processes.test_worker_pool import is_alive
+from tests.process_tree import list_siblings
 
 PATIENCE = 120.0
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -51,15 +52,6 @@ def _is(condition: str) -> Callable[[DriveSnapshot], bool]:
     return lambda snapshot: snapshot.ghost is not None and snapshot.ghost.condition == condition
 
 
-def _children(pid: int) -> list[int]:
-    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()] + [
-        int(child)
-        for thread in Path(f"/proc/{pid}/task").iterdir()
-        if thread.name != str(pid)
-        for child in (thread / "children").read_text().split()
-    ]
-
-
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     return tmp_path / "drive.rrd"
@@ -77,12 +69,12 @@ def connection(small_map: StimulationMap, recording: Path) -> Iterator[DriveClie
 
 def _turn_on(connection: DriveClient) -> int:
     """Turn the ghost on and latch a behavior; the id of the ghost's process."""
-    assert _children(connection.pid) == []
+    before = list_siblings(connection.pid)
     connection.toggle_ghost()
     _until(connection, _is("waiting"))
     connection.press_key("w")
     _until(connection, _runs)
-    (ghost,) = _children(connection.pid)
+    (ghost,) = list_siblings(connection.pid) - before
     return ghost
 
 

@@ -13,7 +13,8 @@ from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.ghost import ghost_runner
 from pdtui.driving.loop_builder import build_control_loop
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
-from pdtui.policies.weights.weights_file import hash_file, save_network
+from pdtui.policies.weights.weights_file import save_network
+from pdtui.policies.weights.weights_header import hash_file
 from pdtui.robots.environments.environment_lookup import TRUSTED
 from pdtui.stimulation.map_library import find_map, map_without_behaviors
 from pdtui.stimulation.map_reader import load_map

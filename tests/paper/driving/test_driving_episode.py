@@ -24,7 +24,8 @@ from pdtui.paper.driving.road_sight import SIGHT
 from pdtui.paper.driving.sight_reader import SightReader, read_boxes
 from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
-from pdtui.policies.weights.weights_file import hash_file, save_network
+from pdtui.policies.weights.weights_file import save_network
+from pdtui.policies.weights.weights_header import hash_file
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot
 from pdtui.sessions.writer.session_recorder import SessionRecorder

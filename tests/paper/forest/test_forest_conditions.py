@@ -32,7 +32,8 @@ from pdtui.paper.forest.key_motion_model import KeyMotionModel
 from pdtui.paper.forest.key_pressers import OperatorPresser, PlaceboPresser
 from pdtui.paper.forest.scripted_operator import DEFAULT
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
-from pdtui.policies.weights.weights_file import hash_file, save_network
+from pdtui.policies.weights.weights_file import save_network
+from pdtui.policies.weights.weights_header import hash_file
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.stimulation.map_reader import load_map
