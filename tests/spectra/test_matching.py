@@ -224,11 +224,13 @@ def test_angles_can_stay_wrapped() -> None:
 def test_the_order_is_that_of_double_precision_where_single_precision_cannot_tell(
     preset: MatchingPreset,
 ) -> None:
-    """Some units differ from others by the last digit of a few samples."""
+    """Some units differ from others by the last digit of one sample."""
     rng = np.random.default_rng(19)
     one = episode(19, 400, units=40)
-    twins = one.activations.copy()
-    twins[100:103] = np.nextafter(twins[100:103], np.float32(2.0))
+    twins = np.hstack([one.activations] * 4)
+    for twin in range(4):
+        sample = twins[100 + 17 * twin, 40 * twin : 40 * twin + 40]
+        sample[:] = np.nextafter(sample, np.float32(2.0))
     level = 5.0 + 0.5 * rng.standard_normal((400, 40)).cumsum(axis=0)  # what loses most digits
     activations = np.hstack([one.activations, twins, level.astype(np.float32)])
     paired = MonitoredEpisode(19, activations, one.attributes)
