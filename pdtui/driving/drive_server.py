@@ -56,16 +56,12 @@ class DriveServer:
         self._branches = 0
         length = 0 if config.watched is None else config.watched.steps
         self._recorder = RecorderProcess(soon=bool(config.recording))
-        self._begin(config, build_control_loop(config), RunTimeline(length))
+        self._begin(config, build_control_loop(config), RunTimeline(length), None)
         dt = self._loop.robot.control_dt
         self._pacer = Pacer(dt, time.monotonic(), keeps_times=bool(config.step_times))
 
     def _begin(
-        self,
-        config: DriveConfig,
-        loop: ControlLoop,
-        timeline: RunTimeline,
-        origin: BranchOrigin | None = None,
+        self, config: DriveConfig, loop: ControlLoop, timeline: RunTimeline, origin: BranchOrigin | None
     ) -> None:
         self._config, self._loop, self._timeline = config, loop, timeline
         self._ghost = GhostRunner(config, loop)

@@ -33,8 +33,8 @@ class RecorderProcess(Closable):
     has written, and its file is completed. The process ends when this one does, in whatever way.
 
     Args:
-        soon: whether to start the process at once, so that it loads while the drive does; otherwise, the first
-            recording starts it.
+        soon: whether to start the process at once, so that it loads while the drive does; otherwise, the
+            first recording starts it.
     """
 
     def __init__(self, *, soon: bool = True) -> None:
@@ -170,7 +170,8 @@ class RemoteRecorder:
         if now - self._looked > _LOOK_EVERY:
             self._looked = now
             self._require_alive()
-        while self._seen != self._ring.notes:
+        # A state is sent before it is counted.
+        while self._seen < self._ring.notes:
             self._take_state()
         if self._state.failure is not None:
             raise self._state.failure
