@@ -115,11 +115,11 @@ class _Recording:
             self._failure = as_session_error(error)
             with suppress(Exception):
                 self._recorder.close(str(self._failure))
-        self._ring.progress = self._recorder.bytes
         self._send_state()
 
     def _send_state(self, *, closed: bool = False) -> None:
         recorder = self._recorder
+        self._ring.progress = recorder.bytes
         notice, recorder.notice = recorder.notice, ""
         state = RecordingState(recorder.path, recorder.created, recorder.began, notice, self._failure, closed)
         if state != self._sent:
