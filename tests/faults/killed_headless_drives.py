@@ -15,7 +15,7 @@ from tests.faults.fault_bench import ROOT, FaultBench
 from tests.faults.fault_tally import FalseReport, FaultTally, StepsLost
 from tests.faults.killed_simulations import SIGNALS
 
-HEADLESS_LOSS = 127
+HEADLESS_LOSS = 3
 """Control steps of a drive without a screen that may be missing after a SIGKILL."""
 
 PATIENCE = 120.0

@@ -39,19 +39,18 @@ def process() -> Iterator[RecorderProcess]:
 
 
 def read_chunks(path: Path) -> list[tuple[str, dict[str, object]]]:
-    """All rows of a recording in the order in which they were written, without what names it."""
-    named = {"__properties/RecordingInfo", "__properties"}
+    """All rows of a recording in the order in which they were written, without what only names it."""
+    named = ("rerun.controls.RowId", "RecordingInfo:start_time")
     return [
         (
             chunk.entity,
             {
                 name: chunk.batch.column(name).to_pylist()
                 for name in chunk.batch.schema.names
-                if name != "rerun.controls.RowId"
+                if name not in named
             },
         )
         for chunk in ChunkStream(path)
-        if chunk.entity not in named
     ]
 
 

@@ -15,6 +15,7 @@ from pdtui.core.processes.shared_ring import SharedRing
 from pdtui.core.processes.worker_pool import describe_exit
 from pdtui.core.step_record import StepRecord
 from pdtui.sessions.drive_info import DriveInfo
+from pdtui.sessions.environment_versions import collect_versions
 from pdtui.sessions.writer.recorder_loop import RecordingState, serve_recordings
 from pdtui.sessions.writer.step_record_codec import StepRecordEncoder
 
@@ -116,7 +117,9 @@ class RemoteRecorder:
         self._looked = time.monotonic()
         self._closed = False
         try:
-            process.send((self._ring.path, {"path": path, "info": info, **options}))
+            # Those of the drive: what the recorder's process has loaded differs.
+            described = {"path": path, "info": info, "versions": collect_versions(), **options}
+            process.send((self._ring.path, described))
             first = process.receive()
         except SessionError:
             self._ring.close()
