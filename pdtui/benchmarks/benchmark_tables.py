@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.console import Group
 from rich.table import Table
 
+from pdtui.benchmarks.accelerator.screening_result import ScreeningBenchmark
 from pdtui.benchmarks.cluster_benchmark import BYTES_PER_SECOND, NODES, ClusterBenchmark
 from pdtui.benchmarks.control_loop_benchmark import ControlLoopBenchmark
 from pdtui.benchmarks.dissection_benchmark import DissectionBenchmark
@@ -177,3 +178,46 @@ def screen_benchmark_table(result: ScreenBenchmark) -> Table:
                 f"{1000 * times[len(times) // 2]:.0f} ms, {1000 * times[-1]:.0f} ms",
             )
     return table
+
+
+def screening_benchmark_tables(result: ScreeningBenchmark) -> Group:
+    """Return the speed of screening on accelerator and CPU, and how far they agree on each attribute."""
+    speed = new_table(
+        f"Screening the Ant's units: {result.rollouts} roll-outs of {result.steps} control steps",
+        "by",
+        "seconds",
+        "roll-outs/s",
+        "falls",
+    )
+    runs = (
+        (f"MJX on {result.device}", result.accelerator_seconds, result.falls[0]),
+        (f"MuJoCo, {result.workers} workers", result.cpu_seconds, result.falls[1]),
+    )
+    for name, seconds, falls in runs:
+        speed.add_row(name, f"{seconds:.1f}", f"{result.rollouts / seconds:.0f}", f"{falls:.1%}")
+    speed.caption = (
+        f"Compiling took another {result.compile_seconds:.0f} s. Both fall, or neither does, in "
+        f"{result.same_falls:.1%} of the roll-outs."
+    )
+    agreement = new_table(
+        "Effects of units on attributes",
+        "attribute",
+        "rank correlation",
+        "of halves in MuJoCo",
+        "strongest tenth shared",
+        "MJX's strongest, on the CPU",
+    )
+    for one in result.attributes:
+        agreement.add_row(
+            one.name,
+            f"{one.correlation:.2f}",
+            f"{one.cpu_correlation:.2f}",
+            f"{one.shared:.0%}",
+            f"{one.confirmed:.2f}",
+        )
+    agreement.caption = (
+        "Rank correlations are of MJX's effects with MuJoCo's from the same starts, and of MuJoCo's from one "
+        "half of the starts with those from the other. The last column is the effect in MuJoCo of what moves "
+        "the attribute most in MJX, as a share of the largest."
+    )
+    return Group(speed, agreement)

@@ -21,6 +21,7 @@ from pdtui.cli.options.worker_options import cluster_option
 from pdtui.cli.output.command_output import print_result
 from pdtui.core.cluster.ray_cluster import RayCluster
 from pdtui.core.console.progress_bar import progress_bar
+from pdtui.core.errors import PdtuiError
 from pdtui.sessions.session_schema import ActivationsKept
 
 
@@ -129,6 +130,30 @@ def bench_cluster_command(
     with cluster or RayCluster() as joined, progress_bar("measuring", quiet=as_json) as advance:
         result = bench_cluster(world, policy or robot, joined, progress=advance, **sizes)
     print_result(asdict(result), as_json, lambda: cluster_benchmark_tables(result))
+
+
+@bench_command.command("screening")
+@own_policy_option
+@integer_option("--units", least=0, default=0, help="Number of units to screen, evenly spread; 0 for all.")
+@integer_option("--starts", least=2, default=6, help="Number of common starts.")
+@integer_option("--steps", least=10, default=60, help="Number of control steps per roll-out.")
+@integer_option("--workers", default=2, help="Number of worker processes on the CPU.")
+@json_option
+def bench_screening_command(policy: str, as_json: bool, **sizes: Any) -> None:
+    """Screen the Ant's units by MJX, on a GPU where there is one, and by MuJoCo on the CPU.
+
+    Needs pdtui[mjx], on which nothing else depends.
+    """
+    from pdtui.benchmarks.benchmark_tables import screening_benchmark_tables
+    from pdtui.robots import RobotSpec
+
+    try:
+        from pdtui.benchmarks.accelerator.screening_benchmark import bench_screening
+    except ImportError as error:
+        raise PdtuiError(f"{error.name} is not installed; pip install 'pdtui[mjx]' brings it") from error
+    with progress_bar("measuring", quiet=as_json) as advance:
+        result = bench_screening(RobotSpec("ant"), policy or "ant", progress=advance, **sizes)
+    print_result(asdict(result), as_json, lambda: screening_benchmark_tables(result))
 
 
 @bench_command.command("record")

@@ -16,7 +16,8 @@ from rich.table import Table
 
 from pdtui.core.attributes import Floats, wrap_angles
 from pdtui.core.printable_text import to_json
-from pdtui.pictures.matplotlib_page import FIGURE_SUFFIXES, open_figure_page
+from pdtui.pictures.matplotlib_page import open_figure_page
+from pdtui.pictures.picture_paths import write_pictures
 from pdtui.pictures.plot_colors import CYCLE, GRAY, RgbColor, color_to_hex
 from pdtui.pictures.rerun_report_file import TIME, open_report_file, table_to_markdown
 
@@ -83,11 +84,7 @@ def draw_heading_pictures(paths: Sequence[Path], shown: HeadingFigure) -> None:
     Raises:
         PictureError: A file cannot be written.
     """
-    for path in paths:
-        if path.suffix in FIGURE_SUFFIXES:
-            _draw_heading_figure(path, shown)
-        else:
-            _write_heading_recording(path, shown)
+    write_pictures(paths, shown, _draw_heading_figure, _write_heading_recording)
 
 
 def _draw_heading_figure(path: Path, shown: HeadingFigure) -> None:

@@ -13,7 +13,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pdtui.core.attributes import Floats
-from pdtui.pictures.matplotlib_page import FIGURE_SUFFIXES, open_figure_page
+from pdtui.pictures.matplotlib_page import open_figure_page
+from pdtui.pictures.picture_paths import write_pictures
 from pdtui.pictures.plot_colors import CYCLE, GRAY, RgbColor, color_to_hex
 from pdtui.pictures.rerun_report_file import open_report_file
 
@@ -60,11 +61,12 @@ def draw_road_pictures(paths: Sequence[Path], title: str, pictures: Sequence[Roa
     Raises:
         PictureError: A file cannot be written.
     """
-    for path in paths:
-        if path.suffix in FIGURE_SUFFIXES:
-            _draw_page(path, title, pictures)
-        else:
-            _write_recording(path, title, pictures)
+    write_pictures(
+        paths,
+        pictures,
+        lambda path, shown: _draw_page(path, title, shown),
+        lambda path, shown: _write_recording(path, title, shown),
+    )
 
 
 def behavior_colors(pictures: Sequence[RoadPicture]) -> dict[str, RgbColor]:

@@ -83,11 +83,11 @@ def _walk(robot: Robot, policy: Policy, seed: int, most: int, ends: list[Outcome
     yield 0
     for step in range(1, most + 1):
         try:
-            observation, _, terminated, truncated, info = robot.step(policy.act(observation).action)
+            observation, outcome, ended = robot.step_without_reward(policy.act(observation).action)
         except SimulationDiverged:
             ends.append(Outcome.DIVERGED)
             return
-        if terminated or truncated:
-            ends.append(robot.outcome_of(terminated, truncated, info))
+        if ended:
+            ends.append(outcome)
             return
         yield step

@@ -80,7 +80,7 @@ def run_rollout(
     for step in range(steps):
         try:
             action = policy.act(observation, stimulate(step, values)).action
-            observation, _, terminated, truncated, info = robot.step(action)
+            observation, reached, ends = robot.step_without_reward(action)
         except SimulationDiverged:
             outcome = Outcome.DIVERGED
             break
@@ -92,8 +92,8 @@ def run_rollout(
             total += np.where(angles, turned, values)
             counted += 1
             errors += controller.distance(values) if controller is not None else 0.0
-        if terminated or truncated:
-            outcome = robot.outcome_of(terminated, truncated, info)
+        if ends:
+            outcome = reached
             break
     means = total / counted if counted else np.full(len(angles), np.nan)
     error = errors / counted if counted and controller is not None else float("nan")

@@ -17,13 +17,14 @@ from pdtui.core.scenery import NO_SCENERY, Scenery
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.legged.terrain import draw_rough_ground, scatter_trees
 from pdtui.robots.observation_edits.a1_observation_edits import a1_observation_edits
-from pdtui.robots.robot import ResetResult, StepResult, TrainingRecipe
+from pdtui.robots.robot import ResetResult, StepResult
 from pdtui.robots.simulators import bullet_robot
 from pdtui.robots.simulators.bullet_robot import BulletRobot
 from pdtui.robots.simulators.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
 from pdtui.robots.simulators.urdf_link_shapes import read_urdf_link_shapes
 from pdtui.robots.task import Task
 from pdtui.robots.tasks.a1_tasks import A1_TASKS
+from pdtui.robots.training_recipe import TrainingRecipe
 
 _LEGS: dict[str, FootPlace] = {"FR": "front right", "FL": "front left", "RR": "rear right", "RL": "rear left"}
 _JOINTS = tuple(f"{leg}_{part}" for leg in _LEGS for part in ("hip", "upper", "lower"))

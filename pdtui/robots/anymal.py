@@ -10,7 +10,7 @@ from types import MappingProxyType
 from pdtui.core.robot_links_and_state import CommandRange, Foot
 from pdtui.robots.legged.legged_robot import LeggedRobot
 from pdtui.robots.legged.legged_robot_description import FallRule, LeggedRewardWeights, LeggedRobotDescription
-from pdtui.robots.robot import TrainingRecipe
+from pdtui.robots.training_recipe import TrainingRecipe
 
 LEGS = ("LF", "LH", "RF", "RH")
 ANYMAL_DESCRIPTION = LeggedRobotDescription(

@@ -18,9 +18,9 @@ from pdtui.core.errors import RobotError
 from pdtui.core.outcome import Outcome, fall_info
 from pdtui.core.robot_links_and_state import Foot, Link
 from pdtui.robots.environments.gymnasium_robot import GymnasiumRobot
-from pdtui.robots.robot import TrainingRecipe
 from pdtui.robots.simulators.joint_and_trunk_attributes import torque_attributes
 from pdtui.robots.tasks.bipedal_walker_tasks import BIPEDAL_WALKER_TASKS
+from pdtui.robots.training_recipe import TrainingRecipe
 
 FINISH = (stock.TERRAIN_LENGTH - stock.TERRAIN_GRASS) * stock.TERRAIN_STEP
 _GROUND_LENGTH = 2000.0  # m

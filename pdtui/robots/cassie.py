@@ -26,8 +26,9 @@ from pdtui.robots.legged.legged_robot_state import LeggedRobotState
 from pdtui.robots.legged.mujoco_ground import load_legged_model
 from pdtui.robots.parkour.parkour_geoms import add_parkour_geoms, place_parkour_boxes, touches_parkour_box
 from pdtui.robots.parkour.parkour_run import NO_BOXES, NO_PROGRESS, ParkourRun
-from pdtui.robots.robot import ResetResult, StepResult, TrainingRecipe
+from pdtui.robots.robot import ResetResult, StepResult
 from pdtui.robots.tasks.cassie_tasks import CASSIE_TASKS
+from pdtui.robots.training_recipe import TrainingRecipe
 
 SIDES = ("left", "right")
 _JOINTS = ("hip abduction", "hip rotation", "hip flexion", "knee", "ankle", "toe")

@@ -22,7 +22,8 @@ from pdtui.robots.road.car_tasks import CAR_GOALS, CAR_TASKS
 from pdtui.robots.road.metadrive_repairs import LIDAR_RANGE, OBSERVATIONS
 from pdtui.robots.road.road_scenes import SCENE_STARTS
 from pdtui.robots.road.road_world import CarState, RoadWorld
-from pdtui.robots.robot import ResetResult, Robot, StepResult, TrainingRecipe
+from pdtui.robots.robot import ResetResult, Robot, StepResult
+from pdtui.robots.training_recipe import TrainingRecipe
 
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 # Widest road and widest lane that MetaDrive divides distances by, m.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -23,6 +22,7 @@ from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 from pdtui.robots.options.robot_option import NO_ROBOT_OPTIONS, RobotOptions, format_robot_options
 from pdtui.robots.robot_goals import WALKING_GOALS, RobotGoals
 from pdtui.robots.task import Task, find_task
+from pdtui.robots.training_recipe import TrainingRecipe
 
 if TYPE_CHECKING:
     from pdtui.robots.lockstep.lockstep_robots import LockstepRobots
@@ -31,24 +31,18 @@ ResetResult = tuple[Floats, dict[str, Any]]
 StepResult = tuple[Floats, float, bool, bool, dict[str, Any]]
 
 
-@dataclass(frozen=True)
-class TrainingRecipe:
-    """How a robot's policy is trained unless the command line says otherwise; `pdtui.training` reads it.
+class RewardlessStep(NamedTuple):
+    """What a control step leads to, but for its reward.
 
     Attributes:
-        options: Arguments of the robot's class during training.
-        settings: Changes to the algorithm's configuration. Settings that an algorithm lacks are ignored.
-        sac_settings: Further changes where the algorithm is SAC.
-        robot_batch: Class that steps all robots of a run at once, ``package.module:Class``, called with a
-            robot, the number of robots and a seed. If it is empty, robots are stepped one by one.
-        initial_policy: Name of the shipped policy that PPO starts from; empty for an untrained one.
+        observation: The observation after it.
+        outcome: How the episode ended, or that its task is done; None for neither.
+        ends: Whether the episode is over.
     """
 
-    options: Mapping[str, Any] = field(default_factory=dict)
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    sac_settings: Mapping[str, Any] = field(default_factory=dict)
-    robot_batch: str = ""
-    initial_policy: str = ""
+    observation: Floats
+    outcome: Outcome | None
+    ends: bool
 
 
 class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
@@ -159,6 +153,13 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     @abstractmethod
     def digest(self) -> int:
         """Return a 63-bit digest of the simulator's state: equal states have equal digests."""
+
+    def step_without_reward(self, action: NDArray[np.float32]) -> RewardlessStep:
+        """Take a control step that leads where `step` does, to the last bit, for those who need no reward."""
+        observation, _, terminated, truncated, info = self.step(action)
+        return RewardlessStep(
+            observation, self.outcome_of(terminated, truncated, info), terminated or truncated
+        )
 
     def outcome_of(self, terminated: bool, truncated: bool, info: Mapping[str, Any]) -> Outcome | None:
         """Return the outcome of the episode after a step that returned this; None while there is none.

@@ -11,10 +11,10 @@ from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv
 from numpy.typing import NDArray
 
 from pdtui.core.attributes import Attribute, Floats, wrap_angle
-from pdtui.core.outcome import fall_info
+from pdtui.core.outcome import Outcome, fall_info
 from pdtui.core.robot_links_and_state import Foot
 from pdtui.robots.observation_edits.observation_edit import offset_observed_number, set_observed_number
-from pdtui.robots.robot import TrainingRecipe
+from pdtui.robots.robot import RewardlessStep
 from pdtui.robots.simulators.joint_and_trunk_attributes import torque_attributes
 from pdtui.robots.simulators.mujoco_robot import (
     MujocoRobot,
@@ -23,6 +23,7 @@ from pdtui.robots.simulators.mujoco_robot import (
     silence_warnings,
 )
 from pdtui.robots.task import Task, TaskRunTrace, TaskVerdict, find_longest_run
+from pdtui.robots.training_recipe import TrainingRecipe
 
 _FEET = {"right": "foot_geom", "left": "foot_left_geom"}
 # Longest time that a foot may be off the ground in training, s.
@@ -189,6 +190,13 @@ class Walker(MujocoRobot, Walker2dEnv):
                 else f"fell: torso at {height:.2f} m, outside {low}–{high} m"
             )
         return observation, float(reward), terminated, truncated, info
+
+    def step_without_reward(self, action: NDArray[np.float32]) -> RewardlessStep:
+        self.data.ctrl[:] = action
+        mujoco.mj_step(self.model, self.data, self.frame_skip)
+        self._check_finite()
+        fell = not self.is_healthy
+        return RewardlessStep(self.observe(), Outcome.FELL if fell else None, fell)
 
     def read_attributes(self) -> Floats:
         mujoco.mj_kinematics(self.model, self.data)

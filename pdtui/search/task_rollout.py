@@ -67,9 +67,9 @@ def judge_stimulations(
     policy.reset()
     walked = [robot.read_attributes()]
     for _ in range(count_walk_steps(task, seed)):
-        observation, _, terminated, truncated, _ = robot.step(policy.act(observation).action)
+        observation, _, ends = robot.step_without_reward(policy.act(observation).action)
         walked.append(robot.read_attributes())
-        if terminated or truncated:
+        if ends:
             return [TaskVerdict(False, 0.0, {}) for _ in plans]
     start, state = robot.snapshot(), policy.snapshot()
     plain = [number for number, plan in enumerate(plans) if plan.onset is None and not plan.stimulation.edits]
@@ -124,13 +124,13 @@ def _judge_plan(
     for step in range(task.steps):
         acted = policy.act(observation, plan.stimulation_at(step))
         try:
-            observation, _, terminated, truncated, info = robot.step(acted.action)
+            observation, reached, ends = robot.step_without_reward(acted.action)
         except SimulationDiverged:
             outcome = Outcome.DIVERGED
             break
         values.append(robot.read_attributes())
-        outcome = robot.outcome_of(terminated, truncated, info) or outcome
-        if terminated or truncated:
+        outcome = reached or outcome
+        if ends:
             break
     return _judge_run(robot, task, np.array(before), values, outcome)
 
@@ -157,11 +157,11 @@ def _wait_for_onset(robot: Robot, policy: Policy, onset: Onset, walked: list[Flo
         if clock.control_steps_until(delay) == 0:
             return True
         try:
-            observation, _, terminated, truncated, _ = robot.step(policy.act(observation).action)
+            observation, _, ends = robot.step_without_reward(policy.act(observation).action)
         except SimulationDiverged:
             return False
         walked.append(robot.read_attributes())
         clock.update(float(walked[-1][column]))
-        if terminated or truncated:
+        if ends:
             return False
     return False

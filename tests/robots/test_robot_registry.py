@@ -162,7 +162,7 @@ from pdtui.core.robot_links_and_state import Link, RobotState
 from pdtui.robots.robot import Robot
 from pdtui.robots.robot_goals import BehaviorGoal, RobotGoals
 from pdtui.robots.task import Task, TaskVerdict
-from pdtui.robots.robot import TrainingRecipe
+from pdtui.robots.training_recipe import TrainingRecipe
 
 
 def runs_away(trace):
