@@ -11,6 +11,7 @@ import numpy as np
 
 from pdtui.benchmarks.librosa_import import load_librosa
 from pdtui.core.attributes import Attribute, Floats
+from pdtui.pictures.matplotlib_page import load_pyplot
 from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching import match_units
 from pdtui.spectra.matching_presets import find_matching_preset
@@ -92,9 +93,7 @@ def run_released_procedure(
     phases there and ρ from its plain mean, and the norm of the difference of the magnitudes. Each result is
     entered into a list of the attribute and into one of the unit, and all lists are sorted by discrepancy.
     """
-    from matplotlib import pyplot
-
-    pyplot.switch_backend("Agg")
+    pyplot = load_pyplot()
     librosa = load_librosa()
 
     def transform(series: Floats) -> _Spectrum:
