@@ -91,7 +91,7 @@ def format_policy_title(dissection: Dissection) -> str:
 
 
 def load_pyplot() -> Any:
-    """Import matplotlib's global figures, drawn without a window: what a benchmark compares with uses them."""
+    """Import matplotlib's global figures, which only a benchmark needs, to be drawn without a window."""
     from matplotlib import pyplot
 
     pyplot.switch_backend("Agg")
