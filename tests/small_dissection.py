@@ -29,7 +29,7 @@ SMALL = DissectionSettings(
     held_steps=20,
     mover_steps=30,
     steering=SteeringSettings(
-        starts=2, units=1, values=(3.0,), lengths=(1.0,), readings=(2.0,), factors=(2.0,), random=2
+        starts=2, sources=2, values=(3.0,), lengths=(1.0,), readings=(2.0,), factors=(2.0,)
     ),
     search_starts=2,
     selection_starts=2,

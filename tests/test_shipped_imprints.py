@@ -1,4 +1,4 @@
-"""What the shipped maps of imprints do, on one seed each; the guide has the figures of many."""
+"""What the shipped maps of imprints and directions do, on one seed each; the guide has more figures."""
 
 from __future__ import annotations
 
@@ -30,6 +30,39 @@ def test_a_key_steers_until_it_is_let_go(
     assert not drive.endings
     assert low <= drive[attribute][300:].mean() <= high
     assert not low <= drive[attribute][40:100].mean() <= high
+
+
+@pytest.mark.parametrize(
+    ("key", "attribute", "low", "high"),
+    [
+        ("a", "yaw rate", 0.6, 0.7),
+        ("d", "yaw rate", -0.7, -0.6),
+        ("j", "sideways", 0.28, 0.36),
+        ("l", "sideways", -0.36, -0.28),
+    ],
+)
+def test_one_direction_of_the_first_layer_turns_anymal_and_moves_it_aside(
+    key: str, attribute: str, low: float, high: float
+) -> None:
+    drive = pdtui.drive(
+        "anymal-forward", "anymal-forward-directions", keys={100: key, 600: "space"}, steps=800, seed=SEED
+    )
+    assert not drive.endings
+    assert low <= drive[attribute][350:600].mean() <= high
+    assert abs(drive[attribute][700:].mean()) < 0.1
+    assert drive["speed"][700:].mean() > 0.9
+
+
+def test_the_a1_stands_and_runs_on() -> None:
+    drive = pdtui.drive(
+        "a1", "a1-imprints", keys={110: "x", 450: "space"}, steps=700, seed=SEED, start="rough"
+    )
+    assert not drive.endings
+    feet = [one.name for one in drive.info.attributes if one.name.endswith(" contact")]
+    assert len(feet) == 4
+    assert drive["speed"][350:450].mean() < 0.05
+    assert all(drive[name][350:450].min() == 1.0 for name in feet)
+    assert drive["speed"][600:].mean() > 2.0
 
 
 @pytest.mark.parametrize("key", ["a", "d"])

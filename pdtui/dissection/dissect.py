@@ -19,7 +19,7 @@ from pdtui.dissection.dissection_result import Dissection, pick_sample_episode
 from pdtui.dissection.dissection_searches import DissectionSearches
 from pdtui.dissection.primitive_judging import judge_primitives, measure_own_range
 from pdtui.dissection.probe_starts import gather_probe_starts
-from pdtui.dissection.steering.gather_candidates import gather_steering_candidates
+from pdtui.dissection.steering.gather_candidates import fit_edit_directions, gather_steering_candidates
 from pdtui.dissection.steering.linear_probes import fit_linear_probes
 from pdtui.dissection.steering.steering_comparison import compare_steering
 from pdtui.policies.runtime.live_network import policy_from_network
@@ -124,7 +124,9 @@ def dissect(config: DissectionConfig) -> Dissection:
             settings,
             stage("up and down"),
         )
-        probes = fit_linear_probes(episodes, robot.attributes, network.layers, movable)
+        probes = fit_linear_probes(
+            episodes, robot.attributes, network.layers, movable, settings.steering.half
+        )
         steering = compare_steering(
             prober,
             movable,
@@ -134,6 +136,7 @@ def dissect(config: DissectionConfig) -> Dissection:
                 refined,
                 probes,
                 robot.observation_edits,
+                fit_edit_directions(robot, network, seed),
                 network.layers,
                 movable,
                 settings.steering,

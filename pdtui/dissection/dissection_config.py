@@ -122,7 +122,7 @@ QUICK_DISSECTION = DissectionSettings(
     judge_keep=1, controls=99, judge_starts=8,
     mover_singles=2, mover_pairs=0, mover_steps=160,
     steering=SteeringSettings(
-        starts=2, units=1, values=(3.0,), lengths=(0.5, 1.0), readings=(2.0,), factors=(2.0,), random=2,
+        starts=2, sources=2, values=(2.0, 4.0), lengths=(0.5, 1.0), readings=(1.0, 2.0), factors=(1.0, 2.0),
     ),
     search_starts=3, selection_starts=4, held_out_starts=8, walk_steps=50,
     imprints=ImprintSettings(episodes=4, steps=40, bins=3, units=(8,), factors=(1.0,)),

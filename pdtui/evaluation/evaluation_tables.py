@@ -40,20 +40,20 @@ def tracking_table(result: TrackingSummary) -> Table:
     table = new_table(
         f"{result.behavior}: {result.attribute} ({unit}), {format_seed_range(result.seeds)}, "
         f"{describe_outcomes(result.outcomes, len(result.seeds))}",
-        *(f"target ({unit})", "mean |error|", "last 25 steps"),
+        *(f"target ({unit})", "mean |error|", "last 25 steps", "without the gait"),
     )
     for row in result.targets:
-        table.add_row(f"{row.target:+.2f}", f"{row.error:.3f}", f"{row.settled:.3f}")
+        table.add_row(f"{row.target:+.2f}", f"{row.error:.3f}", f"{row.settled:.3f}", f"{row.bias:.3f}")
     table.add_section()
-    table.add_row("mean", _with_interval(result), f"{result.settled:.3f}")
+    table.add_row("mean", _with_interval(result), f"{result.settled:.3f}", f"{result.bias:.3f}")
     by_itself = ""
     if result.default_error is not None:
-        table.add_row("without control", f"{result.default_error:.3f}", "")
+        table.add_row("without control", f"{result.default_error:.3f}", "", "")
         by_itself = f" Without control: {describe_outcomes(result.default_outcomes, len(result.seeds))}."
     responses = result.responses
     table.caption = (
         f"Rise time {_rise(responses)} s; {responses.unrisen} of {responses.steps} steps not risen; "
-        f"overshoot {_overshoot(responses)}.{by_itself}"
+        f"overshoot {_overshoot(responses)}. Without the gait: |mean error| of the last 25 steps.{by_itself}"
     )
     return table
 
@@ -88,6 +88,7 @@ def add_tracking_figures(table: Table, columns: Sequence[TrackingSummary]) -> No
     unit, responses = columns[0].unit, [one.responses for one in columns]
     table.add_row(f"mean |error| ({unit})", *(_with_interval(one) for one in columns))
     table.add_row("over the last 25 steps", *(f"{one.settled:.3f}" for one in columns))
+    table.add_row("their mean: without the gait", *(f"{one.bias:.3f}" for one in columns))
     table.add_row("rise time (s)", *map(_rise, responses))
     table.add_row("steps not risen", *(f"{one.unrisen} of {one.steps}" for one in responses))
     table.add_row("overshoot", *map(_overshoot, responses))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.disturbance_conditions import find_condition, plan_pushes
 from pdtui.evaluation.target_tracking import find_pid_behaviors
+from pdtui.paper.pid_inputs import ControlInput, describe_pid_output, list_pid_inputs
 from pdtui.search.gains.tracking_drives import (
     STEPS_EACH,
     STEPS_UNTOUCHED,
@@ -38,7 +39,6 @@ from pdtui.stimulation.stimulation_map import Behavior
 ATTRIBUTE = "yaw"
 PUSHED_SEEDS = 10
 """Largest number of seeds that are also run with pushes."""
-ControlInput = Literal["command", "units", "both"]
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ class HeadingControllerResult:
     """The result of one behavior that holds the heading.
 
     Attributes:
-        input_kind: whether the PID sets commands, units or both.
-        inputs: names of the commands and units that it sets.
+        input_kind: whether the PID sets commands, units, interventions, or several of these.
+        inputs: names of the commands and units that it sets, and what its interventions do.
         other_commands: the commands that it leaves alone, and their values.
         ratio: its error over that of the map's behavior by command; None for that one, and without one.
         pushed: the same while the robot is pushed; None if not measured.
@@ -118,13 +118,6 @@ class HeadingPrecisionComparison:
             "steps_each": STEPS_EACH,
             "rows": rows,
         }
-
-
-def describe_pid_output(behavior: Behavior) -> ControlInput:
-    """Return what the PID of a behavior sets."""
-    if behavior.commands and behavior.magnitudes:
-        return "both"
-    return "command" if behavior.commands else "units"
 
 
 def compare_heading_precision(
@@ -204,7 +197,7 @@ def _rows(
             loop.robot.name,
             loop.policy.name,
             describe_pid_output(behavior),
-            (*behavior.commands, *loop.map.units_of(behavior)),
+            list_pid_inputs(behavior, loop.map),
             {name: value for name, value in loop.robot.commands.items() if name not in behavior.commands},
             summarize_tracking(drives[number], unit),
             ratios[number],

@@ -1,4 +1,4 @@
-"""`pdtui evaluate --experiment tracking`: how precisely headings are held, by a unit and by a command."""
+"""`pdtui evaluate --experiment tracking`: how precisely headings are held, by units and by a command."""
 
 from __future__ import annotations
 
@@ -99,7 +99,8 @@ def heading_precision_table(result: HeadingPrecisionComparison) -> Table:
 
 def _inputs(row: HeadingControllerResult) -> str:
     names = row.inputs if len(row.inputs) <= 2 else (row.inputs[0], f"{len(row.inputs) - 1} more")
-    return {"command": "command ", "units": "unit ", "both": ""}[row.input_kind] + ", ".join(names)
+    prefix = {"command": "command ", "units": "unit "}.get(row.input_kind, "")
+    return prefix + ", ".join(names)
 
 
 def _other_commands(row: HeadingControllerResult) -> str:

@@ -88,6 +88,7 @@ def test_targets_are_held_beside_the_falls_without_control() -> None:
         low=0.4,
         high=0.6,
         settled=0.5,
+        bias=0.4,
         responses=StepResponseSummary.of([]),
         outcomes=fell,
         default_error=0.5,

@@ -91,12 +91,15 @@ def test_a_unit_steers_the_authors_policy_as_its_command_does(tmp_path: Path) ->
 def test_pushes_disturb_both_controllers() -> None:
     config = DriveConfig("anymal", load_map(find_map("anymal")), 0)
     result = compare_heading_precision([config], [5000], targets=(0.0, 0.4), pushed=True)
+    kinds = [(row.input_kind, *row.inputs) for row in result.rows]
+    assert kinds[1:] == [("interventions", "one direction of layer 0"), ("command", "yaw rate")]
+    assert kinds[0][0] == "units"
     for row in result.rows:
         assert row.pushed is not None
         assert row.pushed.tracking.seeds == (5000,)
         # Without a push it would be the same drive, to the last bit.
         assert row.pushed.tracking.error != row.tracking.error
-    units, command = (row.pushed for row in result.rows)
+    units, _, command = (row.pushed for row in result.rows)
     assert units is not None
     assert command is not None
     assert units.ratio is not None

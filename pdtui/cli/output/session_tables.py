@@ -119,13 +119,9 @@ def _involvement(part: SessionSummary | EpisodeStatistics, whole: SessionSummary
 def _ended(session: SessionHeader, summary: SessionSummary) -> str:
     """Return the number of episodes and how they ended, as far as an older session says it."""
     untold = len(session.endings.keys() - session.outcomes.keys())
-    known = [describe_outcomes(summary.outcomes)] if summary.outcomes or not untold else []
-    return ", ".join(
-        [
-            f"{summary.episodes}: {known[0]}" if known else f"{summary.episodes}",
-            *([f"ended {untold}"] * bool(untold)),
-        ]
-    )
+    told = describe_outcomes(summary.outcomes) if summary.outcomes else "" if untold else "none ended"
+    counted = f"{summary.episodes}: {told}" if told else f"{summary.episodes}"
+    return f"{counted}, ended {untold}" if untold else counted
 
 
 def _episodes(summary: SessionSummary) -> list[Table]:

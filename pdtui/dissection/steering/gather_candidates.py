@@ -2,25 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from pdtui.dissection.steering.edit_directions import (
+    EditDirection,
+    fit_edit_direction,
+    sample_walk_observations,
+)
 from pdtui.dissection.steering.linear_probes import LinearProbe
 from pdtui.dissection.steering.steering_candidates import (
     SteeringCandidate,
     SteeringMethod,
     affine_candidates,
     direction_candidates,
+    edit_direction_candidates,
     observation_edit_candidates,
     pair_candidates,
     random_direction_candidates,
+    smallest_edit_size,
     unit_candidates,
 )
 from pdtui.dissection.steering.steering_comparison import SteeringSettings
+from pdtui.policies.runtime.policy import Policy
 from pdtui.probing.measured_effects import UnitEffects
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
+from pdtui.robots.robot import Robot
 from pdtui.spectra.matching import UnitDiscrepancies
+
+
+def fit_edit_directions(robot: Robot, policy: Policy, seed: int) -> dict[str, EditDirection]:
+    """Return the direction in the first layer of each edit that a robot offers, at its smallest size."""
+    edits = robot.observation_edits
+    observations = sample_walk_observations(robot, policy, seed) if edits else []
+    return {
+        one.name: fit_edit_direction(policy, observations, edits, {one.name: smallest_edit_size(one)})
+        for one in edits
+    }
 
 
 def gather_steering_candidates(
@@ -28,6 +47,7 @@ def gather_steering_candidates(
     refined: UnitEffects,
     probes: Sequence[LinearProbe],
     edits: Sequence[ObservationEdit],
+    edit_directions: Mapping[str, EditDirection],
     layers: Sequence[int],
     columns: Sequence[int],
     settings: SteeringSettings,
@@ -36,10 +56,11 @@ def gather_steering_candidates(
     """Return all candidates.
 
     Args:
-        matching: Whose first match of an attribute is its *matched unit*.
+        matching: Whose first matches of an attribute are its *matched units*.
         refined: Effects, whose strongest units of an attribute are its *probed units*.
         probes: Linear probes of the attributes.
         edits: What the robot offers to edit of its observation.
+        edit_directions: Directions of edits of the smallest size, by the edit's name.
         layers: Widths of the policy's hidden layers.
         columns: Columns of the attributes.
         settings: Doses, and how many of each.
@@ -52,11 +73,11 @@ def gather_steering_candidates(
     rng = np.random.default_rng(seed)
     found: list[SteeringCandidate] = []
     for column in columns:
-        matched = matching.ranked_units(column)[:1].tolist()
+        matched = matching.ranked_units(column)[: settings.sources].tolist()
         found += unit_candidates(SteeringMethod.MATCHED_UNIT, column, matched, values, layers)
         probed: dict[int, None] = {}
         for sign in (1.0, -1.0):
-            strongest = _strongest_units(refined, column, sign, settings.units)
+            strongest = _strongest_units(refined, column, sign, settings.half)
             probed |= {unit: None for unit, _ in strongest}
             found += pair_candidates(column, strongest, settings.values, layers)
         found += unit_candidates(SteeringMethod.PROBED_UNIT, column, list(probed), values, layers)
@@ -64,11 +85,12 @@ def gather_steering_candidates(
         found += direction_candidates(probe, lengths)
         found += affine_candidates(probe, readings)
     found += observation_edit_candidates(edits, factors)
-    drawn = rng.choice(sum(layers), size=min(settings.random, sum(layers)), replace=False).tolist()
+    found += edit_direction_candidates(edits, edit_directions, factors)
+    drawn = rng.choice(sum(layers), size=min(settings.sources, sum(layers)), replace=False).tolist()
     found += unit_candidates(SteeringMethod.RANDOM_UNIT, None, drawn, values, layers)
     spreads = {probe.layer: probe.layer_spread for probe in probes}
     for layer, spread in spreads.items():
-        count = max(1, settings.random // len(spreads))
+        count = max(1, settings.sources // len(spreads))
         found += random_direction_candidates(layer, layers[layer], spread, count, lengths, rng)
     return found
 

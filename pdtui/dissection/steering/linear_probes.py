@@ -55,8 +55,9 @@ def fit_linear_probes(
     attributes: Sequence[Attribute],
     layers: Sequence[int],
     columns: Sequence[int],
+    count: int = 1,
 ) -> tuple[LinearProbe, ...]:
-    """Fit a probe of each attribute to each layer, and return the one of the best layer for each attribute.
+    """Fit a probe of each attribute to each layer, and return those of the best layers for each attribute.
 
     The penalty is chosen by how well a probe predicts each episode from the others. A single episode is
     divided into blocks.
@@ -66,24 +67,26 @@ def fit_linear_probes(
         attributes: All attributes of the robot.
         layers: Widths of the policy's hidden layers.
         columns: Columns of the attributes to fit.
+        count: Number of layers to keep for each attribute.
 
     Returns:
-        A probe for each column whose attribute varies; none if every layer is wider than `WIDEST_LAYER`.
+        Probes for each column whose attribute varies, the best first; none of layers wider than
+        `WIDEST_LAYER`.
     """
     values = [_target_values(episode, attributes, columns) for episode in episodes if episode.steps]
     outputs = [episode.activations.astype(np.float64) for episode in episodes if episode.steps]
     if len(outputs) == 1:
         values, outputs = np.array_split(values[0], _BLOCKS), np.array_split(outputs[0], _BLOCKS)
-    best: dict[int, LinearProbe] = {}
+    found: dict[int, list[LinearProbe]] = {}
     first = 0
     for layer, width in enumerate(layers):
         units, first = slice(first, first + width), first + width
         if width > WIDEST_LAYER:
             continue
         for probe in _fit_layer([one[:, units] for one in outputs], values, layer, columns):
-            if probe.column not in best or probe.r2 > best[probe.column].r2:
-                best[probe.column] = probe
-    return tuple(best[column] for column in columns if column in best)
+            found.setdefault(probe.column, []).append(probe)
+    ranked = {column: sorted(own, key=lambda one: -one.r2) for column, own in found.items()}
+    return tuple(probe for column in columns for probe in ranked.get(column, [])[:count])
 
 
 def _target_values(

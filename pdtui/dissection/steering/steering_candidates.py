@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.units import Stimulation, format_unit
+from pdtui.dissection.steering.edit_directions import EditDirection
 from pdtui.dissection.steering.linear_probes import LinearProbe
 from pdtui.probing.intervention_rollout_plan import InterventionRolloutPlan
 from pdtui.probing.stimulated_rollout import RolloutPlan
@@ -32,6 +33,7 @@ class SteeringMethod(StrEnum):
     DIRECTION = "direction"
     AFFINE = "affine"
     IMPRINT = "imprint"
+    EDIT_DIRECTION = "edit's direction"
     RANDOM_UNIT = "random unit"
     RANDOM_DIRECTION = "random direction"
 
@@ -162,9 +164,37 @@ def observation_edit_candidates(
     found = []
     for edit in edits:
         for factor in factors:
-            size = factor * _EDIT_SIZES.get(edit.unit, _OTHER_EDIT_SIZE)
+            size = factor * smallest_edit_size(edit)
             plan = InterventionRolloutPlan(Intervention("imprint", values={edit.name: size}, units=("0:*",)))
             found.append(SteeringCandidate(SteeringMethod.IMPRINT, None, edit.name, size, plan))
+    return found
+
+
+def smallest_edit_size(edit: ObservationEdit) -> float:
+    """Return the smallest size of an edit of the observation that is tried."""
+    return _EDIT_SIZES.get(edit.unit, _OTHER_EDIT_SIZE)
+
+
+def edit_direction_candidates(
+    edits: Sequence[ObservationEdit], directions: Mapping[str, EditDirection], factors: Sequence[float]
+) -> list[SteeringCandidate]:
+    """Return additions along the directions of edits, at the sizes of `observation_edit_candidates`.
+
+    Args:
+        edits: The robot's edits of its observation.
+        directions: Directions of edits of the smallest size, by name.
+        factors: Factors on that size.
+    """
+    found = []
+    for edit in edits:
+        direction = directions[edit.name]
+        if direction.length == 0.0:
+            continue
+        vectors = (direction.vectors("along"),)
+        for factor in factors:
+            size = factor * smallest_edit_size(edit)
+            plan = InterventionRolloutPlan(direction.addition("along", factor), vectors)
+            found.append(SteeringCandidate(SteeringMethod.EDIT_DIRECTION, None, edit.name, size, plan))
     return found
 
 

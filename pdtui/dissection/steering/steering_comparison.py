@@ -25,26 +25,30 @@ _ENOUGH = 0.7
 
 @dataclass(frozen=True)
 class SteeringSettings:
-    """How much work the comparison is.
+    """How much work the comparison is. Each way has as many doses, so that all have the same chance.
 
     Attributes:
         starts: Starts on which each method chooses its source and its dose.
-        units: Units of the refined ones that *probed unit* tries for each attribute and direction; their
-            pairs are those of *two units*.
+        sources: Number, even, of matched units, of probed units, of directions, and of units and directions
+            drawn at random that are tried for each attribute. Half of the probed units are for one
+            direction of the attribute; half of the directions are probes, of the best layers.
         values: Outputs of units, in size.
         lengths: Lengths of what is added along a direction, in the layer's own spread.
         readings: What an affine edit sets, in standard deviations of the attribute.
         factors: Factors on the smallest sizes of edits of the observation.
-        random: Units, and directions, drawn at random.
     """
 
     starts: int = 4
-    units: int = 2
+    sources: int = 4
     values: tuple[float, ...] = (2.0, 4.0, 8.0)
-    lengths: tuple[float, ...] = (0.25, 0.5, 1.0, 2.0)
+    lengths: tuple[float, ...] = (0.5, 1.0, 2.0)
     readings: tuple[float, ...] = (1.0, 2.0, 4.0)
     factors: tuple[float, ...] = (1.0, 2.0, 4.0)
-    random: int = 4
+
+    @property
+    def half(self) -> int:
+        """Half the number of sources, at least one."""
+        return max(1, self.sources // 2)
 
 
 def compare_steering(

@@ -22,8 +22,10 @@ WEAVING = 0.25
 _NEAR_EDGE, _SLIPPING_TIME, INWARDS = 0.6, 0.4, 0.1
 """Distance from an edge of the road that is too small now or after some time, m and s, and the angle by which
 the car must at least turn away from it, rad."""
-_GAP_AHEAD, _GAP_ASIDE, _GAP_TO_EDGE = 1.5, 0.35, 0.5
-"""Gaps that are too close, m: to others lengthways and sideways, and from the car's middle to an edge."""
+GAP_AHEAD, GAP_BRAKED = 1.5, 0.5
+"""Gaps to others lengthways that are too close while driving on, and while braking, m."""
+_GAP_ASIDE, _GAP_TO_EDGE = 0.35, 0.5
+"""Gaps that are too close, m: to others sideways, and from the car's middle to an edge."""
 ROOM_FOR_CROSSING = 1.5
 """How much more room to leave for those who cross the road, m."""
 _SWING_TIME = 0.1
@@ -41,11 +43,13 @@ class Maneuver:
     Attributes:
         name: Name of the key that begins it; empty to let the car go on.
         ahead, beside: Places along the road and to the left of here at `TIMES`, m, shape (T,) each.
+        gap: Gap to others lengthways that is too close, m.
     """
 
     name: str
     ahead: Floats
     beside: Floats
+    gap: float = GAP_AHEAD
 
 
 @dataclass(frozen=True)
@@ -57,12 +61,14 @@ class TimesToConflict:
         moving: To something that drives along the road.
         crossing: To something that moves in another direction.
         edge: To an edge of the road.
+        duration: How long it is too close to anything but an edge within `TIMES`, s.
     """
 
     standing: float
     moving: float
     crossing: float
     edge: float
+    duration: float
 
     @property
     def first(self) -> float:
@@ -125,14 +131,15 @@ def predict_times_to_conflict(
     apart, aside = ahead - maneuver.ahead, beside - maneuver.beside
     stands = sight.others[:, 5] < STANDING
     kinds = stands, sight.followers, ~stands & ~sight.followers
-    gap = np.where(kinds[2], _GAP_AHEAD + room, _GAP_AHEAD)[:, None]
+    gap = np.where(kinds[2], maneuver.gap + room, maneuver.gap)[:, None]
     close = np.abs(apart) < half_length + CAR_HALF_LENGTH + gap
     close &= np.abs(aside) < half_width + CAR_HALF_WIDTH + _GAP_ASIDE
     # Who comes from behind in the same lane keeps away by himself.
     follower = (ahead[:, :1] < 0.0) & (np.abs(beside[:, :1]) < half_width[:, :1] + CAR_HALF_WIDTH)
     close &= ~follower | (np.abs(maneuver.beside) > _LANE_LEFT)
     standing, along, across = (_first_time(close[kind].any(axis=0)) for kind in kinds)
-    return TimesToConflict(standing, along, across, _first_time(out))
+    duration = float(close.any(axis=0).sum() * (TIMES[1] - TIMES[0]))
+    return TimesToConflict(standing, along, across, _first_time(out), duration)
 
 
 def slips_off(sight: RoadSight) -> int:
@@ -156,6 +163,27 @@ def next_standing(sight: RoadSight) -> tuple[float, float]:
     gaps = np.where(in_way, ahead - half_length - CAR_HALF_LENGTH, math.inf)
     nearest = int(np.argmin(gaps))
     return float(gaps[nearest]), float(beside[nearest])
+
+
+def find_way_past(sight: RoadSight, within: float) -> float:
+    """Return how far to the left the car must get to pass what stands next in its way, m.
+
+    Negative to the right; 0 if nothing stands there, or neither side has room.
+
+    Args:
+        sight: What there is to see.
+        within: Distance up to which it counts, m.
+    """
+    gap, _ = next_standing(sight)
+    if gap > within:
+        return 0.0
+    ahead, beside, half_length, half_width = sight.standing().T
+    near = (ahead + half_length > -CAR_HALF_LENGTH) & (ahead - half_length < gap + 3.0 * CAR_HALF_LENGTH)
+    places, reach = beside[near], half_width[near] + CAR_HALF_WIDTH + _GAP_ASIDE
+    ways = np.concatenate([places + reach, places - reach])
+    free = (np.abs(ways[:, None] - places) > reach - 1e-6).all(axis=1)
+    free &= (ways < sight.left - CAR_HALF_WIDTH) & (ways > CAR_HALF_WIDTH - sight.right)
+    return float(min(ways[free], key=abs, default=0.0))
 
 
 def _first_time(when: NDArray[np.bool_]) -> float:

@@ -16,11 +16,13 @@ from pdtui.paper.driving.key_operator import (
     PATIENCE_STANDING,
 )
 from pdtui.paper.driving.maneuver import (
+    GAP_BRAKED,
     HORIZON,
     ROOM_FOR_CROSSING,
     TIMES,
     WEAVING,
     Maneuver,
+    find_way_past,
     predict_times_to_conflict,
     roll,
     slips_off,
@@ -44,6 +46,8 @@ _BRAKING, _HARD_BRAKING, _HEADWAY, _STANDSTILL_GAP = 3.0, 10.0, 1.2, 4.0
 at rest, m."""
 _SLIPPING_SPEED = 3.0
 """Speed to which it brakes near an edge, m/s."""
+_WAITING, _CREEPING_SPEED = 2.0, 1.5
+"""Time after which it drives a halted car round what stands ahead, s, and how fast, m/s."""
 _SOON = 0.5
 """Time over which it judges how fast others get away, s."""
 _THROTTLE_GAIN = 0.3
@@ -76,6 +80,7 @@ class SteeringOperator:
         self._judgment, self._always = judgment or JudgmentErrors(), always
         self._memory = OperatorMemory(dt, self._judgment)
         self._dt, self._target, self._driving, self._quiet, self._halted = dt, 0, False, 0, 0
+        self._way_out: float | None = None
 
     def choose_controls(self, sight: RoadSight) -> ManualControlValues | None:
         """Observe the road and return what to do now, or None to leave it to the policy.
@@ -86,6 +91,7 @@ class SteeringOperator:
         if seen is None:
             return ManualControlValues(0.0, 0.0) if self._always else None
         self._halted = self._halted + 1 if seen.speed < 0.5 else 0
+        self._look_for_way_out(seen)
         if not self._driving:
             if not (self._always or self._must_act(seen)):
                 return None
@@ -108,8 +114,20 @@ class SteeringOperator:
             or expected.crossing < PATIENCE_CROSSING * patience
             or (expected.edge < PATIENCE_EDGE * patience and abs(seen.heading) > WEAVING)
             or slips_off(seen) != 0
-            or self._halted * self._dt > 2.0
+            or self._halted * self._dt > _WAITING
+            or self._way_out is not None
         )
+
+    def _look_for_way_out(self, seen: RoadSight) -> None:
+        """Note how far beside the line a halted car can pass what stands ahead, until it has passed."""
+        if self._halted * self._dt > _WAITING:
+            way = find_way_past(seen, 2 * _STANDSTILL_GAP)
+            self._way_out = seen.beside + way if way else None
+        elif self._way_out is not None:
+            ahead, beside, half_length, half_width = seen.standing().T
+            near = (ahead + half_length > -CAR_HALF_LENGTH) & (ahead - half_length < 2 * _STANDSTILL_GAP)
+            near &= np.abs(beside + seen.beside - self._way_out) < half_width + LANE_WIDTH
+            self._way_out = self._way_out if near.any() else None
 
     def _is_over(self, seen: RoadSight) -> bool:
         centered = abs(seen.to_middle_of(self._target)) < _CENTERED and abs(seen.heading) < _STRAIGHT
@@ -137,12 +155,15 @@ class SteeringOperator:
 
     def _drive(self, seen: RoadSight) -> ManualControlValues:
         road = seen.road_ahead()
-        beside = seen.to_middle_of(self._target) + seen.beside
         slips = slips_off(seen) != 0
-        distance = _LOOK_AHEAD + (0.0 if slips else _LOOK_AHEAD_TIME * seen.speed)
+        if self._way_out is None:
+            beside = seen.to_middle_of(self._target) + seen.beside
+            distance = _LOOK_AHEAD + (0.0 if slips else _LOOK_AHEAD_TIME * seen.speed)
+            speed = min(CRUISING_SPEED, _bend_speed(road), self._following_speed(seen))
+        else:
+            beside, distance, speed = self._way_out, _LOOK_AHEAD / 2, _CREEPING_SPEED
         x, y = _place_ahead(road, distance, beside)
         angle = math.atan(2.0 * _WHEELBASE * y / max(x * x + y * y, 1.0))
-        speed = min(CRUISING_SPEED, _bend_speed(road), self._following_speed(seen))
         stops = self._must_let_pass(seen) or (slips and seen.speed > _SLIPPING_SPEED)
         throttle = -1.0 if stops else _THROTTLE_GAIN * (speed - seen.speed)
         if abs(seen.heading) > math.pi / 2:  # it was turned round, and the place is behind it
@@ -158,8 +179,10 @@ class SteeringOperator:
         goes = predict_times_to_conflict(seen, Maneuver("", ahead, here), ROOM_FOR_CROSSING)
         if goes.crossing > PATIENCE_CROSSING * self._judgment.patience:
             return False
-        stops = predict_times_to_conflict(seen, Maneuver("", roll(seen.speed, -_HARD_BRAKING), here))
-        return stops.crossing > goes.crossing
+        braked = Maneuver("", roll(seen.speed, -_HARD_BRAKING), here, GAP_BRAKED)
+        stops = predict_times_to_conflict(seen, braked)
+        shorter = stops.crossing == goes.crossing and stops.duration < goes.duration
+        return stops.crossing > goes.crossing or shorter
 
     def _following_speed(self, seen: RoadSight) -> float:
         """Return the speed at which the car does not run into what is in front of it on its way, m/s."""

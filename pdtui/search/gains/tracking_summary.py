@@ -26,11 +26,12 @@ _SIZES = (0, 1, 2, 1, 0, -1, -2, -1, 0)
 
 @dataclass(frozen=True)
 class TargetErrorSummary:
-    """Mean |error| at one target over all seeds: over all its control steps, and over the last 25."""
+    """Mean |error| at one target over all its control steps and over the last 25, and their bias."""
 
     target: float
     error: float
     settled: float
+    bias: float
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class TrackingSummary:
             between seeds.
         error, low, high: mean |error| over seeds with its 95 % interval.
         settled: mean |error| over the last 25 steps of each target.
+        bias: |mean error| over these steps, in which the swing within a stride averages out; mean over
+            targets and seeds.
         responses: rise time and overshoot over all steps of the target and all seeds.
         outcomes: how drives ended before their time, and on how many seeds.
         default_error: mean |error| without the controller at the same targets; None if not measured.
@@ -60,6 +63,7 @@ class TrackingSummary:
     low: float
     high: float
     settled: float
+    bias: float
     responses: StepResponseSummary
     outcomes: OutcomeCounts
     default_error: float | None = None
@@ -72,7 +76,8 @@ def summarize_tracking(
     """Summarize drives of one behavior, one per seed, beside the `untouched`: those without a controller."""
     drive = results[0].drive
     common = drive.targets if len({one.drive.targets for one in results}) == 1 else ()
-    table = np.abs(np.array([one.errors for one in results]))
+    errors = np.array([one.errors for one in results])
+    table, biases = np.abs(errors), np.abs(errors[:, :, -SETTLED:].mean(axis=2))
     means = mean_errors_by_seed(results)
     low, high = confidence_interval(means[np.isfinite(means)])
     return TrackingSummary(
@@ -82,7 +87,10 @@ def summarize_tracking(
         tuple(one.drive.seed for one in results),
         tuple(
             TargetErrorSummary(
-                target, mean_of_finite(table[:, row]), mean_of_finite(table[:, row, -SETTLED:])
+                target,
+                mean_of_finite(table[:, row]),
+                mean_of_finite(table[:, row, -SETTLED:]),
+                mean_of_finite(biases[:, row]),
             )
             for row, target in enumerate(common)
         ),
@@ -90,6 +98,7 @@ def summarize_tracking(
         low,
         high,
         mean_of_finite(table[:, :, -SETTLED:]),
+        mean_of_finite(biases),
         StepResponseSummary.of([response for one in results for response in one.responses]),
         count_outcomes((one.outcome for one in results), [Outcome.FELL]),
         mean_of_finite(mean_errors_by_seed(untouched)) if untouched else None,

@@ -52,7 +52,7 @@ class StatusLine(SnapshotWidget):
                 (4, make_printable(self.map.policy), STYLES.muted),
                 (0, "loading the policy…", STYLES.warn),
             ]
-        policy = (4, make_printable(PurePath(facts.policy).name), STYLES.muted)
+        policy = (6, make_printable(PurePath(facts.policy).name), STYLES.muted)
         seed = (8, f"seed {facts.seed}", STYLES.muted)
         if snapshot is None:
             return [policy, seed]
@@ -64,8 +64,8 @@ class StatusLine(SnapshotWidget):
         manual = "  ".join(
             f"{make_printable(name)} {format_number(value)}" for name, value in snapshot.manual
         )
-        arrivals = [] if snapshot.arrivals is None else [(5, f"arrived {snapshot.arrivals}", STYLES.muted)]
-        cost = [(6, f"cost {snapshot.cost:g}", STYLES.muted)] if snapshot.cost else []
+        arrivals = [] if snapshot.arrivals is None else [(4, f"arrived {snapshot.arrivals}", STYLES.muted)]
+        cost = [(5, f"cost {snapshot.cost:g}", STYLES.muted)] if snapshot.cost else []
         return [
             *([(-1, f"manual: {manual}", STYLES.warn)] if manual else []),
             policy,

@@ -83,6 +83,16 @@ def test_it_stops_before_what_blocks_the_whole_road() -> None:
     assert road.speed < 0.5
 
 
+@pytest.mark.parametrize("things", [[(7.0, 0.0)], [(7.0, 0.0), (7.0, 2.5)], [(7.0, -0.5), (7.5, -4.0)]])
+def test_it_drives_a_halted_car_round_what_stands_close_ahead(things: list[tuple[float, float]]) -> None:
+    road, operator = StraightRoad(*things, speed=0.0), SteeringOperator(DT)
+    for _ in range(200):
+        road.step(operator.choose_controls(road.look()) or ManualControlValues(0.0, -1.0))
+        assert not road.touches
+        assert abs(road.beside) < 1.5 * LANE_WIDTH - CAR_HALF_WIDTH
+    assert road.along > 12.0
+
+
 def test_it_takes_over_only_where_it_must_and_hands_back_afterwards() -> None:
     """Left alone, this car keeps its lane and its speed."""
     road, operator = StraightRoad((80.0, 0.0)), SteeringOperator(DT)
