@@ -17,7 +17,7 @@ from pdtui.core.units import Stimulation
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop
-from pdtui.sessions.writer.session_recorder import SessionRecorder
+from pdtui.sessions.writer.recorder_process import RecorderProcess
 from pdtui.stimulation.interventions.unit_edits import AddToUnits, ImprintUnits
 
 ROUNDS = 7
@@ -32,7 +32,7 @@ class ControlLoopBenchmark:
         bare: control steps per second of the simulator alone.
         policy: the same with the policy.
         stimulated: the same of the whole control loop, with attributes and stimulation.
-        recorded: the same with a recorder.
+        recorded: the same with a recorder, until its process has completed the file.
         recorded_share: median over rounds of `recorded` over `bare`.
         forward_us: time of a forward pass with three stimulated units, µs.
         added_us: the same with something added to 64 units, µs.
@@ -113,8 +113,8 @@ def _bare(loop: ControlLoop, seed: int, actions: list[np.ndarray]) -> float:
 
 def _whole(loop: ControlLoop, seed: int, steps: int, behavior: str, *, recorded: bool) -> float:
     fresh = ControlLoop(loop.robot, loop.policy, loop.map, seed)
-    with tempfile.TemporaryDirectory() as folder:
-        recorder = SessionRecorder(Path(folder) / "bench.rrd", loop.info) if recorded else None
+    with tempfile.TemporaryDirectory() as folder, RecorderProcess(soon=False) as process:
+        recorder = process.record(Path(folder) / "bench.rrd", loop.info) if recorded else None
         start = time.perf_counter()
         for step in range(steps):
             events = [DriveEvent(step, "behavior", behavior)] if behavior and step % 200 == 100 else []

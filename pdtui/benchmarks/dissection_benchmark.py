@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.benchmarks.librosa_import import load_librosa
 from pdtui.benchmarks.matching_benchmark import (
     MatchingSpeedup,
     compare_matching,
-    load_librosa,
     measure_matching_memory,
     time_call_in_seconds,
 )
 from pdtui.benchmarks.random_rollouts import draw_rollout_jobs
+from pdtui.benchmarks.released_procedure import ReleasedProcedureSpeedup, compare_with_released_procedure
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PdtuiError
 from pdtui.probing.rollout_pool import RolloutPool
@@ -49,7 +50,7 @@ class DissectionBenchmarkSettings:
     episodes: int = 5
     steps: int = 1000
     units: int = 512
-    attributes: int = 20
+    attributes: int = 16
     rounds: int = 7
     factors: tuple[float, ...] = (0.25, 0.5, 1, 2, 4)
     memory_units: int = 100_000
@@ -82,6 +83,7 @@ class DissectionBenchmark:
 
     Attributes:
         compared: matching against the loop, per preset.
+        released: matching against the procedure of the authors' released code.
         curves: time of matching by number of units, attributes and episodes.
         memory_units: number of units of the episode that was matched and correlated in a fresh process.
         memory_data_gb: size of its activations, GB.
@@ -93,6 +95,7 @@ class DissectionBenchmark:
 
     recorded: str
     compared: tuple[MatchingSpeedup, ...]
+    released: ReleasedProcedureSpeedup
     curves: tuple[MatchingTimeCurve, ...]
     memory_units: int
     memory_data_gb: float
@@ -118,7 +121,7 @@ def bench_dissection(
 
     def stage(done: int, name: str) -> None:
         if progress is not None:
-            progress(done, 5, name)
+            progress(done, 6, name)
 
     with RolloutPool(robot, policy, 1) as one, RolloutPool(robot, policy, 2) as two:
         stage(0, "record")
@@ -128,11 +131,13 @@ def bench_dissection(
             compare_matching(episodes, attributes, find_matching_preset(name), settings.rounds)
             for name in ("paper", "authors")
         )
-        stage(2, "growth")
+        stage(2, "compare with the released procedure")
+        released = compare_with_released_procedure(episodes, attributes, settings.rounds)
+        stage(3, "growth")
         curves = measure_matching_growth(episodes, attributes, find_matching_preset("paper"), settings)
-        stage(3, "memory")
+        stage(4, "memory")
         peak, seconds = measure_matching_memory(settings.memory_units, settings.memory_steps, len(attributes))
-        stage(4, "probing")
+        stage(5, "probing")
         rates = measure_probing_rate(one, two, settings)
         words = (
             f"{robot}, {settings.episodes} episodes of {settings.steps} steps: {one.policy.units} units and "
@@ -141,10 +146,11 @@ def bench_dissection(
         )
         if settings.units > one.policy.units or settings.attributes > len(one.robot.attributes):
             words += "; the others are recorded ones, shifted in time"
-    stage(5, "done")
+    stage(6, "done")
     return DissectionBenchmark(
         recorded=words,
         compared=compared,
+        released=released,
         curves=curves,
         memory_units=settings.memory_units,
         memory_data_gb=settings.memory_units * settings.memory_steps * 4 / 1e9,

@@ -6,11 +6,11 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.signal import get_window
 
+from pdtui.benchmarks.librosa_import import load_librosa
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PdtuiError
 from pdtui.core.processes.worker_pool import WorkerProcess
@@ -86,21 +86,6 @@ def time_call_in_seconds(work: Callable[[], object]) -> float:
     start = time.perf_counter()
     work()
     return time.perf_counter() - start
-
-
-def load_librosa() -> Any:
-    """Import librosa, which only this comparison needs.
-
-    Raises:
-        PdtuiError: librosa is not installed.
-    """
-    try:
-        import librosa
-    except ImportError as error:
-        raise PdtuiError(
-            "librosa is not installed, and the benchmark compares with it: pip install 'pdtui[bench]'"
-        ) from error
-    return librosa
 
 
 def match_by_loop(

@@ -21,6 +21,7 @@ from pdtui.driving.session_replay import replay_session
 from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_schema import ACTIVATIONS_KEPT, ActivationsKept
+from pdtui.sessions.writer.recorder_process import RecorderProcess
 from pdtui.sessions.writer.session_recorder import SessionRecorder
 
 RATE = 50.0
@@ -61,7 +62,8 @@ class MemoryBenchmark:
     Attributes:
         file_bytes: size of the session, bytes.
         seconds: time of recording, examining and replaying, s.
-        resident: resident memory at ten moments of recording and of replaying, bytes.
+        resident: resident memory at ten moments, bytes: of this process while the drive is recorded, of the
+            process that records, and of this process while it replays.
     """
 
     steps: int
@@ -123,7 +125,7 @@ def _cost(info: DriveInfo, records: Sequence[StepRecord]) -> tuple[float, float]
 
 
 def bench_memory(config: DriveConfig, *, steps: int, progress: StepProgress | None = None) -> MemoryBenchmark:
-    """Record a long drive without a screen, examine it and replay it, all in this process.
+    """Record a long drive without a screen, examine it and replay it.
 
     Raises:
         ScreenError: the system has no ``/proc``.
@@ -132,12 +134,14 @@ def bench_memory(config: DriveConfig, *, steps: int, progress: StepProgress | No
     if not Path("/proc/self/statm").exists():
         raise ScreenError("the memory benchmark reads /proc, which this system does not have")
     every = max(1, steps // _SAMPLES)
-    resident: dict[str, list[int]] = {"recording": [], "replaying": []}
+    resident: dict[str, list[int]] = {"recording": [], "recorder": [], "replaying": []}
     seconds: dict[str, float] = {}
 
-    def sample(part: str, done: int) -> None:
+    def sample(part: str, done: int, pid: int = 0) -> None:
         if done % every == 0:
             resident[part].append(_resident())
+            if pid:
+                resident["recorder"].append(_resident(str(pid)))
         if progress is not None:
             progress(done + (steps if part == "replaying" else 0), 2 * steps)
 
@@ -146,10 +150,11 @@ def bench_memory(config: DriveConfig, *, steps: int, progress: StepProgress | No
         start = time.perf_counter()
         loop = build_control_loop(config)
         names = tuple(loop.map.behaviors)
-        with SessionRecorder(path, replace(loop.info, activations=config.activations)) as recorder:
+        with RecorderProcess() as process:
+            recorder = process.record(path, replace(loop.info, activations=config.activations))
             for step in range(steps):
                 recorder.write(loop.advance(_pressed(step, names)))
-                sample("recording", step + 1)
+                sample("recording", step + 1, process.pid)
             recorder.close("finished")
         seconds["recording"] = time.perf_counter() - start
         start = time.perf_counter()
@@ -161,5 +166,5 @@ def bench_memory(config: DriveConfig, *, steps: int, progress: StepProgress | No
         return MemoryBenchmark(steps, path.stat().st_size, seconds, resident, result.verdict, whole)
 
 
-def _resident() -> int:
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+def _resident(process: str = "self") -> int:
+    return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")

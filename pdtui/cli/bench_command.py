@@ -59,7 +59,7 @@ def bench_loop_command(
 @integer_option("--episodes", most=100, default=5, help="Number of episodes to record.")
 @integer_option("--steps", least=64, default=1000, help="Number of control steps per episode.")
 @integer_option("--units", default=512, help="Number of units to match.")
-@integer_option("--attributes", default=20, help="Number of attributes to match.")
+@integer_option("--attributes", default=16, help="Number of attributes to match.")
 @integer_option("--rounds", default=7, help="Number of rounds to measure.")
 @integer_option(
     "--memory-units", default=100_000, help="Number of units of the episode whose memory is measured."
@@ -69,7 +69,7 @@ def bench_loop_command(
 def bench_dissect_command(
     robot: str, robot_options: tuple[str, ...], policy: str, as_json: bool, **sizes: Any
 ) -> None:
-    """Measure matching against a loop over librosa, and probing on two workers."""
+    """Measure matching against loops over librosa, and probing on two workers."""
     from pdtui.benchmarks.benchmark_tables import dissection_benchmark_table
     from pdtui.benchmarks.dissection_benchmark import DissectionBenchmarkSettings, bench_dissection
     from pdtui.robots import RobotSpec

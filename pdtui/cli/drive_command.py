@@ -136,18 +136,19 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, minutes:
     from pdtui.driving.headless_drive import catch_ending_signals, drive_headless
     from pdtui.driving.keystrokes import read_keystrokes
     from pdtui.driving.loop_builder import build_control_loop
-    from pdtui.sessions.writer.session_recorder import SessionRecorder
+    from pdtui.sessions.writer.recorder_process import RecorderProcess
 
     presses = read_keystrokes(keys, config.stimulation_map) if keys is not None else {}
+    process = RecorderProcess() if config.recording else None  # it loads while the world does
     loop = build_control_loop(config)
     info, viewer = replace(loop.info, activations=config.activations), config.viewer
     if viewer is not None and not viewer.is_listening:
         click.echo(viewer.absence_message, err=True)
         viewer = None
     recorder = None
-    if config.recording:
+    if process is not None:
         path, existing = Path(config.recording), config.existing
-        recorder = SessionRecorder(path, info, viewer=viewer, existing=existing, sync=config.sync)
+        recorder = process.record(path, info, viewer=viewer, existing=existing, sync=config.sync)
     with catch_ending_signals() as ended, progress_bar("driving", quiet=not sys.stderr.isatty()) as advance:
         summary = drive_headless(loop, presses, steps, recorder, ended, progress=advance, minutes=minutes)
     takeover = " or a takeover" if loop.robot.manual_controls else ""

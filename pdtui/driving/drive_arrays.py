@@ -17,7 +17,7 @@ from pdtui.core.units import Stimulation, parse_unit
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.headless_drive import drive_from_keystrokes, end_after, open_step_recorder
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.writer.session_recorder import SessionRecorder
+from pdtui.sessions.writer.step_recorder import StepRecorder
 from pdtui.stimulation.behavior_colors import BEHAVIOR_COLORS
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def collect_drive_arrays(
     loop: ControlLoop,
     keys: Mapping[int, str | Sequence[str]],
     steps: int,
-    recorder: SessionRecorder | None = None,
+    recorder: StepRecorder | None = None,
     *,
     progress: Callable[[int, int], None] | None = None,
     minutes: float | None = None,

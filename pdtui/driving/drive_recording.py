@@ -10,7 +10,7 @@ from pdtui.core.errors import SessionError
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.sessions.drive_info import DriveInfo
-from pdtui.sessions.writer.session_recorder import SessionRecorder
+from pdtui.sessions.writer.recorder_process import RecorderProcess, RemoteRecorder
 
 PACED_ROWS_PER_WRITE = 4  # control steps; a drive at its pace is written often, so that a kill loses little
 
@@ -21,6 +21,7 @@ class DriveRecording:
     Args:
         config: the drive.
         info: what is known about it before its first control step.
+        process: the process that records.
 
     Attributes:
         notice: what the user should read now; may be empty.
@@ -30,16 +31,16 @@ class DriveRecording:
         SessionError: the file exists or cannot be written.
     """
 
-    def __init__(self, config: DriveConfig, info: DriveInfo) -> None:
+    def __init__(self, config: DriveConfig, info: DriveInfo, process: RecorderProcess) -> None:
         self.notice = self.failure = ""
-        self._recorder: SessionRecorder | None = None
+        self._recorder: RemoteRecorder | None = None
         self._place = ""
         if not config.recording:
             return
         viewer = config.viewer
         if viewer is not None and not viewer.is_listening:
             self.notice, viewer = viewer.absence_message, None
-        self._recorder = SessionRecorder(
+        self._recorder = process.record(
             Path(config.recording),
             replace(info, activations=config.activations),
             rows_per_write=PACED_ROWS_PER_WRITE,

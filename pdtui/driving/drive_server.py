@@ -30,6 +30,7 @@ from pdtui.driving.timeline.run_timeline import RunTimeline
 from pdtui.driving.timeline.watched_marks import list_watched_marks
 from pdtui.driving.unit_bench.unit_searcher import UnitSearcher
 from pdtui.sessions.drive_info import BranchOrigin
+from pdtui.sessions.writer.recorder_process import RecorderProcess
 
 _IDLE = 0.05  # longest wait for a request while the drive is paused or over, s
 
@@ -54,22 +55,19 @@ class DriveServer:
         self._closing = ""
         self._branches = 0
         length = 0 if config.watched is None else config.watched.steps
-        self._begin(config, build_control_loop(config), RunTimeline(length))
-        dt, keeps_times = self._loop.robot.control_dt, bool(config.step_times)
-        self._pacer = Pacer(dt, time.monotonic(), keeps_times=keeps_times)
+        self._recorder = RecorderProcess(soon=bool(config.recording))
+        self._begin(config, build_control_loop(config), RunTimeline(length), None)
+        dt = self._loop.robot.control_dt
+        self._pacer = Pacer(dt, time.monotonic(), keeps_times=bool(config.step_times))
 
     def _begin(
-        self,
-        config: DriveConfig,
-        loop: ControlLoop,
-        timeline: RunTimeline,
-        origin: BranchOrigin | None = None,
+        self, config: DriveConfig, loop: ControlLoop, timeline: RunTimeline, origin: BranchOrigin | None
     ) -> None:
         self._config, self._loop, self._timeline = config, loop, timeline
         self._ghost = GhostRunner(config, loop)
         self._searcher = UnitSearcher(config, loop)
         self._builder = SnapshotBuilder(loop, self._ghost, self._searcher)
-        self._recording = DriveRecording(config, replace(loop.info, branch=origin))
+        self._recording = DriveRecording(config, replace(loop.info, branch=origin), self._recorder)
         self._pictures = WorldPictures(loop.robot)
         self._spectra = LiveSpectra(loop.robot.attributes, loop.robot.control_dt)
         self._builder.notice, self._recording.notice = self._recording.notice or self._pictures.notice, ""
@@ -108,6 +106,7 @@ class DriveServer:
             self._close_helpers()
             self._pacer.save_times(self._config.step_times)
             self._recording.close(self._finished or self._closing or "an error ended the drive")
+            self._recorder.close()
 
     def stop(self, reason: str) -> None:
         """End the drive after the present step; a signal handler may call this."""

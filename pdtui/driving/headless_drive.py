@@ -24,7 +24,7 @@ from pdtui.core.outcome import Outcome, OutcomeCounts, count_outcomes
 from pdtui.core.step_record import StepRecord
 from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.keystrokes import interpret_keys
-from pdtui.sessions.writer.session_recorder import SessionRecorder
+from pdtui.sessions.writer.step_recorder import StepRecorder
 
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -123,7 +123,7 @@ def catch_ending_signals() -> Iterator[Callable[[], str]]:
 
 
 @contextmanager
-def open_step_recorder(recorder: SessionRecorder | None) -> Iterator[Callable[[StepRecord], None]]:
+def open_step_recorder(recorder: StepRecorder | None) -> Iterator[Callable[[StepRecord], None]]:
     """Yield a function that records a step, and close the recorder with how the ``with`` block ends."""
     outcome = "stopped"
     try:
@@ -141,7 +141,7 @@ def drive_headless(
     loop: ControlLoop,
     presses: Mapping[int, Sequence[str]],
     steps: int,
-    recorder: SessionRecorder | None,
+    recorder: StepRecorder | None,
     ended: Callable[[], str] = str,
     *,
     progress: Callable[[int, int], None] | None = None,

@@ -88,3 +88,11 @@ def check_figure_path(path: Path, overwrite: bool) -> None:
 def format_policy_title(dissection: Dissection) -> str:
     """Return robot and policy as titles name them."""
     return f"{dissection.robot}, driven by {Path(dissection.policy).stem}"
+
+
+def load_pyplot() -> Any:
+    """Import matplotlib's global figures, which only a benchmark needs, to be drawn without a window."""
+    from matplotlib import pyplot
+
+    pyplot.switch_backend("Agg")
+    return pyplot

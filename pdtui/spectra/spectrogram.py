@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,8 +17,11 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching_presets import MatchingPreset
 
-# Units per block: the spectra of 64 units over one episode of 1000 steps (2 MB) fit into a core's own cache.
-BLOCK = 64
+BLOCK = 128
+"""Units per block: what is computed of them at one frequency fits into a core's own cache."""
+LONGEST_PRODUCT = 256
+"""Longest window, in samples, whose transform is a matrix product; an FFT is faster for longer ones."""
+_Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 Complexes = NDArray[np.complex128]
 
@@ -48,7 +51,7 @@ def scaled_attribute_series(
 
 
 def scaled_activation_series(
-    episodes: Sequence[MonitoredEpisode], units: slice, preset: MatchingPreset
+    episodes: Sequence[MonitoredEpisode], units: slice | NDArray[np.intp], preset: MatchingPreset
 ) -> list[NDArray[Any]]:
     """Return the scaled activations of B units of each episode, shape (T, B) each."""
     series = [episode.activations[:, units] for episode in episodes]
@@ -64,10 +67,23 @@ def map_unit_blocks(
     interpreter's lock, so threads are enough.
     """
     blocks = [slice(low, min(low + block, units)) for low in range(0, units, block)]
-    threads = min(os.cpu_count() or 1, max(1, len(blocks)))
+    yield from zip(blocks, map_on_cores(work, blocks), strict=True)
+
+
+def map_on_cores(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> Iterator[_Result]:
+    """Call a function with each item in threads, one for each core, and yield the results in order."""
     # More threads within the matrix products would only wait for these.
-    with ThreadPoolExecutor(threads) as pool, _libraries().limit(limits=1, user_api="blas"):
-        yield from zip(blocks, pool.map(work, blocks), strict=True)
+    with _libraries().limit(limits=1, user_api="blas"):
+        yield from _threads().map(work, items)
+
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    """Return threads that are kept: on a busy machine, to start them takes as long as a small match."""
+    return ThreadPoolExecutor(os.cpu_count() or 1, "pdtui spectra")
+
+
+os.register_at_fork(after_in_child=_threads.cache_clear)  # a copy of a process has none of its threads
 
 
 @cache
@@ -108,3 +124,31 @@ def spectrogram(spectra: Complexes, preset: MatchingPreset) -> Floats:
     power: Floats = np.square(spectra.real)
     power += np.square(spectra.imag)
     return power if preset.spectrogram == "power" else np.sqrt(power, out=power)
+
+
+def window_view(series: NDArray[Any], preset: MatchingPreset) -> NDArray[Any]:
+    """Return the windows of N series, shape (T, N), without a copy: shape (D, L, N)."""
+    return sliding_window_view(series, preset.length, axis=0)[:: preset.hop].transpose(0, 2, 1)
+
+
+@lru_cache(maxsize=8)
+def transform_matrix(preset: MatchingPreset) -> Complexes:
+    """Return the matrix, shape (F, L), whose product with a window of samples is its weighted transform."""
+    return np.asarray(scipy.fft.rfft(np.diag(preset.weights), axis=0), np.complex128)
+
+
+def transform_at_bins(
+    series: NDArray[Any], preset: MatchingPreset, bins: NDArray[np.intp]
+) -> tuple[Floats, Floats]:
+    """Return real and imaginary parts of N series, shape (T, N), at n bins, shape (D, n, N) each.
+
+    They are those of `short_time_transform` to rounding, but only these bins are computed. The series are at
+    least one window long.
+    """
+    if preset.length > LONGEST_PRODUCT:
+        spectra = short_time_transform(series, preset)[:, :, bins].transpose(1, 2, 0)
+        return np.ascontiguousarray(spectra.real), np.ascontiguousarray(spectra.imag)
+    rows = transform_matrix(preset)[bins]
+    both = np.concatenate([rows.real, rows.imag])
+    parts: Floats = np.matmul(both, window_view(series.astype(np.float64), preset))
+    return parts[:, : len(bins)], parts[:, len(bins) :]

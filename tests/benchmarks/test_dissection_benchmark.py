@@ -13,7 +13,9 @@ from pdtui.benchmarks.dissection_benchmark import (
     record_episodes,
     widen_episode_columns,
 )
-from pdtui.benchmarks.matching_benchmark import load_librosa, match_by_loop, same_ranking
+from pdtui.benchmarks.librosa_import import load_librosa
+from pdtui.benchmarks.matching_benchmark import match_by_loop, same_ranking
+from pdtui.benchmarks.released_procedure import run_released_procedure
 from pdtui.cli import main
 from pdtui.core.attributes import Attribute
 from pdtui.core.errors import PdtuiError
@@ -47,8 +49,11 @@ def test_the_command_measures_all_parts(weights: Path) -> None:
     assert [one["preset"] for one in data["compared"]] == ["paper", "authors"]
     for one in data["compared"]:
         assert one["same_ranking"]
-        assert one["largest_difference"] < 1e-12
+        assert one["largest_difference"] < 1e-6
         assert one["ratio"] > 0
+    released = data["released"]
+    assert released["matching_ratio"] > released["phases_ratio"] > 1
+    assert released["overlap"] > 0.5
     assert {curve["grows"]: len(curve["sizes"]) for curve in data["curves"]} == {
         "units": 5, "attributes": 5, "episodes": 4,
     }  # fmt: skip
@@ -73,10 +78,24 @@ def test_the_loop_computes_what_matching_does() -> None:
     for one in PRESETS.values():
         found = match_units(episodes, attributes, one)
         loop = match_by_loop(episodes, attributes, one)
-        np.testing.assert_allclose(found.discrepancy, loop, rtol=1e-9)
+        np.testing.assert_allclose(found.discrepancy, loop, rtol=1e-6)
         assert same_ranking(found, loop) == (True, 0)
         assert not same_ranking(found, loop[:, ::-1])[0]
         assert same_ranking(found, np.column_stack([loop[:, :8], loop[:, 0]]))[1] == 2
+
+
+def test_the_released_procedure_pads_and_keeps_each_episode_apart() -> None:
+    rng = np.random.default_rng(1)
+    one = MonitoredEpisode(0, rng.standard_normal((96, 3)).astype(np.float32), rng.standard_normal((96, 2)))
+    attributes = (Attribute("vx", "m/s"), Attribute("torque", "N m", scale=0.1))
+    found = run_released_procedure([one, one], attributes)
+    assert len(found) == 2
+    stft = load_librosa().stft
+    for row, attribute in enumerate(attributes):
+        target = np.abs(stft(one.attributes[:, row] * attribute.scale, n_fft=32))
+        for unit in range(3):
+            spectrum = np.abs(stft(one.activations[:, unit].astype(np.float64), n_fft=32))
+            assert found[1][row, unit] == pytest.approx(np.linalg.norm(spectrum - target))
 
 
 def test_columns_beyond_the_recorded_ones_are_other_series(weights: Path) -> None:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import signal
 import sys
 import time
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -65,3 +68,37 @@ def test_the_simulation_ends_with_a_killed_screen(
     assert read_session(recording).outcome == "the screen went away"
     if moment != "loading":
         assert replay_session(recording).identical
+
+
+def test_a_killed_recorder_ends_the_drive_with_one_sentence(
+    small_map: StimulationMap, tmp_path: Path
+) -> None:
+    recording = tmp_path / "drive.rrd"
+    client = DriveClient(DriveConfig("ant", small_map, 3, recording=str(recording)))
+    deadline = time.monotonic() + PATIENCE
+    while not client.recording:
+        assert time.monotonic() < deadline
+        client.poll_message()
+        time.sleep(0.01)
+    (recorder,) = find_processes_writing(recording)
+    os.kill(recorder, signal.SIGKILL)
+    finished = ""
+    while not finished and time.monotonic() < deadline:
+        message = client.poll_message()
+        finished = message.finished if isinstance(message, DriveSnapshot) else ""
+        time.sleep(0.01)
+    line = f"the recorder's process was killed by SIGKILL; the recording up to then is in {recording}"
+    assert finished == line
+    assert client.close().startswith(line)
+    assert client.failed
+    assert read_session(recording).steps >= 1
+
+
+def find_processes_writing(path: Path) -> list[int]:
+    """Return the processes that hold a file open, other than this one."""
+    holders = []
+    for folder in Path("/proc").glob("[0-9]*/fd"):
+        with suppress(OSError):
+            if any(link.readlink() == path for link in folder.iterdir()):
+                holders.append(int(folder.parent.name))
+    return [holder for holder in holders if holder != os.getpid()]

@@ -15,7 +15,7 @@ from tests.faults.fault_bench import ROOT, FaultBench
 from tests.faults.fault_tally import FalseReport, FaultTally, StepsLost
 from tests.faults.killed_simulations import SIGNALS
 
-HEADLESS_LOSS = 127
+HEADLESS_LOSS = 3
 """Control steps of a drive without a screen that may be missing after a SIGKILL."""
 
 PATIENCE = 120.0
@@ -127,11 +127,11 @@ def drive_and_count(map_path: Path, path: Path, counter: Path) -> None:
     from pdtui.driving.drive_config import DriveConfig
     from pdtui.driving.headless_drive import drive_headless
     from pdtui.driving.loop_builder import build_control_loop
-    from pdtui.sessions.writer.session_recorder import SessionRecorder
+    from pdtui.sessions.writer.recorder_process import RecorderProcess
     from pdtui.stimulation.map_reader import load_map
 
     loop = build_control_loop(DriveConfig("ant", load_map(map_path), 1))
-    recorder = SessionRecorder(path, loop.info)
+    recorder = RecorderProcess().record(path, loop.info)
     with counter.open("r+b") as file, mmap.mmap(file.fileno(), _COUNTER.size) as shared:
 
         def count() -> str:

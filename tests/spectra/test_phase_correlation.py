@@ -7,6 +7,7 @@ from pdtui.core.attributes import Attribute
 from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching_presets import PRESETS, MatchingPreset, find_matching_preset
 from pdtui.spectra.phase_correlation import correlate_phases, phase_correlation
+from pdtui.spectra.spectrogram import short_time_transform
 
 SPEED = (Attribute("speed", "m/s"),)
 
@@ -75,3 +76,44 @@ def test_the_preset_says_which_mean_counts() -> None:
     )
     assert found.rho(PRESETS["paper"])[0, 0] == found.circular[0, 0]
     assert found.rho(find_matching_preset("paper", ["phase_mean=plain"]))[0, 0] == found.plain[0, 0]
+
+
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=list(PRESETS))
+def test_both_means_are_those_of_the_phases_of_each_window(preset: MatchingPreset) -> None:
+    rng = np.random.default_rng(5)
+    attributes = rng.standard_normal((2, 320, 3)).cumsum(axis=1) + np.array([0.0, 40.0, 0.0])
+    activations = np.tanh(rng.standard_normal((2, 320, 70)).cumsum(axis=1)).astype(np.float32)
+    activations[:, 100:250, 7] = 0.0  # silent in some windows
+    activations[:, :, 8] = 0.0
+    known = tuple(Attribute(name, "") for name in "abc")
+    episodes = [MonitoredEpisode(seed, activations[seed], attributes[seed]) for seed in range(2)]
+    found = correlate_phases(episodes, known, preset, block=16)
+    for row in range(3):
+        waves = [short_time_transform(one[:, [row]], preset)[0] for one in attributes]
+        predominant = int(np.argmax(sum(np.square(np.abs(wave)).sum(axis=0) for wave in waves)))
+        assert found.bins[row] == predominant
+        for unit in range(70):
+            spectra = [short_time_transform(one[:, [unit]], preset)[0] for one in activations]
+            product = np.concatenate(
+                [
+                    spectrum[:, predominant] * wave[:, predominant].conj()
+                    for spectrum, wave in zip(spectra, waves, strict=True)
+                ]
+            )
+            product = product[np.abs(product) > 1e-12]
+            if unit == 8:
+                assert np.isnan(found.plain[row, unit])
+                continue
+            phases = np.where(np.angle(product) == -np.pi, np.pi, np.angle(product))
+            plain, phasor = np.mean(phases), np.mean(product / np.abs(product))
+            circular = np.angle(phasor) if abs(phasor) > 1e-9 else 0.0
+            assert found.plain[row, unit] == pytest.approx(1 - abs(2 * plain) / np.pi, abs=1e-9)
+            assert found.circular[row, unit] == pytest.approx(1 - abs(2 * circular) / np.pi, abs=1e-9)
+
+
+def test_an_attribute_and_its_negative_are_in_antiphase_at_every_window() -> None:
+    moving = np.random.default_rng(6).standard_normal(320).astype(np.float32)
+    one = MonitoredEpisode(0, -moving[:, None], moving[:, None].astype(np.float64))
+    found = correlate_phases([one], SPEED, PRESETS["paper"])
+    assert found.plain[0, 0] == pytest.approx(-1.0)
+    assert found.circular[0, 0] == pytest.approx(-1.0)

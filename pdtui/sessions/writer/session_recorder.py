@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -65,6 +65,7 @@ class SessionRecorder:
         existing: what to do if a file of this name exists. With ``replace``, the recording is written beside
             it, and replaces it once it is closed whole.
         sync: when data are forced to the disk.
+        versions: what the drive runs on; by default, what this process does.
 
     Attributes:
         notice: one line on what happened to the file while it was written, such as that it was renamed; empty
@@ -84,10 +85,11 @@ class SessionRecorder:
         viewer: ViewerAddress | None = None,
         existing: ExistingFile = "refuse",
         sync: SyncMode = "batch",
+        versions: Mapping[str, str] | None = None,
     ) -> None:
         self.info = info
         self._created = datetime.now(UTC).isoformat(timespec="seconds")
-        self._versions = collect_versions()
+        self._versions = versions or collect_versions()
         self._rows_per_write = max(1, rows_per_write)
         self._rows: list[StepRecord] = []
         self._viewer_rows = max(view_rows if viewer is None else _LIVE_ROWS, 2 * self._rows_per_write)
@@ -161,8 +163,7 @@ class SessionRecorder:
         """
         if self._closed:
             return
-        self._closed = True
-        whole = False
+        self._closed, whole = True, False
         try:
             if not self._failed and self._steps:
                 self.flush()
@@ -200,9 +201,7 @@ class SessionRecorder:
         )
 
     def _require_space(self) -> None:
-        self.notice = (
-            self._recording.follow_renamed_file() or self.notice
-        )  # also if it was deleted with its folder
+        self.notice = self._recording.follow_renamed_file() or self.notice
         if self._reserve.lacks_space(self.path.parent, self.bytes, self._steps, self._outputs.chunks):
             self.close(f"the disk is full: {self._steps} steps were recorded")
             closed = f"{self.path} was closed in time and is complete"
