@@ -134,6 +134,8 @@ def window_view(series: NDArray[Any], preset: MatchingPreset) -> NDArray[Any]:
 @lru_cache(maxsize=8)
 def transform_matrix(preset: MatchingPreset) -> Complexes:
     """Return the matrix, shape (F, L), whose product with a window of samples is its weighted transform."""
+    import scipy.fft
+
     return np.asarray(scipy.fft.rfft(np.diag(preset.weights), axis=0), np.complex128)
 
 

@@ -24,9 +24,11 @@ from pdtui.sessions.session_header import read_session_header
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session
 from pdtui.sessions.viewer.viewer_address import ViewerAddress
+from pdtui.sessions.writer.recorder_loop import KILLED
 from pdtui.stimulation.stimulation_map import StimulationMap
 from tests.real_viewer import free_port, real_viewer
 from tests.small_map import write_small_weights
+from tests.waiting import wait_until_whole
 
 PATIENCE = 60.0
 
@@ -129,8 +131,10 @@ def test_a_killed_simulation_says_where_the_recording_is(connection: DriveClient
         PdtuiError, match=r"was killed by SIGKILL; the recording up to then is in .*drive\.rrd"
     ):
         _until(connection, lambda _: False)
+    wait_until_whole(recording)
     session = read_session(recording)
-    assert session.steps >= steps - 3
+    assert session.steps >= steps
+    assert session.outcome == KILLED
     assert replay_session(recording).first_difference is None
 
 

@@ -28,6 +28,7 @@ from pdtui.sessions.writer.session_recorder import SessionRecorder
 from pdtui.sessions.writer.step_record_codec import StepRecordDecoder, StepRecordEncoder
 from tests.sessions.conftest import Recorded
 from tests.sessions.recorded_drives import events_of, make_loop
+from tests.waiting import wait_until_whole
 
 PATIENCE = 120.0
 
@@ -132,10 +133,7 @@ def test_a_drive_that_is_killed_loses_no_step(weights: Path, tmp_path: Path) -> 
         check=False,
     )
     assert child.returncode == -signal.SIGKILL
-    deadline = time.monotonic() + PATIENCE
-    while not (path.exists() and examine_session(path).whole):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    wait_until_whole(path)
     session = read_session(path)
     assert session.steps == 300
     assert session.outcome == KILLED

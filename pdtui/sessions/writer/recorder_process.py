@@ -5,12 +5,14 @@ from __future__ import annotations
 import multiprocessing
 import time
 from dataclasses import replace
+from multiprocessing.process import BaseProcess
 from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any
 
 from pdtui.core.closable import Closable
 from pdtui.core.errors import SessionError
+from pdtui.core.processes.process_start import start_process
 from pdtui.core.processes.shared_ring import SharedRing
 from pdtui.core.processes.worker_pool import describe_exit
 from pdtui.core.step_record import StepRecord
@@ -39,25 +41,23 @@ class RecorderProcess(Closable):
     """
 
     def __init__(self, *, soon: bool = True) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._connection, self._theirs = context.Pipe()
-        self._process = context.Process(target=serve_recordings, args=(self._theirs,), name="pdtui recorder")
-        self._started = False
+        self._connection, self._theirs = multiprocessing.Pipe()
+        self._process: BaseProcess | None = None
         # Python waits for processes when it exits, and this one waits for the end of the pipe.
         self._finalize = Finalize(self, self._connection.close, exitpriority=10)
         if soon:
             self._start()
 
     def _start(self) -> None:
-        if not self._started:
-            self._started = True
-            self._process.start()
+        if self._process is None:
+            module = serve_recordings.__module__
+            self._process = start_process("pdtui recorder", module, serve_recordings, self._theirs)
             self._theirs.close()
 
     @property
     def pid(self) -> int:
         """Process id of the recorder."""
-        return self._process.pid or 0
+        return (self._process and self._process.pid) or 0
 
     def record(self, path: Path, info: DriveInfo, **options: Any) -> RemoteRecorder:
         """Begin a recording; the arguments and errors are those of `SessionRecorder`."""
@@ -80,17 +80,18 @@ class RecorderProcess(Closable):
 
     def require_alive(self) -> None:
         """Raise a `SessionError` if the process is dead."""
-        if not self._process.is_alive():
+        if self._process is None or not self._process.is_alive():
             raise self.death()
 
     def death(self) -> SessionError:
         """Return an error that says how the process ended."""
-        return SessionError(f"the recorder's process {describe_exit(self._process)}")
+        how = "never started" if self._process is None else describe_exit(self._process)
+        return SessionError(f"the recorder's process {how}")
 
     def close(self) -> None:
         """End the process once its recording is complete."""
         self._finalize()
-        if self._started:
+        if self._process is not None:
             self._process.join()
 
 
