@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Group
 from rich.table import Table
 
-from pdtui.benchmarks.accelerator.screening_result import ScreeningBenchmark
+from pdtui.benchmarks.accelerator.accelerator_benchmark_result import AcceleratorBenchmark
 from pdtui.benchmarks.cluster_benchmark import BYTES_PER_SECOND, NODES, ClusterBenchmark
 from pdtui.benchmarks.control_loop_benchmark import ControlLoopBenchmark
 from pdtui.benchmarks.dissection_benchmark import DissectionBenchmark
@@ -180,7 +180,7 @@ def screen_benchmark_table(result: ScreenBenchmark) -> Table:
     return table
 
 
-def screening_benchmark_tables(result: ScreeningBenchmark) -> Group:
+def accelerator_benchmark_tables(result: AcceleratorBenchmark) -> Group:
     """Return the speed of screening on accelerator and CPU, and how far they agree on each attribute."""
     speed = new_table(
         f"Screening the Ant's units: {result.rollouts} roll-outs of {result.steps} control steps",

@@ -114,7 +114,7 @@ def _bare(loop: ControlLoop, seed: int, actions: list[np.ndarray]) -> float:
 def _whole(loop: ControlLoop, seed: int, steps: int, behavior: str, *, recorded: bool) -> float:
     fresh = ControlLoop(loop.robot, loop.policy, loop.map, seed)
     with tempfile.TemporaryDirectory() as folder, RecorderProcess(soon=False) as process:
-        recorder = process.record(Path(folder) / "bench.rrd", loop.info) if recorded else None
+        recorder = process.begin_recording(Path(folder) / "bench.rrd", loop.info) if recorded else None
         start = time.perf_counter()
         for step in range(steps):
             events = [DriveEvent(step, "behavior", behavior)] if behavior and step % 200 == 100 else []

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdtui.benchmarks.librosa_import import load_librosa
 from pdtui.benchmarks.matching_benchmark import (
     MatchingSpeedup,
     compare_matching,
     measure_matching_memory,
     time_call_in_seconds,
 )
+from pdtui.benchmarks.optional_librosa import load_librosa
 from pdtui.benchmarks.random_rollouts import draw_rollout_jobs
 from pdtui.benchmarks.released_procedure import ReleasedProcedureSpeedup, compare_with_released_procedure
 from pdtui.core.attributes import Attribute, Floats

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import get_window
 
-from pdtui.benchmarks.librosa_import import load_librosa
+from pdtui.benchmarks.optional_librosa import load_librosa
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PdtuiError
 from pdtui.core.processes.worker_pool import WorkerProcess

@@ -151,7 +151,7 @@ def bench_memory(config: DriveConfig, *, steps: int, progress: StepProgress | No
         loop = build_control_loop(config)
         names = tuple(loop.map.behaviors)
         with RecorderProcess() as process:
-            recorder = process.record(path, replace(loop.info, activations=config.activations))
+            recorder = process.begin_recording(path, replace(loop.info, activations=config.activations))
             for step in range(steps):
                 recorder.write(loop.advance(_pressed(step, names)))
                 sample("recording", step + 1, process.pid)

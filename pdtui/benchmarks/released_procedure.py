@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pdtui.benchmarks.librosa_import import load_librosa
+from pdtui.benchmarks.optional_librosa import load_librosa
 from pdtui.core.attributes import Attribute, Floats
 from pdtui.pictures.matplotlib_page import load_pyplot
 from pdtui.spectra.episode_monitor import MonitoredEpisode

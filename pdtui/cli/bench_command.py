@@ -69,7 +69,7 @@ def bench_loop_command(
 def bench_dissect_command(
     robot: str, robot_options: tuple[str, ...], policy: str, as_json: bool, **sizes: Any
 ) -> None:
-    """Measure matching against loops over librosa, and probing on two workers."""
+    """Measure matching against loops over librosa and the authors' released procedure, and probing."""
     from pdtui.benchmarks.benchmark_tables import dissection_benchmark_table
     from pdtui.benchmarks.dissection_benchmark import DissectionBenchmarkSettings, bench_dissection
     from pdtui.robots import RobotSpec
@@ -132,28 +132,28 @@ def bench_cluster_command(
     print_result(asdict(result), as_json, lambda: cluster_benchmark_tables(result))
 
 
-@bench_command.command("screening")
+@bench_command.command("accelerator")
 @own_policy_option
-@integer_option("--units", least=0, default=0, help="Number of units to screen, evenly spread; 0 for all.")
-@integer_option("--starts", least=2, default=6, help="Number of common starts.")
+@integer_option("--units", least=0, default=0, help="Number of units to screen, evenly spaced; 0 for all.")
+@integer_option("--starts", least=2, default=6, help="Number of starts, the same for every unit.")
 @integer_option("--steps", least=10, default=60, help="Number of control steps per roll-out.")
 @integer_option("--workers", default=2, help="Number of worker processes on the CPU.")
 @json_option
-def bench_screening_command(policy: str, as_json: bool, **sizes: Any) -> None:
-    """Screen the Ant's units by MJX, on a GPU where there is one, and by MuJoCo on the CPU.
+def bench_accelerator_command(policy: str, as_json: bool, **sizes: Any) -> None:
+    """Screen the Ant's units with MJX, on a GPU if there is one, and with MuJoCo on the CPU.
 
-    Needs pdtui[mjx], on which nothing else depends.
+    Needs pdtui[mjx]; nothing else does.
     """
-    from pdtui.benchmarks.benchmark_tables import screening_benchmark_tables
+    from pdtui.benchmarks.benchmark_tables import accelerator_benchmark_tables
     from pdtui.robots import RobotSpec
 
     try:
-        from pdtui.benchmarks.accelerator.screening_benchmark import bench_screening
+        from pdtui.benchmarks.accelerator.accelerator_benchmark import bench_accelerator
     except ImportError as error:
         raise PdtuiError(f"{error.name} is not installed; pip install 'pdtui[mjx]' brings it") from error
     with progress_bar("measuring", quiet=as_json) as advance:
-        result = bench_screening(RobotSpec("ant"), policy or "ant", progress=advance, **sizes)
-    print_result(asdict(result), as_json, lambda: screening_benchmark_tables(result))
+        result = bench_accelerator(RobotSpec("ant"), policy or "ant", progress=advance, **sizes)
+    print_result(asdict(result), as_json, lambda: accelerator_benchmark_tables(result))
 
 
 @bench_command.command("record")

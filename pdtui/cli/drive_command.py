@@ -148,7 +148,7 @@ def _drive_headless(config: DriveConfig, keys: Path | None, steps: int, minutes:
     recorder = None
     if process is not None:
         path, existing = Path(config.recording), config.existing
-        recorder = process.record(path, info, viewer=viewer, existing=existing, sync=config.sync)
+        recorder = process.begin_recording(path, info, viewer=viewer, existing=existing, sync=config.sync)
     with catch_ending_signals() as ended, progress_bar("driving", quiet=not sys.stderr.isatty()) as advance:
         summary = drive_headless(loop, presses, steps, recorder, ended, progress=advance, minutes=minutes)
     takeover = " or a takeover" if loop.robot.manual_controls else ""

@@ -160,7 +160,7 @@ def _fit_into_map(behavior: Behavior, known: StimulationMap) -> Behavior:
             return replace(behavior, name=other.name, key=other.key)
     keys = {other.key for other in others}
     if behavior.key in keys:
-        pair = KeyAllocator(keys).take_pair(behavior.name)
+        pair = KeyAllocator(keys).take_key_pair(behavior.name)
         if pair is not None:
             return replace(behavior, key=pair[1])
     return behavior

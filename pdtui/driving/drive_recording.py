@@ -40,7 +40,7 @@ class DriveRecording:
         viewer = config.viewer
         if viewer is not None and not viewer.is_listening:
             self.notice, viewer = viewer.absence_message, None
-        self._recorder = process.record(
+        self._recorder = process.begin_recording(
             Path(config.recording),
             replace(info, activations=config.activations),
             rows_per_write=PACED_ROWS_PER_WRITE,

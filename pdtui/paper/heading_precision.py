@@ -20,7 +20,7 @@ from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.disturbance_conditions import find_condition, plan_pushes
 from pdtui.evaluation.target_tracking import find_pid_behaviors
-from pdtui.paper.pid_inputs import ControlInput, describe_pid_output, list_pid_inputs
+from pdtui.paper.pid_outputs import ControlInput, classify_pid_outputs, list_pid_outputs
 from pdtui.search.gains.tracking_drives import (
     STEPS_EACH,
     STEPS_UNTOUCHED,
@@ -196,8 +196,8 @@ def _rows(
             loop.map.source,
             loop.robot.name,
             loop.policy.name,
-            describe_pid_output(behavior),
-            list_pid_inputs(behavior, loop.map),
+            classify_pid_outputs(behavior),
+            list_pid_outputs(behavior, loop.map),
             {name: value for name, value in loop.robot.commands.items() if name not in behavior.commands},
             summarize_tracking(drives[number], unit),
             ratios[number],
@@ -211,7 +211,7 @@ def _rows(
 def _ratios(behaviors: Sequence[Behavior], drives: _DrivesOfBehaviors) -> list[PairedRatio | None]:
     """Return the ratio of each behavior's error to that of the first one by command."""
     of_command = [
-        part for one, part in zip(behaviors, drives, strict=True) if describe_pid_output(one) == "command"
+        part for one, part in zip(behaviors, drives, strict=True) if classify_pid_outputs(one) == "command"
     ]
     return [
         None if not of_command or part is of_command[0] else paired_error_ratio(part, of_command[0])

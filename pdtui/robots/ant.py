@@ -16,7 +16,7 @@ from pdtui.core.robot_links_and_state import Foot
 from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.observation_edits.heading_edit import quaternion_heading_edits
 from pdtui.robots.observation_edits.observation_edit import offset_observed_number
-from pdtui.robots.robot import RewardlessStep
+from pdtui.robots.robot import RewardlessStepResult
 from pdtui.robots.simulators.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
 from pdtui.robots.simulators.mujoco_robot import (
     MujocoRobot,
@@ -78,13 +78,13 @@ class Ant(MujocoRobot, AntEnv):
         info |= {"cost": 0.0, **fall_info(reason)}
         return self.observe(), float(reward), bool(reason), False, info
 
-    def step_without_reward(self, action: NDArray[np.float32]) -> RewardlessStep:
+    def step_without_reward(self, action: NDArray[np.float32]) -> RewardlessStepResult:
         # What Gymnasium's step computes besides, forces among it, takes a third of its time.
         self.data.ctrl[:] = action
         mujoco.mj_step(self.model, self.data, self.frame_skip)
         self._check_finite()
         fell = bool(self._find_fall())
-        return RewardlessStep(self.observe(), Outcome.FELL if fell else None, fell)
+        return RewardlessStepResult(self.observe(), Outcome.FELL if fell else None, fell)
 
     def reset_model(self) -> Floats:
         silence_warnings(self.data)

@@ -31,7 +31,7 @@ ResetResult = tuple[Floats, dict[str, Any]]
 StepResult = tuple[Floats, float, bool, bool, dict[str, Any]]
 
 
-class RewardlessStep(NamedTuple):
+class RewardlessStepResult(NamedTuple):
     """What a control step leads to, but for its reward.
 
     Attributes:
@@ -157,10 +157,10 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     def digest(self) -> int:
         """Return a 63-bit digest of the simulator's state: equal states have equal digests."""
 
-    def step_without_reward(self, action: NDArray[np.float32]) -> RewardlessStep:
+    def step_without_reward(self, action: NDArray[np.float32]) -> RewardlessStepResult:
         """Take a control step that leads where `step` does, to the last bit, for those who need no reward."""
         observation, _, terminated, truncated, info = self.step(action)
-        return RewardlessStep(
+        return RewardlessStepResult(
             observation, self.outcome_of(terminated, truncated, info), terminated or truncated
         )
 

@@ -14,7 +14,7 @@ from pdtui.core.attributes import Attribute, Floats, wrap_angle
 from pdtui.core.outcome import Outcome, fall_info
 from pdtui.core.robot_links_and_state import Foot
 from pdtui.robots.observation_edits.observation_edit import offset_observed_number, set_observed_number
-from pdtui.robots.robot import RewardlessStep
+from pdtui.robots.robot import RewardlessStepResult
 from pdtui.robots.simulators.joint_and_trunk_attributes import torque_attributes
 from pdtui.robots.simulators.mujoco_robot import (
     MujocoRobot,
@@ -191,12 +191,12 @@ class Walker(MujocoRobot, Walker2dEnv):
             )
         return observation, float(reward), terminated, truncated, info
 
-    def step_without_reward(self, action: NDArray[np.float32]) -> RewardlessStep:
+    def step_without_reward(self, action: NDArray[np.float32]) -> RewardlessStepResult:
         self.data.ctrl[:] = action
         mujoco.mj_step(self.model, self.data, self.frame_skip)
         self._check_finite()
         fell = not self.is_healthy
-        return RewardlessStep(self.observe(), Outcome.FELL if fell else None, fell)
+        return RewardlessStepResult(self.observe(), Outcome.FELL if fell else None, fell)
 
     def read_attributes(self) -> Floats:
         mujoco.mj_kinematics(self.model, self.data)

@@ -12,7 +12,11 @@ from pdtui.core.attributes import Attribute, Floats
 from pdtui.core.errors import PolicyError
 from pdtui.spectra.episode_monitor import MonitoredEpisode
 from pdtui.spectra.matching_presets import MatchingPreset
-from pdtui.spectra.mean_distances import measure_exactly, measure_in_single_precision, settle_near_ties
+from pdtui.spectra.mean_distances import (
+    measure_in_double_precision,
+    measure_in_single_precision,
+    settle_near_ties,
+)
 from pdtui.spectra.series_flaws import find_attribute_flaws, find_unit_flaws, is_left_out, is_silent
 from pdtui.spectra.spectrogram import (
     LONGEST_PRODUCT,
@@ -93,7 +97,7 @@ def match_units(
     kept_rows = np.array([not is_left_out(flaws.get(one.name, "")) for one in attributes], bool)
     kept = np.array([not is_left_out(unit_flaws.get(unit, "")) for unit in range(units)], bool)
     if preset.length > LONGEST_PRODUCT:
-        result, share = measure_exactly(used, targets, np.arange(units), preset, block)
+        result, share = measure_in_double_precision(used, targets, np.arange(units), preset, block)
     else:
         found = measure_in_single_precision(used, targets, preset, block)
         settle_near_ties(

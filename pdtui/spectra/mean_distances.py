@@ -21,7 +21,7 @@ _RANKS = 512
 """Number of nearest units of each attribute whose order does not depend on single precision."""
 
 
-def measure_exactly(
+def measure_in_double_precision(
     episodes: Sequence[MonitoredEpisode],
     targets: Sequence[Floats],
     units: NDArray[np.intp],
@@ -52,7 +52,7 @@ def measure_exactly(
 def measure_in_single_precision(
     episodes: Sequence[MonitoredEpisode], targets: Sequence[Floats], preset: MatchingPreset, block: int = 0
 ) -> BoundedDistances:
-    """Return distances of all units in single precision; arguments are as in `measure_exactly`."""
+    """Return distances of all units in single precision, with the arguments of the double one."""
     units = episodes[0].activations.shape[1]
     spectra = list(map_on_cores(lambda series: SinglePrecisionTargets(series, preset), targets))
 
@@ -78,7 +78,7 @@ def settle_near_ties(
 
     Args:
         found: the distances, which are changed.
-        episodes, targets, preset: as in `measure_exactly`.
+        episodes, targets, preset: as in `measure_in_double_precision`.
         rows: the attributes that count.
         columns: the units that count.
         silent: units that never fire; all have the same distances, so that one of them is enough.
@@ -88,7 +88,9 @@ def settle_near_ties(
     again = np.setdiff1d(tied, silent[1:])
     if not len(again):
         return
-    found.distance[:, again], found.share[:, again] = measure_exactly(episodes, targets, again, preset)
+    found.distance[:, again], found.share[:, again] = measure_in_double_precision(
+        episodes, targets, again, preset
+    )
     if silent and silent[0] in again:
         found.distance[:, silent] = found.distance[:, [silent[0]]]
         found.share[:, silent] = found.share[:, [silent[0]]]

@@ -13,7 +13,7 @@ class KeyAllocator:
     def __init__(self, taken: set[str]) -> None:
         self._taken: set[str] = {*taken, *RESERVED_KEYS}
 
-    def take_pair(self, name: str) -> tuple[str, str] | None:
+    def take_key_pair(self, name: str) -> tuple[str, str] | None:
         """Return a capital letter, for more of something, and its small letter, for less, if any is free.
 
         The first free letter of the first letters of the name's words, of the name, and of the alphabet. If

@@ -11,7 +11,7 @@ from textual.strip import Strip
 from pdtui.core.printable_text import make_printable
 
 
-def measure_cells(text: str) -> int:
+def measure_cell_width(text: str) -> int:
     """Return the number of cells of printable text."""
     return len(text) if text.isascii() else cell_len(text)
 
@@ -20,7 +20,7 @@ def fit_cells(text: str, width: int) -> str:
     """Pad text on the right, or cut it with an ellipsis, to exactly `width` cells."""
     if width <= 0:
         return ""
-    length = measure_cells(text)
+    length = measure_cell_width(text)
     if length <= width:
         return text + " " * (width - length)
     return set_cell_size(set_cell_size(text, width - 1).rstrip() + "…", width)
@@ -56,7 +56,7 @@ class ScreenRow:
 
     def add(self, text: str, style: Style, width: int | None = None, *, right: bool = False) -> ScreenRow:
         """Append text, fitted to `width` cells if given; what exceeds the line is cut."""
-        length = measure_cells(text)
+        length = measure_cell_width(text)
         if width is not None and length != width:
             text = " " * (width - length) + text if right and length < width else fit_cells(text, width)
             length = max(width, 0)

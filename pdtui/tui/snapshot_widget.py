@@ -31,7 +31,7 @@ LEAST_PAINTED = Size(16, 2)
 Shown = TypeVar("Shown")
 
 
-class PlainReactive(reactive[Shown]):
+class UncomputedReactive(reactive[Shown]):
     """A reactive that is cheap to read: Textual's own looks for a method that computes it each time."""
 
     if not TYPE_CHECKING:
@@ -53,8 +53,10 @@ class SnapshotWidget(Widget, can_focus=False, inherit_bindings=False):
     """
 
     ALLOW_SELECT: ClassVar[bool] = False
-    facts: reactive[DriveFacts | None] = PlainReactive(None, init=False, repaint=False, always_update=True)
-    snapshot: reactive[DriveSnapshot | None] = PlainReactive(
+    facts: reactive[DriveFacts | None] = UncomputedReactive(
+        None, init=False, repaint=False, always_update=True
+    )
+    snapshot: reactive[DriveSnapshot | None] = UncomputedReactive(
         None, init=False, repaint=False, always_update=True
     )
 

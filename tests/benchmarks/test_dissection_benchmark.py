@@ -13,8 +13,8 @@ from pdtui.benchmarks.dissection_benchmark import (
     record_episodes,
     widen_episode_columns,
 )
-from pdtui.benchmarks.librosa_import import load_librosa
 from pdtui.benchmarks.matching_benchmark import match_by_loop, same_ranking
+from pdtui.benchmarks.optional_librosa import load_librosa
 from pdtui.benchmarks.released_procedure import run_released_procedure
 from pdtui.cli import main
 from pdtui.core.attributes import Attribute

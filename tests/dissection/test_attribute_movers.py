@@ -71,9 +71,9 @@ def test_only_what_the_body_does_and_can_do_otherwise_is_steered() -> None:
 
 def test_keys_come_in_pairs_once_each_and_never_reserved_ones() -> None:
     keys = KeyAllocator({"x", "h"})
-    assert keys.take_pair("thigh angle") == ("T", "t")
-    assert keys.take_pair("height") == ("E", "e")
-    taken = [keys.take_pair("leg angle") for _ in range(40)]
+    assert keys.take_key_pair("thigh angle") == ("T", "t")
+    assert keys.take_key_pair("height") == ("E", "e")
+    taken = [keys.take_key_pair("leg angle") for _ in range(40)]
     given = [key for pair in taken if pair is not None for key in pair]
     assert given[:4] == ["L", "l", "A", "a"]
     assert len(given) == len(set(given))

@@ -131,7 +131,7 @@ def drive_and_count(map_path: Path, path: Path, counter: Path) -> None:
     from pdtui.stimulation.map_reader import load_map
 
     loop = build_control_loop(DriveConfig("ant", load_map(map_path), 1))
-    recorder = RecorderProcess().record(path, loop.info)
+    recorder = RecorderProcess().begin_recording(path, loop.info)
     with counter.open("r+b") as file, mmap.mmap(file.fileno(), _COUNTER.size) as shared:
 
         def count() -> str:

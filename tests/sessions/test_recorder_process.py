@@ -65,7 +65,7 @@ def test_the_session_is_the_same_to_the_last_bit(
         for record in records:
             own.write(record)
         own.close("the operator quit")
-    remote = process.record(there, loop.info, rows_per_write=rows)
+    remote = process.begin_recording(there, loop.info, rows_per_write=rows)
     for record in records:
         remote.write(record)
     remote.close("the operator quit")
@@ -118,7 +118,7 @@ def record_and_die(path: Path, weights: Path) -> None:
     """Record 300 steps without a screen, and be killed."""
     loop = make_loop(weights)
     with RecorderProcess() as process:
-        recorder = process.record(path, loop.info)
+        recorder = process.begin_recording(path, loop.info)
         for step in range(300):
             recorder.write(loop.advance(events_of(step)))
         os.kill(os.getpid(), signal.SIGKILL)
@@ -145,7 +145,7 @@ def test_a_recorder_that_is_killed_ends_the_drive_with_one_sentence(
     _, loop, records = recorded
     path = tmp_path / "a.rrd"
     with RecorderProcess() as process:
-        recorder = process.record(path, loop.info, rows_per_write=4)
+        recorder = process.begin_recording(path, loop.info, rows_per_write=4)
         for record in records[:40]:
             recorder.write(record)
         wait_for(recorder, 36, path)
@@ -165,12 +165,12 @@ def test_what_cannot_be_recorded_is_said_at_once_and_the_process_goes_on(
 ) -> None:
     there, loop, records = recorded
     with pytest.raises(SessionError, match="already exists"):
-        process.record(there, loop.info)
-    unstarted = process.record(tmp_path / "b.rrd", loop.info)
+        process.begin_recording(there, loop.info)
+    unstarted = process.begin_recording(tmp_path / "b.rrd", loop.info)
     unstarted.close("before its first step")
     assert not unstarted.created
     assert not unstarted.path.exists()
-    recorder = process.record(tmp_path / "a.rrd", replace(loop.info, activations="off"))
+    recorder = process.begin_recording(tmp_path / "a.rrd", replace(loop.info, activations="off"))
     recorder.write(records[0])
     recorder.close("done")
     with pytest.raises(SessionError, match="the session is closed"):
@@ -184,7 +184,7 @@ def test_a_full_disk_ends_the_drive_with_a_recording_that_is_whole(
     _, loop, records = recorded
     path = tmp_path / "a.rrd"
     with RecorderProcess() as process:
-        recorder = process.record(path, loop.info, rows_per_write=4)
+        recorder = process.begin_recording(path, loop.info, rows_per_write=4)
         for record in records[:20]:
             recorder.write(record)
         wait_for(recorder, 17, path)
@@ -202,7 +202,7 @@ def test_a_file_that_is_renamed_is_followed(
     process: RecorderProcess, recorded: Recorded, tmp_path: Path
 ) -> None:
     _, loop, records = recorded
-    recorder = process.record(tmp_path / "a.rrd", loop.info, rows_per_write=4)
+    recorder = process.begin_recording(tmp_path / "a.rrd", loop.info, rows_per_write=4)
     recorder.write(records[4]._replace(step=0))
     wait_for(recorder, 1, recorder.path)
     (tmp_path / "a.rrd").rename(tmp_path / "b.rrd")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pdtui.cli.screen.start_certainty import is_certain_to_start
+from pdtui.cli.screen.drive_precheck import is_certain_to_start
 from pdtui.core.errors import ScreenError
 from pdtui.core.printable_text import make_printable
 from pdtui.core.settings.settings_file import read_settings, settings_path

@@ -16,7 +16,7 @@ from typing import Self
 from pdtui.core.closable import Closable
 
 _HEADER = 64
-_WRITTEN, _READ, _NOTES, _SIZE = 0, 1, 2, 3
+_WRITTEN, _READ, _NOTICES, _SIZE = 0, 1, 2, 3
 _LENGTH = 8
 _SKIP = (1 << 64) - 1
 _SHARED_MEMORY = Path("/dev/shm")
@@ -109,21 +109,21 @@ class SharedRing(Closable):
         return None
 
     @property
-    def notes(self) -> int:
+    def notice_count(self) -> int:
         """A number that the reader counts up and the writer looks at, so that it knows of news elsewhere."""
-        return self._fields[_NOTES]
+        return self._fields[_NOTICES]
 
-    def count_note(self) -> None:
-        """Count up the number of notes."""
-        self._fields[_NOTES] += 1
+    def increment_notice_count(self) -> None:
+        """Count up the number of notices."""
+        self._fields[_NOTICES] += 1
 
     @property
-    def progress(self) -> int:
+    def reader_value(self) -> int:
         """A number that the reader sets for the writer."""
         return self._fields[_SIZE]
 
-    @progress.setter
-    def progress(self, value: int) -> None:
+    @reader_value.setter
+    def reader_value(self, value: int) -> None:
         self._fields[_SIZE] = value
 
     def close(self) -> None:

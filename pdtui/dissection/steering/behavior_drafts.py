@@ -38,7 +38,7 @@ def draft_attribute_behaviors(
             found = movers.get((column, sign)) or _strongest_other_way(dissection, column, sign)
             if found is None or (attribute, sign) in aimed:
                 continue
-            pair = pair or keys.take_pair(attribute)
+            pair = pair or keys.take_key_pair(attribute)
             if pair is None:
                 break
             name = f"{attribute} {'up' if sign > 0 else 'down'}"

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pdtui.dissection.steering.edit_directions import (
-    EditDirection,
+from pdtui.dissection.steering.linear_probes import LinearProbe
+from pdtui.dissection.steering.observation_edit_directions import (
+    ObservationEditDirection,
     fit_edit_direction,
     sample_walk_observations,
 )
-from pdtui.dissection.steering.linear_probes import LinearProbe
 from pdtui.dissection.steering.steering_candidates import (
     SteeringCandidate,
     SteeringMethod,
@@ -21,7 +21,7 @@ from pdtui.dissection.steering.steering_candidates import (
     observation_edit_candidates,
     pair_candidates,
     random_direction_candidates,
-    smallest_edit_size,
+    smallest_tried_edit_size,
     unit_candidates,
 )
 from pdtui.dissection.steering.steering_comparison import SteeringSettings
@@ -32,12 +32,12 @@ from pdtui.robots.robot import Robot
 from pdtui.spectra.matching import UnitDiscrepancies
 
 
-def fit_edit_directions(robot: Robot, policy: Policy, seed: int) -> dict[str, EditDirection]:
+def fit_edit_directions(robot: Robot, policy: Policy, seed: int) -> dict[str, ObservationEditDirection]:
     """Return the direction in the first layer of each edit that a robot offers, at its smallest size."""
     edits = robot.observation_edits
     observations = sample_walk_observations(robot, policy, seed) if edits else []
     return {
-        one.name: fit_edit_direction(policy, observations, edits, {one.name: smallest_edit_size(one)})
+        one.name: fit_edit_direction(policy, observations, edits, {one.name: smallest_tried_edit_size(one)})
         for one in edits
     }
 
@@ -47,7 +47,7 @@ def gather_steering_candidates(
     refined: UnitEffects,
     probes: Sequence[LinearProbe],
     edits: Sequence[ObservationEdit],
-    edit_directions: Mapping[str, EditDirection],
+    edit_directions: Mapping[str, ObservationEditDirection],
     layers: Sequence[int],
     columns: Sequence[int],
     settings: SteeringSettings,

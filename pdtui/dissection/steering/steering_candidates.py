@@ -10,8 +10,8 @@ import numpy as np
 
 from pdtui.core.attributes import Floats
 from pdtui.core.units import Stimulation, format_unit
-from pdtui.dissection.steering.edit_directions import EditDirection
 from pdtui.dissection.steering.linear_probes import LinearProbe
+from pdtui.dissection.steering.observation_edit_directions import ObservationEditDirection
 from pdtui.probing.intervention_rollout_plan import InterventionRolloutPlan
 from pdtui.probing.stimulated_rollout import RolloutPlan
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
@@ -164,19 +164,21 @@ def observation_edit_candidates(
     found = []
     for edit in edits:
         for factor in factors:
-            size = factor * smallest_edit_size(edit)
+            size = factor * smallest_tried_edit_size(edit)
             plan = InterventionRolloutPlan(Intervention("imprint", values={edit.name: size}, units=("0:*",)))
             found.append(SteeringCandidate(SteeringMethod.IMPRINT, None, edit.name, size, plan))
     return found
 
 
-def smallest_edit_size(edit: ObservationEdit) -> float:
+def smallest_tried_edit_size(edit: ObservationEdit) -> float:
     """Return the smallest size of an edit of the observation that is tried."""
     return _EDIT_SIZES.get(edit.unit, _OTHER_EDIT_SIZE)
 
 
 def edit_direction_candidates(
-    edits: Sequence[ObservationEdit], directions: Mapping[str, EditDirection], factors: Sequence[float]
+    edits: Sequence[ObservationEdit],
+    directions: Mapping[str, ObservationEditDirection],
+    factors: Sequence[float],
 ) -> list[SteeringCandidate]:
     """Return additions along the directions of edits, at the sizes of `observation_edit_candidates`.
 
@@ -190,10 +192,10 @@ def edit_direction_candidates(
         direction = directions[edit.name]
         if direction.length == 0.0:
             continue
-        vectors = (direction.vectors("along"),)
+        vectors = (direction.make_layer_vectors("along"),)
         for factor in factors:
-            size = factor * smallest_edit_size(edit)
-            plan = InterventionRolloutPlan(direction.addition("along", factor), vectors)
+            size = factor * smallest_tried_edit_size(edit)
+            plan = InterventionRolloutPlan(direction.make_intervention("along", factor), vectors)
             found.append(SteeringCandidate(SteeringMethod.EDIT_DIRECTION, None, edit.name, size, plan))
     return found
 

@@ -165,7 +165,7 @@ def next_standing(sight: RoadSight) -> tuple[float, float]:
     return float(gaps[nearest]), float(beside[nearest])
 
 
-def find_way_past(sight: RoadSight, within: float) -> float:
+def find_passing_offset(sight: RoadSight, within: float) -> float:
     """Return how far to the left the car must get to pass what stands next in its way, m.
 
     Negative to the right; 0 if nothing stands there, or neither side has room.

@@ -22,7 +22,7 @@ from pdtui.paper.driving.maneuver import (
     TIMES,
     WEAVING,
     Maneuver,
-    find_way_past,
+    find_passing_offset,
     predict_times_to_conflict,
     roll,
     slips_off,
@@ -121,7 +121,7 @@ class SteeringOperator:
     def _look_for_way_out(self, seen: RoadSight) -> None:
         """Note how far beside the line a halted car can pass what stands ahead, until it has passed."""
         if self._halted * self._dt > _WAITING:
-            way = find_way_past(seen, 2 * _STANDSTILL_GAP)
+            way = find_passing_offset(seen, 2 * _STANDSTILL_GAP)
             self._way_out = seen.beside + way if way else None
         elif self._way_out is not None:
             ahead, beside, half_length, half_width = seen.standing().T

@@ -119,14 +119,14 @@ class _Recording:
 
     def _send_state(self, *, closed: bool = False) -> None:
         recorder = self._recorder
-        self._ring.progress = recorder.bytes
+        self._ring.reader_value = recorder.bytes
         notice, recorder.notice = recorder.notice, ""
         state = RecordingState(recorder.path, recorder.created, recorder.began, notice, self._failure, closed)
         if state != self._sent:
             self._sent = state
             with suppress(OSError):  # the drive has ended
                 self._connection.send(state)
-            self._ring.count_note()
+            self._ring.increment_notice_count()
 
 
 def as_session_error(error: Exception) -> SessionError:

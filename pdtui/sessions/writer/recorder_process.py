@@ -59,7 +59,7 @@ class RecorderProcess(Closable):
         """Process id of the recorder."""
         return (self._process and self._process.pid) or 0
 
-    def record(self, path: Path, info: DriveInfo, **options: Any) -> RemoteRecorder:
+    def begin_recording(self, path: Path, info: DriveInfo, **options: Any) -> RemoteRecorder:
         """Begin a recording; the arguments and errors are those of `SessionRecorder`."""
         self._start()
         return RemoteRecorder(self, path, info, options)
@@ -69,21 +69,21 @@ class RecorderProcess(Closable):
         try:
             self._connection.send(message)
         except OSError as error:
-            raise self.death() from error
+            raise self.make_exit_error() from error
 
     def receive(self) -> Any:
         """Wait for a message; `SessionError` if the process is dead."""
         try:
             return self._connection.recv()
         except (EOFError, OSError) as error:
-            raise self.death() from error
+            raise self.make_exit_error() from error
 
     def require_alive(self) -> None:
         """Raise a `SessionError` if the process is dead."""
         if self._process is None or not self._process.is_alive():
-            raise self.death()
+            raise self.make_exit_error()
 
-    def death(self) -> SessionError:
+    def make_exit_error(self) -> SessionError:
         """Return an error that says how the process ended."""
         how = "never started" if self._process is None else describe_exit(self._process)
         return SessionError(f"the recorder's process {how}")
@@ -151,7 +151,7 @@ class RemoteRecorder:
     @property
     def bytes(self) -> int:
         """The size of the file so far, bytes."""
-        return self._bytes if self._closed else self._ring.progress
+        return self._bytes if self._closed else self._ring.reader_value
 
     def write(self, record: StepRecord) -> None:
         """Hand over one control step.
@@ -175,7 +175,7 @@ class RemoteRecorder:
             self._looked = now
             self._require_alive()
         # A state is sent before it is counted.
-        while self._seen < self._ring.notes:
+        while self._seen < self._ring.notice_count:
             self._take_state()
         if self._state.failure is not None:
             raise self._state.failure
@@ -195,7 +195,7 @@ class RemoteRecorder:
         except SessionError as error:
             raise self._name_file(error) from error
         finally:
-            self._bytes, self._closed = self._ring.progress, True
+            self._bytes, self._closed = self._ring.reader_value, True
             self._ring.close()
         # A failure was raised once, where the step was written.
         if self._state.failure is not None and failure is None:

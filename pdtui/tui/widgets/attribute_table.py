@@ -20,8 +20,8 @@ from pdtui.tui.ghost_drawing import add_ghost_to_title
 from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
 from pdtui.tui.widgets import sparklines
-from pdtui.tui.widgets.attribute_choice import AttributeChoice, is_force
 from pdtui.tui.widgets.attribute_history import AttributeHistory
+from pdtui.tui.widgets.attribute_window import AttributeWindow, is_force_unit
 from pdtui.tui.widgets.key_press_axis import KeyPressAxis
 
 _SECONDS = 12.0  # length of the history that a plot shows
@@ -66,7 +66,7 @@ class AttributeTable(SnapshotWidget):
 
     def __init__(self, stimulation_map: StimulationMap, *, id: str | None = None) -> None:
         super().__init__(stimulation_map, id=id)
-        self._choice = AttributeChoice(stimulation_map)
+        self._choice = AttributeWindow(stimulation_map)
 
     def handle_request(self, request: str) -> None:
         """Show the next attributes, or those before."""
@@ -97,13 +97,13 @@ class AttributeTable(SnapshotWidget):
     def paint(self, width: int, height: int) -> list[Strip]:
         if self.facts is None or self._history is None:
             return [ScreenRow(width).add("waiting for the policy", STYLES.faint).strip()]
-        forces = sum(is_force(attribute.unit) for attribute in self.facts.attributes)
+        forces = sum(is_force_unit(attribute.unit) for attribute in self.facts.attributes)
         others = len(self.facts.attributes) - forces
         ghost = self.snapshot is not None and self.snapshot.ghost is not None
         lines = 2 if ghost or 2 * others < height else 1
         axis = lines == 1 or height % 2 == 1 or height >= 10
         shown = self._choice.choose(self.facts, (height - axis) // lines)
-        more = f"+{self._choice.hidden} more: scroll" if self._choice.hidden else ""
+        more = f"+{self._choice.hidden_count} more: scroll" if self._choice.hidden_count else ""
         if more != (self.border_subtitle or ""):
             self.border_subtitle = more
         layout = self._lay_out(shown, width, lines)

@@ -67,6 +67,6 @@ def test_nothing_is_left_of_a_ring_without_its_name() -> None:
         assert Path(ring.path).stat().st_mode & 0o077 == 0
         ring.unlink()
         assert not ring.path.exists()
-        ring.progress = 7
-        ring.count_note()
-        assert (ring.progress, ring.notes) == (7, 1)
+        ring.reader_value = 7
+        ring.increment_notice_count()
+        assert (ring.reader_value, ring.notice_count) == (7, 1)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def is_certain_to_start(config: DriveConfig) -> bool:
     """Return whether nothing of a drive can be refused any more: robot, policy, map or recording.
 
-    What is rare or another's is not certain, right as it may be: environments of other packages, policies of
+    Rare or third-party cases do not count as certain, even if they are valid: environments of other packages, policies of
     other programs, options, starts, and sessions that are watched.
     """
     rare = config.watched is not None or config.start or config.stimulation_map.robot_options

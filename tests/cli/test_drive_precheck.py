@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from pdtui.cli.options.shared_options import build_drive_config
-from pdtui.cli.screen.start_certainty import is_certain_to_start
+from pdtui.cli.screen.drive_precheck import is_certain_to_start
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.robots.robot_registry import find_needed_package, find_own_robots
 from pdtui.stimulation.stimulation_map import StimulationMap
@@ -55,7 +55,7 @@ def test_the_screens_process_loads_no_heavy_library() -> None:
     code = (
         "import sys\n"
         "from pdtui.cli.options.shared_options import build_drive_config\n"
-        "from pdtui.cli.screen.start_certainty import is_certain_to_start\n"
+        "from pdtui.cli.screen.drive_precheck import is_certain_to_start\n"
         "assert is_certain_to_start(build_drive_config('walker', None, ''))\n"
         "import pdtui.cli.screen.show_drive, pdtui.tui.drive_app, pdtui.driving.drive_client\n"
         "import pdtui.search.gains.gain_tuning_process\n"

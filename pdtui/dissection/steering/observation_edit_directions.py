@@ -25,7 +25,7 @@ _FIRST, _EVERY = 100, 4
 
 
 @dataclass(frozen=True, eq=False)
-class EditDirection:
+class ObservationEditDirection:
     """The mean change of one layer's outputs by edits of the observation.
 
     Attributes:
@@ -44,11 +44,11 @@ class EditDirection:
         """Length of the mean change."""
         return float(np.linalg.norm(self.change))
 
-    def vectors(self, name: str) -> LayerVectors:
+    def make_layer_vectors(self, name: str) -> LayerVectors:
         """Return the unit vector along it, as a map keeps it."""
         return LayerVectors(name, str(self.layer), (self.change / self.length)[None].astype(np.float32))
 
-    def addition(self, name: str, dose: float = 1.0) -> Intervention:
+    def make_intervention(self, name: str, dose: float = 1.0) -> Intervention:
         """Return the intervention that adds the mean change times `dose`, along the vector called `name`."""
         return Intervention("direction", vectors=name, coordinates=(dose * self.length,))
 
@@ -76,7 +76,7 @@ def fit_edit_direction(
     edits: Sequence[ObservationEdit],
     sizes: Mapping[str, float],
     layer: int = 0,
-) -> EditDirection:
+) -> ObservationEditDirection:
     """Return the direction of edits in a layer.
 
     It is half the difference between what edits of these sizes and of their negatives make of the outputs.
@@ -106,4 +106,4 @@ def fit_edit_direction(
 
     changes = np.array([0.5 * (outputs(one, 1.0) - outputs(one, -1.0)) for one in observations])
     mean, power = changes.mean(axis=0), float((changes**2).sum(axis=1).mean())
-    return EditDirection(layer, mean, float((mean**2).sum()) / power if power else 0.0)
+    return ObservationEditDirection(layer, mean, float((mean**2).sum()) / power if power else 0.0)

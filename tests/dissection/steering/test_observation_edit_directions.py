@@ -7,7 +7,7 @@ import pytest
 
 import pdtui
 from pdtui.core.errors import RobotError
-from pdtui.dissection.steering.edit_directions import fit_edit_direction, sample_walk_observations
+from pdtui.dissection.steering.observation_edit_directions import fit_edit_direction, sample_walk_observations
 from pdtui.dissection.steering.steering_candidates import edit_direction_candidates
 from pdtui.probing.intervention_rollout_plan import InterventionRolloutPlan
 from pdtui.robots import make_robot
@@ -30,8 +30,8 @@ def test_a_direction_is_half_the_mean_difference_of_the_outputs() -> None:
     )
     np.testing.assert_allclose(direction.change, (up - down) / 2, atol=1e-6)
     assert 0.0 < direction.common <= 1.0
-    added = direction.addition("along", 2.0)
-    (length,), vectors = added.coordinates, direction.vectors("along")
+    added = direction.make_intervention("along", 2.0)
+    (length,), vectors = added.coordinates, direction.make_layer_vectors("along")
     np.testing.assert_allclose(length * vectors.rows[0], 2.0 * direction.change, atol=1e-5)
 
 
@@ -67,4 +67,6 @@ def test_the_shipped_directions_are_those_of_the_edits_that_the_maps_name(
     robot, policy = make_robot(own.robot), pdtui.load_policy(own.policy)
     observations = sample_walk_observations(robot, policy, 1000)
     direction = fit_edit_direction(policy, observations, robot.observation_edits, sizes)
-    np.testing.assert_allclose(direction.vectors(vectors).rows, own.vectors[vectors].rows, atol=1e-3)
+    np.testing.assert_allclose(
+        direction.make_layer_vectors(vectors).rows, own.vectors[vectors].rows, atol=1e-3
+    )

@@ -11,7 +11,7 @@ from pdtui.stimulation.stimulation_map import Behavior, StimulationMap
 ControlInput = Literal["command", "units", "interventions", "both"]
 
 
-def describe_pid_output(behavior: Behavior) -> ControlInput:
+def classify_pid_outputs(behavior: Behavior) -> ControlInput:
     """Return what the PID of a behavior sets."""
     kinds: dict[ControlInput, object] = {
         "command": behavior.commands,
@@ -22,7 +22,7 @@ def describe_pid_output(behavior: Behavior) -> ControlInput:
     return used[0] if len(used) == 1 else "both"
 
 
-def list_pid_inputs(behavior: Behavior, stimulation_map: StimulationMap) -> tuple[str, ...]:
+def list_pid_outputs(behavior: Behavior, stimulation_map: StimulationMap) -> tuple[str, ...]:
     """Return the names of the commands and units that it sets, and what its interventions change."""
     return (
         *behavior.commands,

@@ -15,7 +15,7 @@ pytest.importorskip("mujoco.mjx")
 
 @pytest.mark.slow
 def test_effects_on_the_accelerator_are_those_on_the_cpu() -> None:
-    command = ["bench", "screening", "--units", "16", "--starts", "2", "--steps", "20", "--json"]
+    command = ["bench", "accelerator", "--units", "16", "--starts", "2", "--steps", "20", "--json"]
     result = CliRunner(env={"COLUMNS": "120"}).invoke(main, command, catch_exceptions=False)
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)

@@ -1,4 +1,4 @@
-"""What `bench_screening` measures; needs neither JAX nor MJX."""
+"""What `bench_accelerator` measures; needs neither JAX nor MJX."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class ScreenedAttribute:
+class AttributeAgreement:
     """How well the accelerator and the CPU agree on one attribute, over units and outputs.
 
     Attributes:
@@ -28,8 +28,8 @@ class ScreenedAttribute:
 
 
 @dataclass(frozen=True)
-class ScreeningBenchmark:
-    """The result of `bench_screening`.
+class AcceleratorBenchmark:
+    """The result of `bench_accelerator`.
 
     Attributes:
         device: What JAX calls the accelerator; a CPU where there is none.
@@ -52,4 +52,4 @@ class ScreeningBenchmark:
     cpu_seconds: float
     falls: tuple[float, float]
     same_falls: float
-    attributes: tuple[ScreenedAttribute, ...]
+    attributes: tuple[AttributeAgreement, ...]

@@ -1,4 +1,4 @@
-"""`pdtui bench screening`: all units of the Ant screened on an accelerator and on the CPU, in one run."""
+"""`pdtui bench accelerator`: all units of the Ant screened on an accelerator and on the CPU, in one run."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from pdtui.benchmarks.accelerator.accelerator_benchmark_result import AcceleratorBenchmark, AttributeAgreement
 from pdtui.benchmarks.accelerator.mjx_rollouts import NO_UNIT, MjxOutcomes, MjxRollouts
-from pdtui.benchmarks.accelerator.screening_result import ScreenedAttribute, ScreeningBenchmark
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import PdtuiError
 from pdtui.core.processes.worker_pool import StepProgress
@@ -25,7 +25,7 @@ _FIRST_SEED, _AT = 1100, range(100, 200)
 _STRONGEST_SHARE = 0.1
 
 
-def bench_screening(
+def bench_accelerator(
     robot: RobotSpec,
     policy: str,
     *,
@@ -35,7 +35,7 @@ def bench_screening(
     steps: int = 60,
     workers: int = 2,
     progress: StepProgress | None = None,
-) -> ScreeningBenchmark:
+) -> AcceleratorBenchmark:
     """Overwrite each unit alone with each output from common starts; measure the second half of the steps.
 
     Args:
@@ -78,7 +78,7 @@ def bench_screening(
         report(4, 4)
         names = [attribute.name for attribute in ant.attributes]
     effects, exact_effects = _effects(fast, starts), _effects(exact, starts)
-    return ScreeningBenchmark(
+    return AcceleratorBenchmark(
         device=jax.devices()[0].device_kind,
         workers=workers,
         rollouts=len(plans) * starts,
@@ -126,12 +126,12 @@ def _effects(outcomes: MjxOutcomes, starts: int) -> Floats:
     return effects
 
 
-def _compare(name: str, fast: Floats, exact: Floats) -> ScreenedAttribute:
+def _compare(name: str, fast: Floats, exact: Floats) -> AttributeAgreement:
     """Compare the effects on one attribute, each of shape (plans, starts)."""
     mean, exact_mean = np.abs(fast.mean(axis=1)), np.abs(exact.mean(axis=1))
     count = max(1, round(_STRONGEST_SHARE * len(mean)))
     strongest, found = (set(_strongest(values, count).tolist()) for values in (exact_mean, mean))
-    return ScreenedAttribute(
+    return AttributeAgreement(
         name=name,
         correlation=_correlate(fast.mean(axis=1), exact.mean(axis=1)),
         cpu_correlation=_correlate(exact[:, ::2].mean(axis=1), exact[:, 1::2].mean(axis=1)),

@@ -8,12 +8,12 @@ from pdtui.stimulation.stimulation_map import StimulationMap
 _FORCES = ("N", "N m", "Nm")
 
 
-def is_force(unit: str) -> bool:
+def is_force_unit(unit: str) -> bool:
     """Return whether an attribute with this unit is a force or a torque, of which robots have many."""
     return unit in _FORCES
 
 
-class AttributeChoice:
+class AttributeWindow:
     """A part of a robot's attributes, which can be scrolled.
 
     Those that the map is about come first, forces and torques last. What is shown is in the robot's order.
@@ -34,7 +34,7 @@ class AttributeChoice:
 
         def rank(index: int) -> tuple[bool, bool, int]:
             one = attributes[index]
-            return is_force(one.unit), one.name not in self._named, index
+            return is_force_unit(one.unit), one.name not in self._named, index
 
         ranked = sorted(range(self._count), key=rank)
         return sorted(ranked[self._first : self._first + max(room, 0)])
@@ -50,6 +50,6 @@ class AttributeChoice:
         return self.scroll(direction * self._room)
 
     @property
-    def hidden(self) -> int:
+    def hidden_count(self) -> int:
         """Number of attributes that are not shown."""
         return max(0, self._count - self._room)
