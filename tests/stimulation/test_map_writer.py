@@ -3,6 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pdtui.core.errors import MapError
@@ -36,7 +37,11 @@ def test_a_composed_map_reads_back_as_what_it_was_made_of(map_text: str) -> None
         composed = compose_map(one, ["first", "second"])
         assert composed.startswith("# first\n# second\nschema = 1\n")
         again = parse_map(composed, one.source)
-        assert replace(again, text="") == replace(one, text="")
+        assert replace(again, text="", vectors={}) == replace(one, text="", vectors={})
+        assert list(again.vectors) == list(one.vectors)
+        for name, vectors in one.vectors.items():
+            assert again.vectors[name].layer == vectors.layer
+            np.testing.assert_array_equal(again.vectors[name].rows, vectors.rows)
         assert again.behaviors.keys() == one.behaviors.keys()
         assert list(again.behaviors) == list(one.behaviors)
 

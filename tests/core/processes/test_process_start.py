@@ -76,7 +76,7 @@ def test_signals_to_the_group_end_the_process_and_leave_the_server() -> None:
     server = _ask(tell_surroundings)[3]
     for number in (signal.SIGHUP, signal.SIGTERM):
         os.kill(server, number)
-    os.kill(pid, signal.SIGHUP)
+    os.kill(pid, signal.SIGTERM)  # not SIGHUP, which `nohup` lets all processes ignore
     process.join(PATIENCE)
-    assert process.exitcode == -signal.SIGHUP
+    assert process.exitcode == -signal.SIGTERM
     assert _ask(tell_surroundings)[3] == server
