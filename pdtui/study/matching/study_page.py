@@ -95,9 +95,9 @@ def compose_study_page(data: MatchingStudyData, result: StudyResult) -> str:
     """Return the page as Markdown."""
     plan, count = data.plan, len(result.figures)
     left_out = [one for one in data.policies if not one.walks]
-    dropped = (
-        f" {len(left_out)} more were trained, but do not walk by the rule of the plan." if left_out else ""
-    )
+    one = len(left_out) == 1
+    more = "One more was trained, but does" if one else f"{len(left_out)} more were trained, but do"
+    dropped = f" {more} not walk by the rule of the plan." if left_out else ""
     best, settings = plan.settings.best, plan.settings
     listed = ["policy", "net speed", "return", "episodes failed", "units", "roll-outs", "in the study"]
     return _TEMPLATE.read_text().format(
