@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 def is_certain_to_start(config: DriveConfig) -> bool:
     """Return whether nothing of a drive can be refused any more: robot, policy, map or recording.
 
-    Rare or third-party cases do not count as certain, even if they are valid: environments of other packages, policies of
-    other programs, options, starts, and sessions that are watched.
+    Rare or third-party cases do not count as certain, even if they are valid: environments of other packages,
+    policies of other programs, options, starts, and sessions that are watched.
     """
     rare = config.watched is not None or config.start or config.stimulation_map.robot_options
     try:
