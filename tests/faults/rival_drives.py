@@ -15,12 +15,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+from pdtui.core.processes.process_start import prepare_processes
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session
 from tests.faults.fault_bench import ROOT, FaultBench
 from tests.faults.fault_tally import FalseReport, FaultTally, StepsLost
 
-_STEPS = 20
+_STEPS = 200
 _LEAD = 0.05
 """Seconds from the telling to the moment."""
 
@@ -156,6 +157,9 @@ def _require_own(ending: _Ending) -> None:
 
 def _serve() -> None:
     """Run what comes down the pipe, each at its moment, and answer with how it ended."""
+    # Recorders are forked from a server that has loaded them: those that load meanwhile, some seconds long,
+    # would begin their files one after the other.
+    prepare_processes("pdtui.sessions.writer.session_recorder")
     for line in sys.stdin:
         moment, arguments = json.loads(line)
         output, error = io.StringIO(), io.StringIO()
