@@ -160,9 +160,8 @@ class Robot(gymnasium.Env[Floats, NDArray[np.float32]]):
     def step_without_reward(self, action: NDArray[np.float32]) -> RewardlessStepResult:
         """Take a control step that leads where `step` does, to the last bit, for those who need no reward."""
         observation, _, terminated, truncated, info = self.step(action)
-        return RewardlessStepResult(
-            observation, self.outcome_of(terminated, truncated, info), terminated or truncated
-        )
+        outcome = self.outcome_of(terminated, truncated, info)
+        return RewardlessStepResult(observation, outcome, terminated or truncated)
 
     def outcome_of(self, terminated: bool, truncated: bool, info: Mapping[str, Any]) -> Outcome | None:
         """Return the outcome of the episode after a step that returned this; None while there is none.

@@ -180,7 +180,7 @@ def test_a_small_study_from_policies_to_the_page(trained: Path, tmp_path: Path) 
     assert "Matching and steering: 1 of the 3 policies wanted" in first.stdout
     assert "Unknown: one policy that walks is too few" in first.stdout
     page = (guide / "matching-study.md").read_text()
-    assert "1 more were trained, but do not walk by the rule of the plan" in page
+    assert "One more was trained, but does not walk by the rule of the plan" in page
     assert "pdtui train walker --algorithm ppo --activation tanh --layers 256,256 --seed 1001" in page
     data = read_study_data(folder / "matching-study.parquet")
     assert [one.walks for one in data.policies] == [True, False]
