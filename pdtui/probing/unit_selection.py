@@ -88,8 +88,8 @@ def _action_changes(
         action = policy.act(observation).action
         if step % _STEPS_APART == 0:
             seen.append((observation, action))
-        observation, _, terminated, truncated, _ = robot.step(action)
-        if terminated or truncated:
+        observation, _, ends = robot.step_without_reward(action)
+        if ends:
             break
     changes = np.zeros((policy.units, len(values), len(seen[0][1])))
     for unit in range(policy.units):

@@ -36,6 +36,9 @@ class Ant(MujocoRobot, AntEnv):
     episode ends where Gymnasium's does (torso outside 0.2–1.0 m), and also when the torso lies on its back,
     which Gymnasium's Ant does not notice.
 
+    Attributes:
+        torso_heights: Range of heights of the torso outside which it has fallen, m.
+
     Args:
         forward: What is rewarded as moving forward: ``"either"`` is ``max(|vx|, |vy|)``, as in the paper;
             ``"x"`` is vx, as in Gymnasium's Ant. The physics is the same.
@@ -57,7 +60,7 @@ class Ant(MujocoRobot, AntEnv):
 
     def __init__(self, forward: Literal["either", "x"] = "either") -> None:
         super().__init__(include_cfrc_ext_in_observation=False)
-        self._forward = forward
+        self._forward, self.torso_heights = forward, self._healthy_z_range
         self.links = read_model_links(self.model)
         gears = read_motor_gears(self.model)
         self._gears = np.array(list(gears.values()))
@@ -109,7 +112,7 @@ class Ant(MujocoRobot, AntEnv):
 
     def _find_fall(self) -> str:
         height = float(self.data.qpos[2])
-        low, high = self._healthy_z_range
+        low, high = self.torso_heights
         if not low <= height <= high:
             return f"fell: torso at {height:.2f} m, outside {low}–{high} m"
         _, x, y, _ = self.data.qpos[3:7].tolist()

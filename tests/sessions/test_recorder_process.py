@@ -19,6 +19,7 @@ from pdtui.core.errors import RecordingEnded, SessionError
 from pdtui.core.outcome import Outcome
 from pdtui.core.scenery import RoadLine, Scenery, Traffic
 from pdtui.core.step_record import ReplacedAction, StepRecord
+from pdtui.sessions.drive_info import DriveInfo
 from pdtui.sessions.rrd.chunk_stream import ChunkStream
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session
@@ -145,10 +146,7 @@ def test_a_recorder_that_is_killed_ends_the_drive_with_one_sentence(
     _, loop, records = recorded
     path = tmp_path / "a.rrd"
     with RecorderProcess() as process:
-        recorder = process.begin_recording(path, loop.info, rows_per_write=4)
-        for record in records[:40]:
-            recorder.write(record)
-        wait_for(recorder, 36, path)
+        recorder = begin_with(process, path, loop.info, records[:40])
         os.kill(process.pid, signal.SIGKILL)
         with pytest.raises(SessionError) as caught:
             write_on(recorder, records[40:])
@@ -184,10 +182,7 @@ def test_a_full_disk_ends_the_drive_with_a_recording_that_is_whole(
     _, loop, records = recorded
     path = tmp_path / "a.rrd"
     with RecorderProcess() as process:
-        recorder = process.begin_recording(path, loop.info, rows_per_write=4)
-        for record in records[:20]:
-            recorder.write(record)
-        wait_for(recorder, 17, path)
+        recorder = begin_with(process, path, loop.info, records[:20])
         resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (recorder.bytes + 1_000_000, -1))
         with pytest.raises(
             RecordingEnded, match=f"the disk is full; {path} was closed in time and is complete"
@@ -211,6 +206,17 @@ def test_a_file_that_is_renamed_is_followed(
     recorder.close("done")
     assert recorder.path == tmp_path / "b.rrd"
     assert "was renamed: the recording goes on in" in recorder.notice
+
+
+def begin_with(
+    process: RecorderProcess, path: Path, info: DriveInfo, records: list[StepRecord]
+) -> RemoteRecorder:
+    """Begin a recording with some steps, and wait until at most three of them are not in the file."""
+    recorder = process.begin_recording(path, info, rows_per_write=4)
+    for record in records:
+        recorder.write(record)
+    wait_for(recorder, len(records) - 3, path)
+    return recorder
 
 
 def wait_for(recorder: RemoteRecorder, steps: int, path: Path) -> None:

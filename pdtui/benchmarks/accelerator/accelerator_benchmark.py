@@ -7,7 +7,6 @@ import time
 import jax
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from pdtui.benchmarks.accelerator.accelerator_benchmark_result import AcceleratorBenchmark, AttributeAgreement
 from pdtui.benchmarks.accelerator.mjx_rollouts import NO_UNIT, MjxOutcomes, MjxRollouts
@@ -15,9 +14,11 @@ from pdtui.core.attributes import Floats
 from pdtui.core.errors import PdtuiError
 from pdtui.core.processes.worker_pool import StepProgress
 from pdtui.core.units import NO_STIMULATION, Stimulation
+from pdtui.probing.effect_probe import EffectProbe
+from pdtui.probing.matching_hits import rank_correlation
+from pdtui.probing.measured_effects import PlanEffects
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import StartState, collect_start_states
-from pdtui.probing.stimulated_rollout import RolloutJob
 from pdtui.robots import RobotSpec
 from pdtui.robots.ant import Ant
 
@@ -68,16 +69,18 @@ def bench_accelerator(
         first = time.perf_counter() - started
         report(2, 4)
         started = time.perf_counter()
-        fast = _run_on_accelerator(rollouts, plans, common)
+        fast = _to_effects(_run_on_accelerator(rollouts, plans, common), starts)
         accelerator_seconds = time.perf_counter() - started
         report(3, 4)
         pool.run([(NO_STIMULATION, 0)] * 8 * workers, common, steps, 0)  # starts the worker processes
         started = time.perf_counter()
-        exact = _run_on_cpu(pool, plans, common, steps)
+        stimulations = [Stimulation((unit,), (output,)) for unit, output in plans[1:]]
+        exact = EffectProbe(pool).measure_plans(stimulations, common, steps=steps)
         cpu_seconds = time.perf_counter() - started
         report(4, 4)
         names = [attribute.name for attribute in ant.attributes]
-    effects, exact_effects = _effects(fast, starts), _effects(exact, starts)
+    effects, exact_effects = fast.counted_effects(), exact.counted_effects()
+    falls, exact_falls = _all_falls(fast), _all_falls(exact)
     return AcceleratorBenchmark(
         device=jax.devices()[0].device_kind,
         workers=workers,
@@ -86,8 +89,8 @@ def bench_accelerator(
         compile_seconds=first - accelerator_seconds,
         accelerator_seconds=accelerator_seconds,
         cpu_seconds=cpu_seconds,
-        falls=(float(fast.falls.mean()), float(exact.falls.mean())),
-        same_falls=float((fast.falls == exact.falls).mean()),
+        falls=(float(falls.mean()), float(exact_falls.mean())),
+        same_falls=float((falls == exact_falls).mean()),
         attributes=tuple(
             _compare(name, effects[:, :, column], exact_effects[:, :, column])
             for column, name in enumerate(names)
@@ -102,28 +105,22 @@ def _run_on_accelerator(
     return rollouts.run(starts, units, outputs, np.tile(np.arange(len(starts)), len(plans)))
 
 
-def _run_on_cpu(
-    pool: RolloutPool, plans: list[tuple[int, float]], starts: list[StartState], steps: int
-) -> MjxOutcomes:
-    jobs: list[RolloutJob] = [
-        (NO_STIMULATION if unit == NO_UNIT else Stimulation((unit,), (output,)), index)
-        for unit, output in plans
-        for index in range(len(starts))
-    ]
-    outcomes = pool.run(jobs, starts, steps, steps // 2)
-    return MjxOutcomes(
-        np.array([outcome.means for outcome in outcomes]),
-        np.array([outcome.outcome is not None for outcome in outcomes]),
+def _to_effects(outcomes: MjxOutcomes, starts: int) -> PlanEffects:
+    """Return the effects of roll-outs, those without stimulation first."""
+    means = outcomes.means.reshape(-1, starts, outcomes.means.shape[1])
+    falls = outcomes.falls.reshape(-1, starts)
+    return PlanEffects(
+        effects=means[1:] - means[:1],
+        means=means[1:],
+        unperturbed=means[0],
+        falls=falls[1:],
+        errors=np.full(falls[1:].shape, np.nan),
+        unperturbed_falls=falls[0],
     )
 
 
-def _effects(outcomes: MjxOutcomes, starts: int) -> Floats:
-    """Return what each plan changes from each start, shape (plans, starts, J); 0 where it falls."""
-    means = outcomes.means.reshape(-1, starts, outcomes.means.shape[1])
-    fallen = outcomes.falls.reshape(-1, starts)
-    effects: Floats = means[1:] - means[:1]
-    effects[fallen[1:] | fallen[:1]] = 0.0
-    return effects
+def _all_falls(effects: PlanEffects) -> NDArray[np.bool_]:
+    return np.vstack([effects.unperturbed_falls, effects.falls])
 
 
 def _compare(name: str, fast: Floats, exact: Floats) -> AttributeAgreement:
@@ -133,8 +130,8 @@ def _compare(name: str, fast: Floats, exact: Floats) -> AttributeAgreement:
     strongest, found = (set(_strongest(values, count).tolist()) for values in (exact_mean, mean))
     return AttributeAgreement(
         name=name,
-        correlation=_correlate(fast.mean(axis=1), exact.mean(axis=1)),
-        cpu_correlation=_correlate(exact[:, ::2].mean(axis=1), exact[:, 1::2].mean(axis=1)),
+        correlation=rank_correlation(fast.mean(axis=1), exact.mean(axis=1)),
+        cpu_correlation=rank_correlation(exact[:, ::2].mean(axis=1), exact[:, 1::2].mean(axis=1)),
         shared=len(strongest & found) / count,
         confirmed=float(exact_mean[mean.argmax()] / exact_mean.max()),
     )
@@ -142,7 +139,3 @@ def _compare(name: str, fast: Floats, exact: Floats) -> AttributeAgreement:
 
 def _strongest(values: Floats, count: int) -> NDArray[np.intp]:
     return np.argsort(-values, kind="stable")[:count]
-
-
-def _correlate(one: Floats, other: Floats) -> float:
-    return float(stats.spearmanr(one, other).statistic)

@@ -8,9 +8,6 @@ import jax.numpy as jnp
 
 from pdtui.robots.ant import Ant
 
-_LEAST_HEIGHT, _MOST_HEIGHT = 0.2, 1.0
-"""Heights of the torso within which an episode goes on, m."""
-
 
 class JaxAntFormulas:
     """The Ant's formulas of `pdtui.robots.ant`, for one world; `jax.vmap` gives those of many.
@@ -21,6 +18,7 @@ class JaxAntFormulas:
 
     def __init__(self, ant: Ant) -> None:
         self.physics_steps = ant.frame_skip
+        self._heights = ant.torso_heights
         self._gears = jnp.asarray(ant.model.actuator_gear[:, 0], jnp.float32)
         self.wraps = tuple(attribute.wraps for attribute in ant.attributes)
 
@@ -42,5 +40,6 @@ class JaxAntFormulas:
     def has_fallen(self, data: Any) -> Any:
         """Return whether the episode is over: outside the heights, on its back, or no number any more."""
         height, (_, x, y, _) = data.qpos[2], data.qpos[3:7]
-        within = (height >= _LEAST_HEIGHT) & (height <= _MOST_HEIGHT)  # false for NaN
+        low, high = self._heights
+        within = (height >= low) & (height <= high)  # false for NaN
         return ~within | (1 - 2 * (x * x + y * y) < 0)

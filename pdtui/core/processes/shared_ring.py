@@ -16,7 +16,7 @@ from typing import Self
 from pdtui.core.closable import Closable
 
 _HEADER = 64
-_WRITTEN, _READ, _NOTICES, _SIZE = 0, 1, 2, 3
+_WRITTEN, _READ, _NOTICES, _READER_VALUE = 0, 1, 2, 3
 _LENGTH = 8
 _SKIP = (1 << 64) - 1
 _SHARED_MEMORY = Path("/dev/shm")
@@ -44,7 +44,6 @@ class SharedRing(Closable):
         self._fields = self._view[:_HEADER].cast("Q")
         self._data = self._view[_HEADER:]
         self._size = len(self._data)
-        self._taken = 0
 
     @classmethod
     def create(cls, size: int) -> Self:
@@ -120,11 +119,11 @@ class SharedRing(Closable):
     @property
     def reader_value(self) -> int:
         """A number that the reader sets for the writer."""
-        return self._fields[_SIZE]
+        return self._fields[_READER_VALUE]
 
     @reader_value.setter
     def reader_value(self, value: int) -> None:
-        self._fields[_SIZE] = value
+        self._fields[_READER_VALUE] = value
 
     def close(self) -> None:
         for view in (self._fields, self._data, self._view):

@@ -64,8 +64,8 @@ def sample_walk_observations(robot: Robot, policy: Policy, seed: int, steps: int
     for step in range(steps):
         if step % _EVERY == 0:
             found.append(np.array(observation, np.float64))
-        observation, _, terminated, truncated, _ = robot.step(policy.act(observation).action)
-        if terminated or truncated:
+        observation, _, ends = robot.step_without_reward(policy.act(observation).action)
+        if ends:
             break
     return found[_FIRST // _EVERY :] or found
 

@@ -13,8 +13,8 @@ from pdtui.core.printable_text import make_printable
 from pdtui.stimulation.stack.stack_entry import is_muted
 from pdtui.tui.cell_text import ScreenRow, displayed_key_name, fit_cells, format_number, format_signed
 from pdtui.tui.commands.key_clicked import KeyClicked
-from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.theme import STYLES
+from pdtui.tui.widgets.scrolled_list import ScrolledList
 
 if TYPE_CHECKING:
     from textual import events
@@ -29,20 +29,11 @@ _BAR = 10  # length of the bar of the time left, in cells
 _BLOCKS = " ▏▎▍▌▋▊▉"
 
 
-class BehaviorList(SnapshotWidget):
+class BehaviorList(ScrolledList):
     """Shows two lines per behavior if there is room, else one; latched behaviors are never hidden."""
 
     BORDER_TITLE = "behaviors"
     _line_keys: tuple[str, ...] = ()
-    _first = _hidden = 0  # behavior from which on they are listed, and how many have no room
-
-    def on_mouse_scroll_down(self) -> None:
-        self._first = min(self._first + 1, self._hidden)
-        self.redraw()
-
-    def on_mouse_scroll_up(self) -> None:
-        self._first = max(self._first - 1, 0)
-        self.redraw()
 
     def on_click(self, event: events.Click) -> None:
         """Latch the behavior that was clicked."""

@@ -14,27 +14,18 @@ from pdtui.core.step_record import ActiveBehavior
 from pdtui.core.units import format_unit, parse_unit
 from pdtui.stimulation.stimulation_map import StimulationMap
 from pdtui.tui.cell_text import ScreenRow, format_number
-from pdtui.tui.snapshot_widget import SnapshotWidget
 from pdtui.tui.strip.natural_outputs import NaturalOutputs
 from pdtui.tui.strip.unit_picked import UnitPicked
 from pdtui.tui.theme import STYLES
+from pdtui.tui.widgets.scrolled_list import ScrolledList
 
 _NUMBER, _ADDRESS = 8, 8  # widths of the columns, in cells
 
 
-class UnitTable(SnapshotWidget):
+class UnitTable(ScrolledList):
     """Shows one unit per line, in the color of the behavior that overwrites it."""
 
     BORDER_TITLE = "stimulated units"
-    _first = _hidden = 0  # unit from which on they are listed, and how many have no room
-
-    def on_mouse_scroll_down(self) -> None:
-        self._first = min(self._first + 1, self._hidden)
-        self.redraw()
-
-    def on_mouse_scroll_up(self) -> None:
-        self._first = max(self._first - 1, 0)
-        self.redraw()
 
     def paint(self, width: int, height: int) -> list[Strip]:
         if self.facts is None or self.snapshot is None or not self.snapshot.stimulated_units:
