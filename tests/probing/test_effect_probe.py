@@ -98,7 +98,7 @@ def test_a_fall_before_the_measured_steps_leaves_no_number(
     policy_file: Path, starts: list[StartState]
 ) -> None:
     with RolloutPool("ant", policy_file, 1) as pool:
-        pool.robot._healthy_z_range = (2.0, 3.0)  # type: ignore[attr-defined]
+        pool.robot.torso_heights = (2.0, 3.0)  # type: ignore[attr-defined]
         result = EffectProbe(pool).measure_plans([Stimulation((0,), (1.0,))], starts, steps=10)
     assert result.falls.all()
     assert np.isnan(result.effects).all()

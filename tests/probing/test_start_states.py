@@ -35,6 +35,6 @@ def test_steps_of_a_range_are_spread_by_the_seed_of_the_walk(policy_file: Path) 
 
 def test_a_policy_that_always_falls_is_refused(policy_file: Path) -> None:
     robot, policy = make_robot("ant"), load_policy(policy_file)
-    robot._healthy_z_range = (0.9, 1.0)  # type: ignore[attr-defined]
+    robot.torso_heights = (0.9, 1.0)  # type: ignore[attr-defined]
     with pytest.raises(RobotError, match="expected 2 walks of 15 steps among 8 seeds, found 0: falls 8"):
         collect_start_states(robot, policy, 2000, 2, at=15)
