@@ -17,9 +17,11 @@ FULL_EFFECT = 1.0
 """Change of an attribute that counts in full, in standard deviations of the walk."""
 SCORE_SENTENCE = (
     "The score is walking times steering. Walking is the share of walks without a failure, times the net "
-    "speed over that of the robot's fastest policy. Steering is the mean, over these attributes and both "
-    "directions, of how far the one unit that moved the attribute most on the choosing start moves it on the "
-    "held-out starts, in standard deviations of the walk, from 0 to 1; a fall counts as no change."
+    "speed over that of the robot's fastest policy. Steering is the mean, over both directions of "
+    f"{', '.join(STEERED_ATTRIBUTES[:-1])} and {STEERED_ATTRIBUTES[-1]} "
+    "(those that the robot has), of how far the one unit that moved the attribute most on the choosing start "
+    "moves it on the held-out starts, in standard deviations of the walk, from 0 to 1; a fall counts as no "
+    "change."
 )
 
 

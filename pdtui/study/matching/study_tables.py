@@ -40,9 +40,12 @@ class StudySummary:
         scores = score_policies(self.data)
         if not scores:
             return Group(self._variant_table())
-        table = new_table("Walking and steering", *score_headers(), left=("policy", "trained by"))
+        # The page has the attributes, too, for which a terminal has no room.
+        headers = score_headers()
+        shown = [headers.index(name) for name in ("policy", "walking", "steering (halves)", "score")]
+        table = new_table("Walking and steering", *(headers[column] for column in shown))
         for row in score_rows(scores):
-            table.add_row(*row)
+            table.add_row(*(row[column] for column in shown))
         table.caption = f"{SCORE_SENTENCE} {describe_best_policies(scores).replace('`', '')}"
         return Group(self._variant_table(), table)
 
