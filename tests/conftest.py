@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import compileall
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+import pdtui
 from pdtui.api import dissect
 from pdtui.dissection.dissection_result import Dissection
 from pdtui.driving.drive_client import prepare_simulation
@@ -19,6 +21,15 @@ from tests.real_viewer import RealViewer, real_viewer
 from tests.small_dissection import SMALL, small_network, write_policy
 from tests.small_map import SMALL_MAP, write_small_weights
 from tests.wired_policy import wired_file  # noqa: F401
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile pdtui once, for the hundreds of processes that tests start.
+
+    Without this, each compiles all that it imports where ``PYTHONDONTWRITEBYTECODE`` is set.
+    """
+    if not hasattr(config, "workerinput"):
+        compileall.compile_dir(Path(pdtui.__file__).parent, quiet=2)
 
 
 @pytest.fixture(scope="session", autouse=True)
