@@ -104,7 +104,7 @@ from pdtui.policies.weights.import_options import ImportOptions
     help="Draw the result of the experiment as .png, .pdf, .svg or .rrd; may be repeated.",
 )
 @overwrite_option
-@journal_option("run", " Not with --target, --policy-only, --gait and most experiments.")
+@journal_option("run", " Of the experiments, only driving takes one.")
 @workers_option
 @json_option
 def evaluate_command(
