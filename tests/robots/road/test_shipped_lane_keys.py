@@ -1,0 +1,94 @@
+"""The key for the lane on the right of `metadrive-deep`, an imprint of 14 units, beside what would do as well."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("metadrive", reason="the extra 'driving' is not installed")
+
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.evaluation.behavior_evaluation import plan_evaluation
+from pdtui.evaluation.held_run import InterventionMeasurement
+from pdtui.evaluation.tasks.task_runs import list_task_runs, plan_task_episode, run_task_episode
+from pdtui.robots.metadrive import MetaDrive
+from pdtui.stimulation.interventions.intervention import Intervention
+from pdtui.stimulation.map_library import find_map
+from pdtui.stimulation.map_reader import load_map
+
+MAP = load_map(find_map("metadrive-deep"))
+KEY = MAP.behaviors["lane right"]
+(IMPRINT,) = KEY.interventions
+LAYER, WIDTH = 3, 128
+JUDGING_SEEDS = range(980, 1000)
+# Noisy sensors, which are not run, would need to know how much each observation varies.
+UNDISTURBED = {"": [InterventionMeasurement(None, np.zeros(275))]}
+
+
+def _count_done(imprints: Mapping[str, Intervention], seeds: Sequence[int], *, near: bool) -> dict[str, int]:
+    """Return on how many seeds the car changes the lane with each of the imprints in the key's place.
+
+    Args:
+        imprints: The imprints by name; an empty intervention for none.
+        seeds: The seeds.
+        near: Whether all drives keep one engine, which is faster and off by less than a millimeter.
+    """
+    behaviors = {
+        name: replace(KEY, name=name, key=chr(0x4E00 + number), interventions=(one,))
+        for number, (name, one) in enumerate(imprints.items())
+    }
+    plan = plan_evaluation(DriveConfig("metadrive", replace(MAP, behaviors=behaviors), 0), seeds)
+    car = plan.loop.robot
+    assert isinstance(car, MetaDrive)
+    if near:
+        car.allow_near_restores()
+    done = dict.fromkeys(imprints, 0)
+    for run in list_task_runs(plan):
+        if run.pressed and run.kind == "units" and run.condition == "undisturbed":
+            episode = plan_task_episode(plan, run, UNDISTURBED)
+            assert episode is not None
+            done[run.behavior] += run_task_episode(plan.loop, episode).verdict.success
+    car.close()
+    return done
+
+
+def _random_units(draw: int) -> tuple[str, ...]:
+    """Return as many units of the layer as the key's, and none of its own."""
+    others = [unit for unit in (f"{LAYER}:{index}" for index in range(WIDTH)) if unit not in IMPRINT.units]
+    rng = np.random.default_rng(draw)
+    return tuple(rng.choice(others, len(IMPRINT.units), replace=False).tolist())
+
+
+def test_it_changes_the_lane() -> None:
+    assert _count_done({"lane right": IMPRINT}, [1800], near=False) == {"lane right": 1}
+
+
+@pytest.mark.slow
+def test_it_changes_the_lane_on_most_judging_seeds() -> None:
+    done = _count_done({"lane right": IMPRINT}, JUDGING_SEEDS, near=False)
+    print(done)
+    assert done["lane right"] >= 16
+
+
+@pytest.mark.slow
+def test_random_units_with_the_same_edit_do_not() -> None:
+    drawn = {f"draw {draw}": replace(IMPRINT, units=_random_units(draw)) for draw in range(24)}
+    done = _count_done({"lane right": IMPRINT, **drawn}, JUDGING_SEEDS[:4], near=True)
+    print(done)
+    assert sum(done[name] >= done["lane right"] for name in drawn) <= 2
+
+
+@pytest.mark.slow
+def test_the_edit_without_a_choice_of_units_is_another_one() -> None:
+    """All units of the first layer are the same as another observation."""
+    sizes = {"0.60": 0.60, "0.66": 0.66, "0.72": 0.72}
+    whole = {
+        name: replace(IMPRINT, units=("0:*",), values={"heading offset": size})
+        for name, size in sizes.items()
+    }
+    done = _count_done(whole, JUDGING_SEEDS, near=True)
+    print(done)
+    assert len(done) == len(sizes)
