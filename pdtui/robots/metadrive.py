@@ -20,10 +20,10 @@ from pdtui.core.scenery import Traffic
 from pdtui.robots.environments.action_log import ActionLog
 from pdtui.robots.road.car_observation_edits import (
     CAR_OBSERVATION_EDITS,
-    WIDEST_LANE,
-    WIDEST_ROAD,
     SPEED_OFFSET,
     SPEED_SCALE,
+    WIDEST_LANE,
+    WIDEST_ROAD,
 )
 from pdtui.robots.road.car_tasks import CAR_GOALS, CAR_TASKS
 from pdtui.robots.road.metadrive_repairs import LIDAR_RANGE, OBSERVATIONS

@@ -1,4 +1,4 @@
-"""Edits of what the car observes of itself and of its road: where it is, the way that it faces, how fast it is.
+"""Edits of what the car observes of itself and its road: where it is, where it heads, and how fast it drives.
 
 What it observes of other cars, and the lidar, stay as they are, so that the policy still sees them where they
 are. `repair_observation` has the order of the observation.
@@ -87,7 +87,11 @@ CAR_OBSERVATION_EDITS = (
         "lane offset", "m", "the car is this far to the left of the middle of its lane", _place_in_lane
     ),
     ObservationEdit(
-        "heading offset", "rad", "the car is turned to the left on its road by this much", _turn, 2.0 * math.pi
+        "heading offset",
+        "rad",
+        "the car is turned to the left on its road by this much",
+        _turn,
+        2.0 * math.pi,
     ),
     ObservationEdit("speed offset", "m/s", "the car is faster by this much", _speed_up),
     ObservationEdit("speed", "m/s", "the car drives at this speed", _set_speed),

@@ -1,4 +1,4 @@
-"""The key for the lane on the right of `metadrive-deep`, an imprint of 14 units, beside what would do as well."""
+"""The key of `metadrive-deep` for the lane on the right, an imprint of few units, beside others."""
 
 from __future__ import annotations
 
