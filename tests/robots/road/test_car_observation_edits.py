@@ -158,7 +158,7 @@ def test_both_together_in_a_bend(car: MovableCar) -> None:
 def test_the_place_in_the_lane_is_set(askew: Floats) -> None:
     scale = next(one for one in MetaDrive.attributes if one.name == "lane offset")
     edited = EDITS["lane offset"](askew, 0.7)
-    assert edited[8] == pytest.approx(scale.as_observed(0.7))
+    assert edited[8] == pytest.approx(scale.as_observed(np.array(0.7)))
     moved = (askew[0] - edited[0]) * 18.0
     np.testing.assert_allclose(edited, EDITS["sideways offset"](askew, moved), atol=1e-9)
 

@@ -82,13 +82,14 @@ def test_random_units_with_the_same_edit_do_not() -> None:
 
 
 @pytest.mark.slow
-def test_the_edit_without_a_choice_of_units_is_another_one() -> None:
+def test_editing_the_observation_itself_does_it_with_a_smaller_edit() -> None:
     """All units of the first layer are the same as another observation."""
-    sizes = {"0.60": 0.60, "0.66": 0.66, "0.72": 0.72}
+    sizes = {"smaller": 0.60, "between": 0.66, "the same": 0.72}
     whole = {
         name: replace(IMPRINT, units=("0:*",), values={"heading offset": size})
         for name, size in sizes.items()
     }
     done = _count_done(whole, JUDGING_SEEDS, near=True)
     print(done)
-    assert len(done) == len(sizes)
+    assert done["smaller"] >= 16
+    assert done["the same"] < 10
