@@ -26,7 +26,7 @@ KEY = MAP.behaviors["lane right"]
 LAYER, WIDTH = 3, 128
 JUDGING_SEEDS = range(980, 1000)
 # Noisy sensors, which are not run, would need to know how much each observation varies.
-UNDISTURBED = {"": [InterventionMeasurement(None, np.zeros(275))]}
+UNMEASURED = {"": [InterventionMeasurement(None, np.zeros(275))]}
 
 
 def _judge(
@@ -51,7 +51,7 @@ def _judge(
     verdicts: dict[str, list[TaskVerdict]] = {name: [] for name in imprints}
     for run in list_task_runs(plan):
         if run.pressed and run.kind == "units" and run.condition == "undisturbed":
-            episode = plan_task_episode(plan, run, UNDISTURBED)
+            episode = plan_task_episode(plan, run, UNMEASURED)
             assert episode is not None
             verdicts[run.behavior].append(run_task_episode(plan.loop, episode).verdict)
     car.close()
