@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from pdtui.robots.observation_edits.observation_edit import (
     set_observed_number,
 )
 
+_GRAVITY = slice(7, 10)
 _FIRST_COMMAND = 10
 _OBSERVED_COMMANDS = ("forward", "lateral", "yaw rate")
 
@@ -36,13 +38,48 @@ TRUNK_EDITS = (
 )
 
 
-def legged_observation_edits(description: LeggedRobotDescription) -> tuple[ObservationEdit, ...]:
-    """Return the edits of what a policy of a robot observes of its trunk and of its commands."""
+def _roll_trunk(observation: Floats, angle: float) -> Floats:
+    edited, (c, s) = observation.copy(), (math.cos(angle), math.sin(angle))
+    x, y, z = observation[_GRAVITY].tolist()
+    edited[_GRAVITY] = x, c * y + s * z, c * z - s * y
+    return edited
+
+
+def _pitch_trunk(observation: Floats, angle: float) -> Floats:
+    edited, (c, s) = observation.copy(), (math.cos(angle), math.sin(angle))
+    x, y, z = observation[_GRAVITY].tolist()
+    edited[_GRAVITY] = c * x - s * z, y, c * z + s * x
+    return edited
+
+
+BALANCE_EDITS = (
+    offset_observed_number(3, "upward offset", "m/s", "it moves up faster by this much", LINEAR_SCALE),
+    ObservationEdit("roll offset", "rad", "the trunk leans to the right by this much", _roll_trunk),
+    ObservationEdit("pitch offset", "rad", "the trunk leans forward by this much", _pitch_trunk),
+)
+
+
+def legged_observation_edits(
+    description: LeggedRobotDescription, joints: Sequence[str]
+) -> tuple[ObservationEdit, ...]:
+    """Return the edits of what a policy of a robot observes of its trunk, its commands and its joints.
+
+    Args:
+        description: The robot.
+        joints: Names of its joints, in their order.
+    """
     height = (
         TRUNK_EDITS[0] if description.scan is None else _scanned_height_edit(description, description.scan)
     )
     commands = _OBSERVED_COMMANDS[: description.observed_commands]
-    return (height, *TRUNK_EDITS[1:], *command_edits(commands))
+    further = (replace(one, dissected=False) for one in (*BALANCE_EDITS, *_joint_edits(description, joints)))
+    return (height, *TRUNK_EDITS[1:], *command_edits(commands), *further)
+
+
+def _joint_edits(description: LeggedRobotDescription, joints: Sequence[str]) -> Iterable[ObservationEdit]:
+    first = _FIRST_COMMAND + description.observed_commands
+    for index, joint in enumerate(joints):
+        yield offset_observed_number(first + index, f"{joint} offset", "rad", "its angle is larger by this much")
 
 
 def _scanned_height_edit(description: LeggedRobotDescription, scan: HeightScan) -> ObservationEdit:
