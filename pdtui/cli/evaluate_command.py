@@ -76,6 +76,18 @@ from pdtui.policies.weights.import_options import ImportOptions
     "a copy into ./maps instead.",
 )
 @click.option("--quick", is_flag=True, help="Take a quick look: fewer seeds and random draws.")
+@click.option(
+    "--without-controls",
+    is_flag=True,
+    help="Leave out random units and directions, pushes on the actions, and disturbed worlds.",
+)
+@click.option(
+    "--behavior",
+    "behaviors",
+    metavar="NAME",
+    multiple=True,
+    help="Measure only this behavior of the map; may be repeated.",
+)
 @integer_option("--hold", help="Control steps for which a behavior is held, at least 10 s; default: 1000.")
 @click.option(
     "--strip",
@@ -121,6 +133,8 @@ def evaluate_command(
     start: str,
     update: bool,
     quick: bool,
+    without_controls: bool,
+    behaviors: tuple[str, ...],
     hold: int | None,
     strip: Path | None,
     watch: bool,
@@ -141,7 +155,14 @@ def evaluate_command(
             "--target": target,
             "--experiment": experiment,
         },
-        {"--update": update, "--quick": quick, "--strip": strip, "--watch": watch}
+        {
+            "--update": update,
+            "--quick": quick,
+            "--without-controls": without_controls,
+            "--behavior": behaviors,
+            "--strip": strip,
+            "--watch": watch,
+        }
         | ({} if let_go else {"--hold": hold}),
     )
     _check_cluster(
@@ -198,9 +219,11 @@ def evaluate_command(
     elif let_go:
         print_key_releases(config, seeds, hold, workers, as_json)
     else:
+        from pdtui.evaluation.evaluation_plan import keep_behaviors
         from pdtui.evaluation.protocol_settings import QUICK_SEEDS, choose_protocol
 
-        settings, drawn = choose_protocol(quick=quick, hold=hold), (strip, overwrite) if strip else None
+        settings = choose_protocol(quick=quick, hold=hold, controls=not without_controls)
+        config, drawn = keep_behaviors(config, behaviors), (strip, overwrite) if strip else None
         seeds = seeds[:QUICK_SEEDS] if quick else seeds
         print_behaviors(config, seeds, settings, workers, drawn, watch=watch, update=update, as_json=as_json)
 

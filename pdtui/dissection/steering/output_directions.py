@@ -1,7 +1,7 @@
 """Directions of the last hidden layer that move chosen outputs of the network and leave the others alone.
 
-An imprint can only make a policy do what it would do for some observation. Such a direction goes with it where
-the posture that is wanted is one that the policy would correct.
+An imprint can only make a policy do what it would do for some observation. Such a direction goes with it
+where the posture that is wanted is one that the policy would correct.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ def find_output_direction(policy: Policy, changes: Mapping[int, float], outputs:
     width = policy.layers[-1]
     if not linear or linear[-1].in_features != width or linear[-1].out_features < outputs:
         raise PolicyError(
-            f"{policy.name}: expected a linear layer from {width} units to {outputs} outputs or more at its end"
+            f"{policy.name}: expected a linear layer at its end, from {width} units to {outputs} outputs"
         )
     wanted = np.zeros(outputs)
     for index, change in changes.items():
         if not 0 <= index < outputs:
-            raise PolicyError(f"{policy.name}: expected the index of an output below {outputs}, found {index}")
+            raise PolicyError(f"{policy.name}: expected an index of outputs below {outputs}, found {index}")
         wanted[index] = change
     weights = linear[-1].weight.detach().numpy()[:outputs].astype(np.float64)
     direction: Floats = np.linalg.pinv(weights) @ wanted

@@ -79,7 +79,8 @@ def legged_observation_edits(
 def _joint_edits(description: LeggedRobotDescription, joints: Sequence[str]) -> Iterable[ObservationEdit]:
     first = _FIRST_COMMAND + description.observed_commands
     for index, joint in enumerate(joints):
-        yield offset_observed_number(first + index, f"{joint} offset", "rad", "its angle is larger by this much")
+        says = "its angle is larger by this much"
+        yield offset_observed_number(first + index, f"{joint} offset", "rad", says)
 
 
 def _scanned_height_edit(description: LeggedRobotDescription, scan: HeightScan) -> ObservationEdit:
