@@ -19,6 +19,7 @@ from pdtui.robots.legged.observations_and_rewards import (
 from pdtui.robots.observation_edits.observation_edit import (
     ObservationEdit,
     offset_observed_number,
+    scale_observed_number,
     set_observed_number,
 )
 
@@ -53,6 +54,8 @@ def _pitch_trunk(observation: Floats, angle: float) -> Floats:
 
 
 BALANCE_EDITS = (
+    scale_observed_number(1, "forward gain", "its forward speed is larger by this share of it"),
+    scale_observed_number(2, "sideways gain", "its speed to the left is larger by this share of it"),
     offset_observed_number(3, "upward offset", "m/s", "it moves up faster by this much", LINEAR_SCALE),
     ObservationEdit("roll offset", "rad", "the trunk leans to the right by this much", _roll_trunk),
     ObservationEdit("pitch offset", "rad", "the trunk leans forward by this much", _pitch_trunk),

@@ -58,3 +58,14 @@ def offset_observed_number(
         return edited
 
     return ObservationEdit(name, unit, says, apply)
+
+
+def scale_observed_number(index: int, name: str, says: str) -> ObservationEdit:
+    """Return an edit that multiplies one number of the observation by 1 + size."""
+
+    def apply(observation: Floats, size: float) -> Floats:
+        edited = observation.copy()
+        edited[index] *= 1.0 + size
+        return edited
+
+    return ObservationEdit(name, "", says, apply)
