@@ -136,7 +136,7 @@ def test_cassie_walks_on_tiptoe_and_on_its_soles_again() -> None:
 
 
 def test_cassie_walks_on_half_crouched() -> None:
-    drive = pdtui.drive("cassie", keys={100: "b"}, steps=350, seed=SEED)
+    drive = pdtui.drive("cassie", keys={100: "k"}, steps=350, seed=SEED)
     assert not drive.endings
     assert drive["height"][250:].mean() < 0.8 * drive["height"][50:100].mean()
     assert drive["forward"][250:].mean() > 0.3
