@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -135,8 +137,17 @@ def test_cassie_walks_on_tiptoe_and_on_its_soles_again() -> None:
     assert drive["height"][-50:].mean() < 1.02 * before
 
 
-def test_cassie_walks_on_half_crouched() -> None:
+def test_cassie_walks_on_crouched() -> None:
     drive = pdtui.drive("cassie", keys={100: "k"}, steps=350, seed=SEED)
     assert not drive.endings
-    assert drive["height"][250:].mean() < 0.8 * drive["height"][50:100].mean()
-    assert drive["forward"][250:].mean() > 0.3
+    assert drive["height"][250:].mean() < 0.62 * drive["height"][50:100].mean()
+    assert drive["forward"][250:].mean() > 0.5
+
+
+def test_cassie_flips_backward_and_walks_on() -> None:
+    drive = pdtui.drive("cassie", keys={120: "b"}, steps=420, seed=SEED)
+    assert not drive.endings
+    pitch, feet = np.unwrap(drive["pelvis pitch"]), (drive["left foot height"], drive["right foot height"])
+    assert pitch[120] - pitch.min() > math.radians(330)
+    assert np.minimum(*feet).max() > 0.8  # over its head
+    assert drive["forward"][-100:].mean() > 0.9

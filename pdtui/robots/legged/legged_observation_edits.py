@@ -75,8 +75,20 @@ def legged_observation_edits(
         TRUNK_EDITS[0] if description.scan is None else _scanned_height_edit(description, description.scan)
     )
     commands = _OBSERVED_COMMANDS[: description.observed_commands]
-    further = (replace(one, dissected=False) for one in (*BALANCE_EDITS, *_joint_edits(description, joints)))
-    return (height, *TRUNK_EDITS[1:], *command_edits(commands), *further)
+    further = [*BALANCE_EDITS, *_command_offset_edits(commands), *_joint_edits(description, joints)]
+    if description.scan is not None:
+        further.append(_ground_edit(description, description.scan))
+    helping = (replace(one, dissected=False) for one in further)
+    return (height, *TRUNK_EDITS[1:], *command_edits(commands), *helping)
+
+
+def _command_offset_edits(commands: Iterable[str]) -> Iterable[ObservationEdit]:
+    for index, (name, scale) in enumerate(zip(commands, COMMAND_SCALES.tolist(), strict=False)):
+        unit = "rad/s" if name == "yaw rate" else "m/s"
+        says = f"its {name} command is larger by this much"
+        yield offset_observed_number(
+            _FIRST_COMMAND + index, f"{name} command offset", unit, says, float(scale)
+        )
 
 
 def _joint_edits(description: LeggedRobotDescription, joints: Sequence[str]) -> Iterable[ObservationEdit]:
@@ -88,16 +100,21 @@ def _joint_edits(description: LeggedRobotDescription, joints: Sequence[str]) -> 
 
 def _scanned_height_edit(description: LeggedRobotDescription, scan: HeightScan) -> ObservationEdit:
     """Return the edit "height offset" where the distance to points of the ground is observed as well."""
+    lower_ground, plain = _ground_edit(description, scan), TRUNK_EDITS[0]
+    return replace(
+        plain, apply=lambda observation, offset: lower_ground.apply(plain.apply(observation, offset), offset)
+    )
+
+
+def _ground_edit(description: LeggedRobotDescription, scan: HeightScan) -> ObservationEdit:
     first, largest = description.observations - scan.count**2, scan.scale * MAX_SCANNED
 
-    def lift(observation: Floats, offset: float) -> Floats:
+    def lower(observation: Floats, offset: float) -> Floats:
         edited = observation.copy()
-        edited[0] += offset
         edited[first:] = np.clip(edited[first:] + scan.scale * offset, -largest, largest)
         return edited
 
-    plain = TRUNK_EDITS[0]
-    return replace(plain, apply=lift)
+    return ObservationEdit("ground offset", "m", "the scanned ground is lower by this much", lower)
 
 
 def command_edits(commands: Iterable[str]) -> tuple[ObservationEdit, ...]:

@@ -9,14 +9,17 @@ from torch import nn
 import pdtui
 from pdtui.core.errors import PolicyError
 from pdtui.core.units import Stimulation
-from pdtui.dissection.steering.output_directions import find_output_direction
+from pdtui.dissection.steering.output_directions import find_output_coordinates, find_output_direction
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
-from pdtui.stimulation.interventions.unit_edits import AddToUnits
+from pdtui.stimulation.interventions.unit_edits import AddToUnits, SetCoordinates
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map
 
 ACTIONS = 12
+CROUCH = dict(
+    enumerate([0.002, 0.049, 0.053, -0.05, 0.239, -0.043, 0.033, -0.17, 0.051, -0.365, 0.325, -0.194])
+)
 
 
 def test_a_direction_moves_the_outputs_that_it_is_for_and_no_other() -> None:
@@ -37,12 +40,24 @@ def test_a_direction_moves_the_outputs_that_it_is_for_and_no_other() -> None:
     np.testing.assert_allclose((after - before)[near], expected[near], atol=1e-3)
 
 
-@pytest.mark.parametrize(("name", "changes"), [("left knee", {3: 1.0}), ("right leg", {9: -0.4, 10: 0.25})])
+@pytest.mark.parametrize(("name", "changes"), [("left knee", {3: 1.0}), ("crouch", CROUCH)])
 def test_the_shipped_directions_are_those_of_the_outputs_that_they_name(
     name: str, changes: dict[int, float]
 ) -> None:
     direction = find_output_direction(pdtui.load_policy("cassie"), changes, ACTIONS)
     np.testing.assert_allclose(load_map(find_map("cassie")).vectors[name].rows[0], direction, atol=1e-5)
+
+
+def test_coordinates_set_what_the_network_puts_out() -> None:
+    policy, robot = pdtui.load_policy("cassie"), make_robot("cassie")
+    observation, _ = robot.reset(seed=1600)
+    wanted = np.linspace(-1.5, 1.5, ACTIONS)
+    vectors, coordinates = find_output_coordinates(policy, wanted.tolist())
+    np.testing.assert_allclose(load_map(find_map("cassie")).vectors["outputs"].rows, vectors, atol=1e-5)
+    units = np.arange(policy.units - policy.layers[-1], policy.units)
+    edit = SetCoordinates(units, vectors.astype(np.float32), coordinates)
+    posed = policy.act(observation, Stimulation(edits=(edit,))).action
+    np.testing.assert_allclose(posed, 3.0 * np.tanh(wanted), atol=1e-3)
 
 
 def test_an_output_that_is_not_there_is_refused() -> None:
