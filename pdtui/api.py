@@ -129,7 +129,7 @@ def dissect(config: DissectionConfig) -> Dissection:
     >>> from torch import nn
     >>> network = nn.Sequential(nn.Linear(27, 4), nn.Tanh(), nn.Linear(4, 8))
     >>> _ = nn.init.constant_(network[2].weight, 0.01)
-    >>> quick = dataclasses.replace(pdtui.QUICK_DISSECTION, controls=4, held_steps=40, mover_steps=20)
+    >>> quick = dataclasses.replace(pdtui.QUICK_DISSECTION.shortened_to(40), controls=4, mover_steps=10)
     >>> found = pdtui.dissect("ant", network, episodes=1, settings=quick, budget_minutes=0.0)
     >>> found.screen.effects.shape[0], found.matching.discrepancy.shape[1]  # a row, a column for each unit
     (4, 4)

@@ -18,29 +18,29 @@ SMALL = DissectionSettings(
     steps=130,
     screen_values=(-3.0, 3.0),
     screen_starts=2,
-    screen_steps=16,
+    screen_steps=12,
     refine_keep=1,
     refine_values=(-3.0, 0.0, 3.0),
     refine_starts=2,
-    refine_steps=16,
+    refine_steps=12,
     judge_keep=1,
     judge_starts=3,
     controls=6,
     held_steps=20,
-    mover_steps=30,
+    mover_steps=12,
     steering=SteeringSettings(
         starts=2, sources=2, values=(3.0,), lengths=(1.0,), readings=(2.0,), factors=(2.0,)
     ),
     search_starts=2,
     selection_starts=2,
     held_out_starts=2,
-    walk_steps=20,
+    walk_steps=12,
     imprints=ImprintSettings(episodes=2, steps=10, bins=2, units=(3,), factors=(1.0,)),
     behavior_search=BehaviorSearchSettings(
         random_sets=4, single_units=4, elite=3, children=3, promoted=2, max_units=(3,), generations=1,
-        quick_starts=1, quick_steps=12, full_starts=2, full_steps=16, finalists=2, final_steps=18,
+        quick_starts=1, quick_steps=8, full_starts=2, full_steps=10, finalists=2, final_steps=12,
     ),
-    controller_search=ControllerSearchSettings(units=1, finalists=2, steps=12, final_steps=18),
+    controller_search=ControllerSearchSettings(units=1, finalists=2, steps=8, final_steps=12),
 )  # fmt: skip
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import doctest
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from pdtui.policies.runtime.policy import Policy
 from pdtui.robots.robot import Robot
 from pdtui.stimulation.map_reader import parse_map
 from pdtui.stimulation.stimulation_map import StimulationMap
+from tests.small_dissection import SMALL
 from tests.small_worlds import Dot, Pole, initial_state, trained_conv, trained_lstm
 
 _MAP = """\
@@ -95,8 +95,7 @@ def test_a_recorded_drive_of_a_live_network_replays_bit_for_bit_with_a_rewind(
 def test_a_live_network_is_dissected(world: object) -> None:
     assert callable(world)
     robot, policy, _ = world()
-    settings = replace(pdtui.QUICK_DISSECTION, controls=8, judge_starts=3, held_steps=60, mover_steps=30)
-    found = pdtui.dissect(robot, policy, episodes=2, settings=settings)
+    found = pdtui.dissect(robot, policy, episodes=2, settings=SMALL)
     assert found.screen.effects.shape[:2] == (policy.units, 2)
     assert np.abs(np.nan_to_num(found.screen.effects)).max() > 0
     assert repr(found).startswith(f"<Dissection of {policy.name} on {robot.name}: {policy.units} units")

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import pdtui
+from pdtui.driving.drive_config import DriveConfig
+from pdtui.evaluation.key_release.key_release_evaluation import evaluate_key_releases
+from pdtui.stimulation.map_library import find_map
+from pdtui.stimulation.map_reader import load_map
 
 SEED = 1800
 
@@ -151,3 +156,19 @@ def test_cassie_flips_backward_and_walks_on() -> None:
     assert pitch[120] - pitch.min() > math.radians(330)
     assert np.minimum(*feet).max() > 0.8  # over its head
     assert drive["forward"][-100:].mean() > 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", [1500, 100])
+def test_whole_turns_make_no_ant_fall_that_observes_the_canonical_quaternion(first: int) -> None:
+    """Let go of its spins at once, after 25 s; the shipped maps fade instead, since the usual Ant falls."""
+    shipped = load_map(find_map("ant-imprints"))
+    spins = {name: replace(shipped.behaviors[name], fade=0.0) for name in ("spin left", "spin right")}
+    falls = {}
+    for canonical in (False, True):
+        changed = replace(shipped, behaviors=spins, robot_options={"canonical_quaternion": canonical})
+        found = evaluate_key_releases(DriveConfig("ant", changed, 0), range(first, first + 20)).behaviors
+        print(f"canonical: {canonical}", *found, sep="\n")
+        falls[canonical] = sum(one.failed for one in found)
+    assert falls[False] >= 5
+    assert falls[True] <= falls[False] / 2

@@ -30,6 +30,7 @@ from pdtui.cli.options.shared_options import (
     force_option,
     import_option_flags,
     integer_option,
+    journal_option,
     json_option,
     map_option,
     map_policy_option,
@@ -115,6 +116,7 @@ from pdtui.policies.weights.import_options import ImportOptions
     help="Draw the result of the experiment as .png, .pdf, .svg or .rrd; may be repeated.",
 )
 @overwrite_option
+@journal_option("run", " Of the experiments, only driving takes one.")
 @workers_option
 @json_option
 def evaluate_command(
@@ -141,11 +143,13 @@ def evaluate_command(
     experiment: str | None,
     pictures: tuple[Path, ...],
     overwrite: bool,
+    journal: Path | None,
     workers: Workers,
     as_json: bool,
     **own_options: Any,
 ) -> None:
     """Measure what each behavior of ROBOT, a robot's name or a map file, does beside the policy alone."""
+    own_options |= {"journal": journal} if experiment else {}
     own_options = {name: value for name, value in own_options.items() if value not in (None, ())}
     _check_modes(
         {
@@ -163,7 +167,8 @@ def evaluate_command(
             "--strip": strip,
             "--watch": watch,
         }
-        | ({} if let_go else {"--hold": hold}),
+        | ({} if let_go else {"--hold": hold})
+        | ({} if let_go or experiment else {"--journal": journal}),
     )
     _check_cluster(
         workers, {"--policy-only": policy_only, "--gait": gait, "--record": own_options.get("record")}
@@ -217,7 +222,7 @@ def evaluate_command(
     elif without_map:
         print_policy_alone(config, seeds, as_json, gait=gait)
     elif let_go:
-        print_key_releases(config, seeds, hold, workers, as_json)
+        print_key_releases(config, seeds, hold, workers, journal, as_json)
     else:
         from pdtui.evaluation.evaluation_plan import keep_behaviors
         from pdtui.evaluation.protocol_settings import QUICK_SEEDS, choose_protocol
@@ -225,7 +230,17 @@ def evaluate_command(
         settings = choose_protocol(quick=quick, hold=hold, controls=not without_controls)
         config, drawn = keep_behaviors(config, behaviors), (strip, overwrite) if strip else None
         seeds = seeds[:QUICK_SEEDS] if quick else seeds
-        print_behaviors(config, seeds, settings, workers, drawn, watch=watch, update=update, as_json=as_json)
+        print_behaviors(
+            config,
+            seeds,
+            settings,
+            workers,
+            drawn,
+            journal=journal,
+            watch=watch,
+            update=update,
+            as_json=as_json,
+        )
 
 
 def _check_cluster(workers: Workers, on_one_machine: Mapping[str, Any]) -> None:

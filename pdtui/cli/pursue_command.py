@@ -14,6 +14,7 @@ from pdtui.cli.options.shared_options import (
     FILE_PATH,
     import_option_flags,
     integer_option,
+    journal_option,
     json_option,
     minutes_option,
     own_policy_option,
@@ -47,6 +48,7 @@ from pdtui.core.settings.settings_file import own_folder
     metavar="FILE.toml",
     help="Map to write the behavior into, new or of the same policy; default: maps/ROBOT-dissected.toml.",
 )
+@journal_option("roll-out")
 @workers_option
 @json_option
 def pursue_command(

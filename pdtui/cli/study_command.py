@@ -63,7 +63,7 @@ def study_matching_command(
     overwrite: bool,
     as_json: bool,
 ) -> None:
-    """Test whether the unit that matches an attribute steers it.
+    """Test whether the unit that matches an attribute steers it, and score how policies walk and are steered.
 
     A plan says which policies are wanted, and how they are measured and judged. A study that was interrupted
     goes on when the same command is run again.
@@ -98,7 +98,7 @@ def study_matching_command(
     if guide is not None:
         written += write_study_page(measured, result, guide)
     summary = StudySummary(measured, result)
-    print_result(summary.as_dict(), as_json, summary.table)
+    print_result(summary.as_dict(), as_json, summary.tables)
     if not as_json:
         click.echo(summary.answer)
         if written:

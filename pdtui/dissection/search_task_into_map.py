@@ -23,6 +23,7 @@ from pdtui.search.evolutionary_search import SharedTimeBudget
 from pdtui.search.task_rollout import StimulationWithDuration
 from pdtui.search.task_search import TaskSearch, TaskSearchResult
 from pdtui.search.task_search_settings import TaskSearchSettings
+from pdtui.search.verdict_journal import open_verdict_journal
 from pdtui.stimulation.interventions.intervention import Onset
 from pdtui.stimulation.key_allocator import KeyAllocator
 from pdtui.stimulation.map_policy_lookup import relative_policy_name
@@ -93,13 +94,15 @@ def search_task_into_map(
     workers: Workers,
     minutes: float,
     settings: TaskSearchSettings,
+    journal: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> WrittenBehavior:
     """Search for a stimulation that does a task, and write it into a new map or one of the same policy.
 
     The robot has the map's options, if there is a map.
     If the map has a behavior for the task, the search also begins from it, and it is replaced.
-    After `minutes` it ends with the best found so far.
+    After `minutes` it ends with the best found so far. The `journal` is a file that keeps every roll-out, so
+    that the same call goes on where an interrupted one stopped; None keeps nothing.
 
     Raises:
         MapError: There is no such task, or the map is of another policy or other options of the robot, or
@@ -115,7 +118,8 @@ def search_task_into_map(
         if known is not None:
             known.check(robot.name, layers, pool.policy.sha256)
         begin = [] if known is None else _known_plans(known, task, pool)
-        search = TaskSearch(pool, goal, seed, settings, begin)
+        kept = None if journal is None else open_verdict_journal(journal, pool.robot, pool.policy)
+        search = TaskSearch(pool, goal, seed, settings, begin, journal=kept)
         result = search.run(SharedTimeBudget(minutes).share(), progress)
         named, named_options = relative_policy_name(policy, import_options, output)
         new_map = StimulationMap(

@@ -55,14 +55,14 @@ class DriveRecording:
         return "" if self._recorder is None else str(self._recorder.path)
 
     @property
-    def created(self) -> bool:
+    def on_disk(self) -> bool:
         """Whether there is a file: not before the first control step."""
-        return self._recorder is not None and self._recorder.created
+        return self._recorder is not None and self._recorder.on_disk
 
     @property
-    def began(self) -> str:
-        """Date and time at which the recording began, ISO 8601; empty without one."""
-        return "" if self._recorder is None else self._recorder.began
+    def created(self) -> str:
+        """Date and time at which the drive began, ISO 8601; empty without one."""
+        return "" if self._recorder is None else self._recorder.created
 
     @property
     def bytes(self) -> int:
@@ -83,7 +83,7 @@ class DriveRecording:
                 recorder.close(self.failure)
         if recorder.notice:
             self.notice, recorder.notice = recorder.notice, ""
-        if recorder.created and self.path != self._place:
+        if recorder.on_disk and self.path != self._place:
             self._place = self.path
             return True
         return False

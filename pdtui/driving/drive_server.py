@@ -82,7 +82,7 @@ class DriveServer:
             replace(
                 describe_loop(self._loop),
                 recording=self._recording.path,
-                recorded=self._recording.created,
+                recorded=self._recording.on_disk,
                 length=self._timeline.length,
                 known_keys=keys,
                 known_ends=ends,
@@ -115,7 +115,7 @@ class DriveServer:
     def outcome(self) -> str:
         """Return one line on how the drive ended."""
         line = f"{self._finished or self._closing}: {self._loop.step} steps"
-        place = self._recording.path if self._recording.created else ""
+        place = self._recording.path if self._recording.on_disk else ""
         return f"{line}, recorded in {place}" if place and place not in line else line
 
     def _seconds_until_due(self) -> float | None:

@@ -68,8 +68,8 @@ class SnapshotBuilder:
 
     def add_step(self, record: StepRecord) -> None:
         """Add a control step."""
-        began = record.episode != self._episode or any(event.jumps for event in record.events)
-        if began:
+        is_new_run = record.episode != self._episode or any(event.jumps for event in record.events)
+        if is_new_run:
             self._restarted, self._path = True, []
             self._episode = record.episode
         row = self._rows[record.behaviors[-1].name] if record.behaviors else -1

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from pdtui.core.cluster.ray_cluster import Workers
 from pdtui.core.outcome import count_failures
@@ -32,6 +33,7 @@ from pdtui.evaluation.held_run import (
     measure_intervention,
     run_held_behavior,
 )
+from pdtui.evaluation.journal.run_journal import RunJournal
 from pdtui.evaluation.paired_statistics import holm_correction
 from pdtui.evaluation.protocol_settings import ProtocolSettings
 from pdtui.evaluation.tasks.task_runs import (
@@ -110,7 +112,12 @@ def count_control_steps(plan: EvaluationPlan) -> int:
 
 
 def evaluate_behaviors(
-    config: DriveConfig, plan: EvaluationPlan, *, workers: Workers = 1, progress: StepProgress | None = None
+    config: DriveConfig,
+    plan: EvaluationPlan,
+    *,
+    workers: Workers = 1,
+    journal: Path | None = None,
+    progress: StepProgress | None = None,
 ) -> MapEvaluation:
     """Run an evaluation; `progress` is called with the number of runs done and the total.
 
@@ -118,8 +125,13 @@ def evaluate_behaviors(
         config: What the plan was made for; worker processes build it again.
         plan: The runs.
         workers: Number of worker processes, or a cluster.
+        journal: File that keeps the result of every run, and from which finished runs are taken.
         progress: Called with the number of runs done and of all runs.
+
+    Raises:
+        PdtuiError: The journal cannot be read or written, or is of something else.
     """
+    kept = RunJournal(journal, plan.loop)
     measuring, in_tasks = plan.measuring_runs(), task_measuring_runs(plan)
     held, tasks = plan.held_runs(), list_task_runs(plan)
     trials = [*measuring, *in_tasks]
@@ -131,16 +143,17 @@ def evaluate_behaviors(
 
     sent = send_drive_files(workers, config)
     with WorkerPool(f"evaluation of {config.robot}", workers, plan.loop, build_control_loop, sent) as pool:
-        found = pool.map(measure_intervention, trials, advance)
+        found = pool.map(measure_intervention, trials, advance, kept.of(measure_intervention))
         measured = _by_behavior(measuring, found[: len(measuring)])
         measured_in_tasks = measured | _by_behavior(in_tasks, found[len(measuring) :])
         done += len(trials)
         runs = {key: run for key in held if (run := plan.held_plan(key, measured)) is not None}
-        traces = dict(zip(runs, pool.map(run_held_behavior, list(runs.values()), advance), strict=True))
+        found_traces = pool.map(run_held_behavior, list(runs.values()), advance, kept.of(run_held_behavior))
+        traces = dict(zip(runs, found_traces, strict=True))
         done += len(held)
         planned = [plan_task_episode(plan, run, measured_in_tasks) for run in tasks]
         episodes = [one for one in planned if one is not None]
-        judged = pool.map(run_task_episode, episodes, advance)
+        judged = pool.map(run_task_episode, episodes, advance, kept.of(run_task_episode))
         verdicts = {one.run: verdict for one, verdict in zip(episodes, judged, strict=True)}
     return _summarize(plan, traces, summarize_tasks(plan, verdicts))
 

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from pdtui.core.closable import Closable
 from pdtui.core.cluster.ray_cluster import RayCluster, Workers
+from pdtui.core.processes.result_journal import JobJournal
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_compatibility import check_policy_fit
@@ -175,15 +176,17 @@ class RolloutPool(Closable):
         function: Callable[[Robot, Policy, WorkItem], WorkResult],
         items: Sequence[WorkItem],
         progress: StepProgress | None = None,
+        journal: JobJournal[WorkItem, WorkResult] | None = None,
     ) -> list[WorkResult]:
         """Call a function with robot, policy and each item, and return the results in order.
 
-        The function has to be a module's, so that worker processes can import it.
+        The function has to be a module's, so that worker processes can import it. Items whose results the
+        journal holds are left out.
 
         Raises:
             WorkerError: a worker process died.
         """
-        return self._pool.map(partial(_apply, function), items, progress)
+        return self._pool.map(partial(_apply, function), items, progress, journal)
 
     @cached_property
     def offers_lockstep(self) -> bool:

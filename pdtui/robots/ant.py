@@ -14,7 +14,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.outcome import Outcome, fall_info
 from pdtui.core.robot_links_and_state import Foot
 from pdtui.robots.geometry import roll_pitch_yaw
-from pdtui.robots.observation_edits.heading_edit import quaternion_heading_edits
+from pdtui.robots.observation_edits.heading_edit import make_canonical, quaternion_heading_edits
 from pdtui.robots.observation_edits.observation_edit import offset_observed_number
 from pdtui.robots.robot import RewardlessStepResult
 from pdtui.robots.simulators.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
@@ -27,6 +27,7 @@ from pdtui.robots.simulators.mujoco_robot import (
 from pdtui.robots.training_recipe import TrainingRecipe
 
 _LEGS = {"1": "front left", "2": "back left", "3": "back right", "4": "front right"}
+_QUATERNION = 1  # its place in the observation
 
 
 class Ant(MujocoRobot, AntEnv):
@@ -42,6 +43,8 @@ class Ant(MujocoRobot, AntEnv):
     Args:
         forward: What is rewarded as moving forward: ``"either"`` is ``max(|vx|, |vy|)``, as in the paper;
             ``"x"`` is vx, as in Gymnasium's Ant. The physics is the same.
+        canonical_quaternion: Observe the negative of the torso's quaternion wherever its w is negative, so
+            that whole turns make no difference; otherwise the Ant observes the negative after one whole turn.
     """
 
     name = "ant"
@@ -52,14 +55,17 @@ class Ant(MujocoRobot, AntEnv):
         Foot("back left", "right_ankle_geom", "rear left"),
         Foot("back right", "third_ankle_geom", "rear right"),
     )
-    observation_edits = (
-        *quaternion_heading_edits(quaternion=1, velocity=13),
-        offset_observed_number(0, "height offset", "m", "the torso is higher by this much"),
-    )
     training_recipe = TrainingRecipe(options={"forward": "x"})
 
-    def __init__(self, forward: Literal["either", "x"] = "either") -> None:
+    def __init__(
+        self, forward: Literal["either", "x"] = "either", canonical_quaternion: bool = False
+    ) -> None:
         super().__init__(include_cfrc_ext_in_observation=False)
+        self._canonical = canonical_quaternion
+        self.observation_edits = (
+            *quaternion_heading_edits(_QUATERNION, velocity=13, canonical=canonical_quaternion),
+            offset_observed_number(0, "height offset", "m", "the torso is higher by this much"),
+        )
         self._forward, self.torso_heights = forward, self._healthy_z_range
         self.links = read_model_links(self.model)
         gears = read_motor_gears(self.model)
@@ -68,7 +74,10 @@ class Ant(MujocoRobot, AntEnv):
         self.attributes = (*TRUNK_ATTRIBUTES, *torque_attributes(names, gears.values()))
 
     def observe(self) -> Floats:
-        return np.asarray(self._get_obs())
+        observation = np.asarray(self._get_obs())
+        if self._canonical:
+            make_canonical(observation, _QUATERNION)
+        return observation
 
     def step(self, action: NDArray[np.float32]) -> tuple[Floats, Any, bool, bool, dict[str, Any]]:
         before = self.data.qpos[:2].copy()

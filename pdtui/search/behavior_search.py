@@ -150,7 +150,7 @@ class BehaviorSearch:
             deadline: asked between the generations of the search.
             progress: called with (generations done, generations).
         """
-        began, settings, starts = self.prober.pool.rollouts, self.settings, self.starts
+        rollouts_before, settings, starts = self.prober.pool.rollouts, self.settings, self.starts
         quick, full = starts.search[: settings.quick_starts], starts.search[: settings.full_starts]
         # A stop has a best possible score, since nothing stops more than entirely.
         limit = 1.0 / self.goal.enough if self.goal.aim.direction == "stop" else inf
@@ -166,7 +166,7 @@ class BehaviorSearch:
         search = EvolutionarySearch(problem, settings)
         search_score, stimulation = search.run(deadline, progress)
         rival = search.choose_among(self._draw_rivals(len(stimulation.units), search.tried))
-        return self._measure(stimulation, rival, search_score, began)
+        return self._measure(stimulation, rival, search_score, rollouts_before)
 
     def _draw_rivals(self, units: int, count: int) -> list[Stimulation]:
         """Return random sets of so many units of the policy, with outputs as large as a search can reach."""
@@ -213,7 +213,7 @@ class BehaviorSearch:
         return weights + (weights.mean() or 1.0)
 
     def _measure(
-        self, best: Stimulation, rival: Stimulation, search_score: float, began: int
+        self, best: Stimulation, rival: Stimulation, search_score: float, rollouts_before: int
     ) -> BehaviorSearchResult:
         column = self.column
         held = self._probe([best, rival], self.starts.held_out, self.settings.final_steps)
@@ -237,7 +237,7 @@ class BehaviorSearch:
             falls=float(held.falls[0].mean()),
             value=float(np.nanmean(held.means[0, :, column])),
             unperturbed=float(held.unperturbed[:, column].mean()),
-            rollouts=self.prober.pool.rollouts - began,
+            rollouts=self.prober.pool.rollouts - rollouts_before,
             rival=rival,
             rival_gain=float(rival_gain.mean()),
             rival_p=float(sign_flip_p_values(gain - rival_gain)),

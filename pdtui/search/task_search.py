@@ -21,6 +21,7 @@ from pdtui.search.onsets.onset_search import search_onset
 from pdtui.search.stimulation_sampler import CROSSED, StimulationSampler
 from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
 from pdtui.search.task_search_settings import TaskSearchSettings
+from pdtui.search.verdict_journal import TaskJob, VerdictJournal
 from pdtui.stimulation.seed_ranges import JUDGING_SEEDS, require_search_seeds
 
 _SEEDS_APART = 1000
@@ -78,6 +79,7 @@ class TaskSearch:
         settings: how much to do.
         known: plans to begin with besides the best single units.
         units: flat indices of the units that are tried alone; None for those that the settings say.
+        journal: keeps every verdict; what it holds is not run again. None for none.
 
     Raises:
         SeedError: a seed is reserved for judging.
@@ -91,9 +93,10 @@ class TaskSearch:
         settings: TaskSearchSettings,
         known: Sequence[StimulationWithDuration] = (),
         units: Sequence[int] | None = None,
+        journal: VerdictJournal | None = None,
     ) -> None:
         self._pool, self._task, self._seed, self._settings, self._known = pool, task, seed, settings, known
-        self._units = units
+        self._units, self._journal = units, journal
         self._rng, self._rollouts = np.random.default_rng(seed), 0
         require_search_seeds([seed], f"the search for '{task.name}'")
 
@@ -229,7 +232,7 @@ class TaskSearch:
         size = max(1, min(32, len(plans) // 2 + 1))
         parts = [tuple(plans[low : low + size]) for low in range(0, len(plans), size)]
         jobs = [(self._task.name, part, seed, one_by_one) for part in parts for seed in seeds]
-        results = iter(self._pool.map(judge_task_plans, jobs, progress))
+        results = iter(self._pool.map(judge_task_plans, jobs, progress, self._journal))
         rows: list[list[TaskVerdict]] = []
         for part in parts:
             columns = [next(results) for _ in seeds]
@@ -237,9 +240,7 @@ class TaskSearch:
         return rows
 
 
-def judge_task_plans(
-    robot: Robot, policy: Policy, job: tuple[str, tuple[StimulationWithDuration, ...], int, bool]
-) -> list[TaskVerdict]:
+def judge_task_plans(robot: Robot, policy: Policy, job: TaskJob) -> list[TaskVerdict]:
     """Judge plans in a worker process; tasks hold functions, so they travel by name."""
     name, plans, seed, one_by_one = job
     return judge_stimulations(robot, policy, robot.find_task(name), plans, seed, one_by_one)

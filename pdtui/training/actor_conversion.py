@@ -1,17 +1,16 @@
-"""A trained actor as a function of NumPy and as a network that the policy runtime loads, and back."""
+"""A trained actor as a function of NumPy and as a network that the policy runtime loads."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from pdtui.policies.runtime.jax_multilayer_perceptron import ARRAY_ACTIVATIONS, MlpParameters, apply_mlp
 from pdtui.policies.weights.policy_network import NetworkSpec, PolicyNetwork
-from pdtui.training.multilayer_perceptron import ACTIVATIONS, MlpParameters, apply_mlp
 
 Actor = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
@@ -20,7 +19,7 @@ def make_numpy_actor(
     params: MlpParameters, rng: np.random.Generator | None, activation: str = "tanh"
 ) -> Actor:
     """Return a squashed Gaussian actor in NumPy: its mean actions, or samples where a generator is given."""
-    params, activate = jax.tree.map(np.asarray, params), ACTIVATIONS[activation][1]
+    params, activate = jax.tree.map(np.asarray, params), ARRAY_ACTIVATIONS[activation][1]
 
     def act(observation: NDArray[np.float32]) -> NDArray[np.float32]:
         mean, log_std = np.split(apply_mlp(params, observation, activate), 2, axis=-1)
@@ -43,11 +42,3 @@ def actor_to_network(params: MlpParameters, spec: NetworkSpec) -> PolicyNetwork:
         tensors[f"{name}.bias"] = torch.from_numpy(np.array(layer["b"]).copy())
     network.load_tensors(tensors)
     return network
-
-
-def network_to_actor(network: PolicyNetwork) -> MlpParameters:
-    """Return the network's layers on raw observations, in the form of `PpoLearner.folded_actor`."""
-    return [
-        {"w": jnp.asarray(layer.weight.detach().numpy().T), "b": jnp.asarray(layer.bias.detach().numpy())}
-        for layer in (*network.hidden, network.head)
-    ]

@@ -11,9 +11,13 @@ import numpy as np
 import optax
 from numpy.typing import NDArray
 
+from pdtui.policies.runtime.jax_multilayer_perceptron import (
+    MlpParameters,
+    apply_mlp,
+    network_to_mlp_parameters,
+)
 from pdtui.policies.weights.policy_network import PolicyNetwork
-from pdtui.training.actor_conversion import Actor, make_numpy_actor, network_to_actor
-from pdtui.training.multilayer_perceptron import MlpParameters, apply_mlp
+from pdtui.training.actor_conversion import Actor, make_numpy_actor
 from pdtui.training.ppo_learner import PpoLearner, PpoState, normalize_observations
 
 _EPOCHS, _BATCH, _LEARNING_RATE = 60, 256, 1e-3
@@ -59,7 +63,7 @@ def imitate(
 
 def make_demonstrator(network: PolicyNetwork) -> Actor:
     """Return what a policy does, given what a run observes: it observes the first columns of that."""
-    actor = network_to_actor(network)
+    actor = network_to_mlp_parameters(network)
     act, inputs = make_numpy_actor(actor, None, network.spec.activation), actor[0]["w"].shape[0]
     return lambda seen: act(seen[:, :inputs])
 

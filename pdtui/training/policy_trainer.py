@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from pdtui.core.cluster.ray_cluster import RayCluster
 from pdtui.core.errors import SimulationDiverged
 from pdtui.core.outcome import Outcome, is_failure
+from pdtui.policies.runtime.jax_multilayer_perceptron import MlpParameters
 from pdtui.policies.weights.policy_network import NetworkSpec
 from pdtui.policies.weights.weights_file import CHECKPOINT_FOLDER, save_network
 from pdtui.robots import make_robot
 from pdtui.robots.robot import Robot
 from pdtui.training.actor_conversion import Actor, actor_to_network, make_numpy_actor
-from pdtui.training.multilayer_perceptron import MlpParameters
 from pdtui.training.robot_batch import RobotBatch
 from pdtui.training.training_checkpoint import load_checkpoint, save_checkpoint
 from pdtui.training.training_config import TrainingConfig

@@ -15,7 +15,12 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from pdtui.training.multilayer_perceptron import ACTIVATIONS, MlpParameters, apply_mlp, init_mlp_parameters
+from pdtui.policies.runtime.jax_multilayer_perceptron import (
+    ARRAY_ACTIVATIONS,
+    MlpParameters,
+    apply_mlp,
+    init_mlp_parameters,
+)
 from pdtui.training.training_config import PpoConfig
 
 _EPSILON = 1e-8
@@ -82,7 +87,7 @@ class PpoLearner:
 
     def __init__(self, config: PpoConfig, observations: int, actions: int) -> None:
         self.config, self.observations, self.actions = config, observations, actions
-        self.activate, self._activate_in_numpy = ACTIVATIONS[config.activation]
+        self.activate, self._activate_in_numpy = ARRAY_ACTIVATIONS[config.activation]
         self._tx = optax.chain(optax.clip_by_global_norm(1.0), optax.scale_by_adam())
         self.update = jax.jit(self._update)
 

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from pdtui.core.errors import TrainingError
+from pdtui.policies.runtime.jax_multilayer_perceptron import MlpParameters, network_to_mlp_parameters
 from pdtui.policies.weights.policy_file_lookup import find_weights_file
 from pdtui.policies.weights.policy_network import PolicyNetwork
 from pdtui.policies.weights.weights_file import load_network
-from pdtui.training.actor_conversion import Actor, make_numpy_actor, network_to_actor
-from pdtui.training.multilayer_perceptron import MlpParameters
+from pdtui.training.actor_conversion import Actor, make_numpy_actor
 from pdtui.training.policy_imitation import fit_actor, imitate, make_demonstrator
 from pdtui.training.policy_trainer import PolicyTrainer
 from pdtui.training.ppo_learner import PpoLearner, PpoRollout, PpoState
@@ -89,7 +89,7 @@ class PpoTrainer(PolicyTrainer[PpoConfig]):
         for _ in range(_WARM_START_STEPS):
             seen.append(self._observations())
             self._step(act(seen[-1]))
-        actor = network_to_actor(network)
+        actor = network_to_mlp_parameters(network)
         self.state = warm_start_policy(self.learner, self.state, actor, np.concatenate(seen))
 
     def _imitate(self, demonstrate: Actor) -> None:

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from pdtui.training.multilayer_perceptron import MlpParameters, apply_mlp, init_mlp_parameters
+from pdtui.policies.runtime.jax_multilayer_perceptron import MlpParameters, apply_mlp, init_mlp_parameters
 from pdtui.training.robot_batch import TransitionBatch
 from pdtui.training.training_config import SacConfig
 

@@ -9,10 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.policies.runtime.jax_multilayer_perceptron import MlpParameters
 from pdtui.policies.weights.policy_file_lookup import find_weights_file
 from pdtui.policies.weights.weights_file import load_network
 from pdtui.training.actor_conversion import Actor, make_numpy_actor
-from pdtui.training.multilayer_perceptron import MlpParameters
 from pdtui.training.policy_imitation import fit_gaussian_actor, imitate, make_demonstrator
 from pdtui.training.policy_trainer import PolicyTrainer
 from pdtui.training.remote.spread_robot_batch import SpreadRobotBatch

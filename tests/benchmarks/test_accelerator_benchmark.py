@@ -9,12 +9,11 @@ from click.testing import CliRunner
 
 from pdtui.cli import main
 
-pytest.importorskip("jax")
-pytest.importorskip("mujoco.mjx")
-
 
 @pytest.mark.slow
 def test_effects_on_the_accelerator_are_those_on_the_cpu() -> None:
+    pytest.importorskip("jax")
+    pytest.importorskip("mujoco.mjx")  # takes seconds to load
     command = ["bench", "accelerator", "--units", "16", "--starts", "2", "--steps", "20", "--json"]
     result = CliRunner(env={"COLUMNS": "120"}).invoke(main, command, catch_exceptions=False)
     assert result.exit_code == 0, result.output

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import signal
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ from pdtui.core.console.text_tables import format_mean_with_interval
 from pdtui.core.errors import MapError, WorkerError
 from pdtui.core.outcome import Outcome
 from pdtui.core.printable_text import to_json
+from pdtui.core.processes.process_start import start_process
 from pdtui.core.units import Stimulation
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.behavior_evaluation import MapEvaluation, evaluate_behaviors, plan_evaluation
@@ -124,6 +128,40 @@ def test_the_tables_show_the_criterion_and_what_is_not_offered(result: MapEvalua
 def test_the_number_of_workers_changes_nothing(config: DriveConfig, result: MapEvaluation) -> None:
     alone = evaluate_behaviors(config, plan_evaluation(config, [100, 101, 102], SMALL), workers=1)
     assert to_json(asdict(alone)) == to_json(asdict(result))
+
+
+def _evaluate_half(config: DriveConfig, journal: Path) -> None:
+    """Evaluate until this process kills itself."""
+
+    def kill(done: int, total: int) -> None:
+        if done > total // 2:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    evaluate_behaviors(
+        config, plan_evaluation(config, [100, 101, 102], SMALL), journal=journal, progress=kill
+    )
+
+
+def test_a_killed_evaluation_goes_on_and_finds_the_same(
+    config: DriveConfig, result: MapEvaluation, tmp_path: Path
+) -> None:
+    journal = tmp_path / "runs.jsonl"
+    process = start_process("evaluation", "pdtui.driving.drive_process", _evaluate_half, config, journal)
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+    kept = journal.read_bytes()
+    plan = plan_evaluation(config, [100, 101, 102], SMALL)
+    runs = len(plan.measuring_runs()) + len(plan.held_runs())
+    assert kept.count(b"\n") == runs // 2 + 1
+    told: list[int] = []
+    again = evaluate_behaviors(config, plan, journal=journal, progress=lambda done, _total: told.append(done))
+    assert to_json(asdict(again)) == to_json(asdict(result))
+    assert journal.read_bytes().startswith(kept)
+    assert journal.read_bytes().count(b"\n") == runs
+    assert told[-1] == runs
+    other = plan_evaluation(config, [103], replace(SMALL, draws=0, condition_seeds=0))
+    evaluate_behaviors(config, other, journal=journal)
+    assert journal.read_bytes().count(b"\n") > runs  # of another seed, nothing was known
 
 
 def test_a_killed_worker_ends_an_evaluation(config: DriveConfig) -> None:

@@ -5,19 +5,16 @@ Two processes load everything once; then they do one thing after the other, each
 
 from __future__ import annotations
 
-import io
 import json
 import subprocess
 import sys
 import time
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
-from pdtui.core.processes.process_start import prepare_processes
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session
+from tests.faults import rival_process
 from tests.faults.fault_bench import ROOT, FaultBench
 from tests.faults.fault_tally import FalseReport, FaultTally, StepsLost
 
@@ -50,7 +47,7 @@ class _Rivals:
         self._bench = bench
         self._children = [
             subprocess.Popen(
-                [sys.executable, "-m", __spec__.name],
+                [sys.executable, "-m", rival_process.__name__],
                 env=bench.environment,
                 cwd=ROOT,
                 text=True,
@@ -153,55 +150,3 @@ def _require_own(ending: _Ending) -> None:
         raise StepsLost(f"{path} is that of the other drive")
     if session.steps != _STEPS:
         raise StepsLost(f"{path} has {session.steps} steps")
-
-
-def _serve() -> None:
-    """Run what comes down the pipe, each at its moment, and answer with how it ended."""
-    # Recorders are forked from a server that has loaded them: those that load meanwhile, some seconds long,
-    # would begin their files one after the other.
-    prepare_processes("pdtui.sessions.writer.session_recorder")
-    for line in sys.stdin:
-        moment, arguments = json.loads(line)
-        output, error = io.StringIO(), io.StringIO()
-        with redirect_stdout(output), redirect_stderr(error):
-            try:
-                code = (
-                    _record_numbered(moment, arguments) if "number" in arguments else _run(moment, arguments)
-                )
-            except SystemExit as ended:
-                code = int(ended.code or 0)
-        print(json.dumps([code, output.getvalue(), error.getvalue()]), flush=True)
-
-
-def _run(moment: float, arguments: list[str]) -> int:
-    from pdtui.cli import main
-
-    _wait_until(moment)
-    main(arguments, prog_name="pdtui")
-    return 0
-
-
-def _record_numbered(moment: float, arguments: list[str]) -> int:
-    from pdtui.driving.drive_config import DriveConfig
-    from pdtui.driving.loop_builder import build_control_loop
-    from pdtui.sessions.writer.session_recorder import SessionRecorder
-    from pdtui.stimulation.map_reader import load_map
-
-    given = dict(pairwise(arguments))
-    loop = build_control_loop(DriveConfig("ant", load_map(Path(given["--map"])), int(given["--seed"])))
-    records = [loop.advance() for _ in range(_STEPS)]
-    _wait_until(max(moment, time.monotonic()))
-    with SessionRecorder(Path(given["--record"]), loop.info, existing="number") as recorder:
-        for record in records:
-            recorder.write(record)
-    print(f"recorded in {recorder.path}")
-    return 0
-
-
-def _wait_until(moment: float) -> None:
-    while time.monotonic() < moment:
-        pass
-
-
-if __name__ == "__main__":
-    _serve()

@@ -178,6 +178,8 @@ def test_the_command_compares_maps_and_draws(map_path: Path, tmp_path: Path, vie
         (["evaluate", "MAP", "--experiment", "forest", "-o", "f.png"], "forest draws no pictures"),
         (["evaluate", "MAP", "MAP", "--experiment", "forest"], "--experiment forest takes one map"),
         (["evaluate", "MAP", "--experiment", "tracking", "--repeats", "2"], "has no option --repeats"),
+        (["evaluate", "MAP", "--experiment", "tracking", "--journal", "f"], "has no option --journal"),
+        (["evaluate", "MAP", "--policy-only", "--journal", "f"], "are mutually exclusive"),
         (["evaluate", "MAP", "--update", "--policy-only"], "are mutually exclusive"),
         (["evaluate", "MAP", "--experiment", "tracking", "-o", "f.gif"], "f.gif: expected a name that ends"),
         (["tune", "MAP"], "expected either a BEHAVIOR or --all"),

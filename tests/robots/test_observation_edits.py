@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pdtui.robots import make_robot
+from pdtui.robots.ant import Ant
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 from pdtui.robots.robot import Robot
 
@@ -164,6 +165,27 @@ def test_a_heading_is_set_in_the_same_way_however_often_the_robot_has_turned() -
     turned = _edit(robot, "heading offset").apply(observation, 2 * np.pi)
     heading = _edit(robot, "heading")
     np.testing.assert_allclose(heading.apply(turned, 0.5), heading.apply(observation, 0.5), atol=1e-9)
+
+
+@pytest.mark.parametrize("turns", [-2.8, -0.9, 0.3, 1.1, 2.6])
+def test_whole_turns_make_no_difference_to_a_canonical_quaternion(turns: float) -> None:
+    usual, observation = _walked("ant")
+    robot: Any = Ant(canonical_quaternion=True)
+    robot.restore(usual.snapshot())
+    offset, heading = _edit(robot, "heading offset"), _edit(robot, "heading")
+    size = 2 * np.pi * turns
+    edited = offset.apply(robot.observe(), size)
+    np.testing.assert_allclose(edited, offset.apply(robot.observe(), size + 2 * np.pi), atol=1e-9)
+    assert abs(offset.wrap_size(size)) <= np.pi
+    np.testing.assert_allclose(edited, offset.apply(robot.observe(), offset.wrap_size(size)), atol=1e-9)
+    there = _turn_ant(robot, size)
+    np.testing.assert_allclose(edited, there, atol=1e-9)
+    # It is the usual observation, or that with the quaternion's negative, and its w is not negative.
+    expected = _turn_ant(usual, size)
+    np.testing.assert_allclose(there[1:5] * np.sign(expected[1]), expected[1:5], atol=1e-12)
+    np.testing.assert_array_equal(np.delete(there, range(1, 5)), np.delete(expected, range(1, 5)))
+    assert there[1] >= 0.0
+    np.testing.assert_allclose(heading.apply(there, 0.5), heading.apply(observation, 0.5), atol=1e-9)
 
 
 def test_an_angle_is_the_same_after_one_turn_and_a_length_never() -> None:

@@ -71,14 +71,14 @@ def test_the_session_is_the_same_to_the_last_bit(
         remote.write(record)
     remote.close("the operator quit")
     assert examine_session(there).whole
-    assert (remote.path, remote.created) == (there, True)
+    assert (remote.path, remote.on_disk) == (there, True)
     assert remote.bytes == there.stat().st_size
     first, second = read_chunks(here), read_chunks(there)
     assert len(first) > 20
-    began = own.began, remote.began
+    created = own.created, remote.created
     assert [entity for entity, _ in first] == [entity for entity, _ in second]
     for (entity, one), (_, two) in zip(first, second, strict=True):
-        assert repr(one).replace(began[0], "") == repr(two).replace(began[1], ""), entity
+        assert repr(one).replace(created[0], "") == repr(two).replace(created[1], ""), entity
 
 
 def test_everything_that_a_step_can_hold_survives(recorded: Recorded) -> None:
@@ -166,7 +166,7 @@ def test_what_cannot_be_recorded_is_said_at_once_and_the_process_goes_on(
         process.begin_recording(there, loop.info)
     unstarted = process.begin_recording(tmp_path / "b.rrd", loop.info)
     unstarted.close("before its first step")
-    assert not unstarted.created
+    assert not unstarted.on_disk
     assert not unstarted.path.exists()
     recorder = process.begin_recording(tmp_path / "a.rrd", replace(loop.info, activations="off"))
     recorder.write(records[0])

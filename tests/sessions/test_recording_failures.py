@@ -75,7 +75,7 @@ def test_an_exception_is_the_outcome(recorded: Recorded, tmp_path: Path) -> None
 
 def test_a_drive_without_steps_leaves_no_file(recorded: Recorded, tmp_path: Path) -> None:
     recorder = SessionRecorder(tmp_path / "a.rrd", recorded[1].info)
-    assert not recorder.created
+    assert not recorder.on_disk
     recorder.close("nothing happened")
     assert not list(tmp_path.iterdir())
 

@@ -179,6 +179,8 @@ def test_a_small_study_from_policies_to_the_page(trained: Path, tmp_path: Path) 
     assert first.exit_code == 0, first.output
     assert "Matching and steering: 1 of the 3 policies wanted" in first.stdout
     assert "Unknown: one policy that walks is too few" in first.stdout
+    said = "Of 2 policies of walker, walker-ppo-tanh-256x256-1000 scores best"
+    assert said in " ".join(first.stdout.split())
     page = (guide / "matching-study.md").read_text()
     assert "One more was trained, but does not walk by the rule of the plan" in page
     assert "pdtui train walker --algorithm ppo --activation tanh --layers 256,256 --seed 1001" in page
@@ -204,6 +206,9 @@ def test_a_small_study_from_policies_to_the_page(trained: Path, tmp_path: Path) 
     assert {path: path.stat().st_mtime_ns for path in folder.glob("walker*.parquet")} == parts
     summary = json.loads(again.stdout)
     assert (summary["answer"], summary["wanted"], len(summary["policies"])) == ("unknown", 3, 2)
+    walking, falling = summary["scores"]
+    assert 0.0 <= walking["score"] == walking["walking"] * walking["steering"] <= 1.0
+    assert (falling["policy"], falling["score"]) == ("walker-ppo-tanh-256x256-1001", 0.0)
     redrawn = _run("--data", folder / "matching-study.parquet", "--guide", tmp_path / "other")
     assert redrawn.exit_code == 0, redrawn.output
     assert (tmp_path / "other" / "matching-study.md").read_text() == page

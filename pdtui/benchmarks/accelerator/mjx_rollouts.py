@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 from io import StringIO
 from typing import Any, NamedTuple
@@ -15,6 +15,11 @@ from numpy.typing import NDArray
 from pdtui.benchmarks.accelerator.jax_ant_formulas import JaxAntFormulas
 from pdtui.core.attributes import Floats
 from pdtui.core.errors import PdtuiError
+from pdtui.policies.runtime.jax_multilayer_perceptron import (
+    ARRAY_ACTIVATIONS,
+    apply_mlp,
+    network_to_mlp_parameters,
+)
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.policy_network import PolicyNetwork
 from pdtui.probing.start_states import StartState
@@ -23,7 +28,6 @@ from pdtui.robots.ant import Ant
 with redirect_stdout(StringIO()):  # it prints which of its back ends are not installed
     from mujoco import mjx
 
-_ACTIVATIONS: dict[str, Callable[[Any], Any]] = {"tanh": jnp.tanh, "relu": jax.nn.relu, "elu": jax.nn.elu}
 NO_UNIT = -1
 """The number of a unit that does not exist: nothing is overwritten."""
 
@@ -68,12 +72,14 @@ class MjxRollouts:
     """
 
     def __init__(self, ant: Ant, policy: Policy, steps: int, measure_from: int) -> None:
-        if not isinstance(policy.module, PolicyNetwork) or policy.module.spec.activation not in _ACTIVATIONS:
+        network = policy.module
+        if not isinstance(network, PolicyNetwork) or network.spec.activation not in ARRAY_ACTIVATIONS:
+            known = ", ".join(ARRAY_ACTIVATIONS)
             raise PdtuiError(
-                f"{policy.name}: expected a multilayer perceptron with {', '.join(_ACTIVATIONS)} for the "
-                "accelerator; this policy is another network"
+                f"{policy.name}: expected a multilayer perceptron with {known} for the accelerator; "
+                "this policy is another network"
             )
-        self._ant, self._network = ant, policy.module
+        self._ant, self._network, self._layers = ant, network, network_to_mlp_parameters(network)
         self._formulas, self._steps, self._measure_from = JaxAntFormulas(ant), steps, measure_from
         self._model = mjx.put_model(ant.model)
         # Without this, matrices are multiplied with 10 bits of mantissa on some accelerators.
@@ -141,18 +147,16 @@ class MjxRollouts:
 
     def _act(self, observation: Any, unit: Any, output: Any) -> Any:
         """Return the mean action with one unit overwritten, shape (A,)."""
-        network, spec, first = self._network, self._network.spec, 0
-        x = observation
+        network, spec, x = self._network, self._network.spec, observation
         if network.normalizes:
             x = (x - network.normalizer.mean.numpy()) / network.normalizer.std.numpy()
             x = jnp.clip(x, -spec.observation_clip, spec.observation_clip) if spec.observation_clip else x
-        for layer in network.hidden:
-            weight, bias = (parameter.detach().numpy() for parameter in layer.parameters())
-            x = _ACTIVATIONS[spec.activation](weight @ x + bias)
-            x = jnp.where(jnp.arange(len(x)) == unit - first, output, x)
-            first += len(x)
-        weight, bias = (parameter.detach().numpy() for parameter in network.head.parameters())
-        mean = (weight @ x + bias)[: spec.actions]
+
+        def overwrite(outputs: Any, first: int) -> Any:
+            return jnp.where(jnp.arange(len(outputs)) == unit - first, output, outputs)
+
+        activation, _ = ARRAY_ACTIVATIONS[spec.activation]
+        mean = apply_mlp(self._layers, x, activation, overwrite)[: spec.actions]
         mean = jnp.clip(mean, -spec.mean_limit, spec.mean_limit) if spec.mean_limit else mean
         low, high = np.array(spec.action_low, np.float32), np.array(spec.action_high, np.float32)
         if spec.head in ("squashed_gaussian", "tanh"):

@@ -30,12 +30,15 @@ EXPERIMENTS = find_experiments()
 
 
 def experiment_options(command: click.Command) -> click.Command:
-    """Add the options of the experiments to a command."""
+    """Add the options of the experiments to a command; one that it has already serves both."""
     takers: dict[click.Option, list[str]] = {}
     for name, experiment in EXPERIMENTS.items():
         for option in experiment.options:
             takers.setdefault(option, []).append(name)
+    present = {option.name for option in command.params}
     for option, names in takers.items():
+        if option.name in present:
+            continue
         option.help = f"With --experiment {' or '.join(names)}: {option.help}"
         command.params.append(option)
     return command

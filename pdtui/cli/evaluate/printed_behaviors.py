@@ -28,6 +28,7 @@ def print_behaviors(
     workers: Workers,
     drawn: tuple[Path, bool] | None,
     *,
+    journal: Path | None,
     watch: bool,
     update: bool,
     as_json: bool,
@@ -58,7 +59,9 @@ def print_behaviors(
         where = f"{workers} processes" if isinstance(workers, int) else str(workers)
         click.echo(f"{evaluation.count_control_steps(plan):,} control steps, {where}", err=True)
     with progress_bar("evaluating", quiet=as_json) as advance:
-        result = evaluation.evaluate_behaviors(config, plan, workers=workers, progress=advance)
+        result = evaluation.evaluate_behaviors(
+            config, plan, workers=workers, journal=journal, progress=advance
+        )
     if update:
         measured = result.measured_effects()
         rewrite_map(source, lambda text: replace_effects(text, measured, str(source)), output)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pdtui.cli.output.command_output import print_result
@@ -44,12 +45,14 @@ def print_policy_alone(config: DriveConfig, seeds: range, as_json: bool, *, gait
 
 
 def print_key_releases(
-    config: DriveConfig, seeds: range, held: int | None, workers: Workers, as_json: bool
+    config: DriveConfig, seeds: range, held: int | None, workers: Workers, journal: Path | None, as_json: bool
 ) -> None:
     """Measure what happens once each behavior is let go, and print it."""
     from pdtui.evaluation.key_release.key_release_evaluation import evaluate_key_releases
     from pdtui.evaluation.key_release.key_release_table import key_release_table
 
     with progress_bar("letting go", quiet=as_json) as advance:
-        result = evaluate_key_releases(config, seeds, held=held, workers=workers, progress=advance)
+        result = evaluate_key_releases(
+            config, seeds, held=held, workers=workers, journal=journal, progress=advance
+        )
     print_result(asdict(result), as_json, lambda: key_release_table(result))

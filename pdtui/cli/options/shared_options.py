@@ -108,6 +108,16 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print the re
 overwrite_option = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 
 
+def journal_option(kept: str, note: str = "") -> Decorator:
+    """Return an option for the file with which an interrupted command goes on."""
+    return click.option(
+        "--journal",
+        type=click.Path(path_type=Path, dir_okay=False),
+        metavar="FILE",
+        help=f"Keep the result of each finished {kept}, and do not run again what is there already.{note}",
+    )
+
+
 def minutes_option(name: str, default: float | None = None, note: str = "") -> Decorator:
     """Return an option for the time that a search may take."""
     return click.option(

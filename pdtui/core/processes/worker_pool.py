@@ -21,10 +21,9 @@ from pdtui.core.cluster.ray_cluster import RayCluster, Workers
 from pdtui.core.errors import WorkerError, format_error_in_one_line
 from pdtui.core.processes.call_answer import CallAnswer, answer_call, take_answer
 from pdtui.core.processes.process_start import start_process
+from pdtui.core.processes.result_journal import Job, JobJournal, Result, map_missing
 
 State = TypeVar("State")
-Job = TypeVar("Job")
-Result = TypeVar("Result")
 StepProgress = Callable[[int, int], None]
 """Called with the units of work done and their total."""
 
@@ -116,6 +115,7 @@ class WorkerPool(Closable, Generic[State]):
         function: Callable[[State, Job], Result],
         jobs: Sequence[Job],
         progress: StepProgress | None = None,
+        journal: JobJournal[Job, Result] | None = None,
     ) -> list[Result]:
         """Run all jobs and return their results in the order of the jobs; `WorkerError` if a worker dies.
 
@@ -123,13 +123,9 @@ class WorkerPool(Closable, Generic[State]):
             function: function of a module, called with the worker's state and a job.
             jobs: one argument of `function` each.
             progress: called with the number of jobs finished and of all jobs.
+            journal: keeps each result; jobs whose results it holds are not run. None for none.
         """
-        results: dict[int, Result] = {}
-        for number, result in self.as_completed(function, jobs):
-            results[number] = result
-            if progress is not None:
-                progress(len(results), len(jobs))
-        return [results[number] for number in range(len(jobs))]
+        return map_missing(partial(self.as_completed, function), jobs, journal, progress)
 
     def as_completed(
         self, function: Callable[[State, Job], Result], jobs: Sequence[Job]

@@ -17,7 +17,7 @@ def find_branch_origin(config: DriveConfig, recording: DriveRecording, step: int
     """Return where a branch at a control step branches off; None if the drive is not recorded."""
     if config.watched is not None:
         return BranchOrigin(config.watched.path.name, config.watched.created, step)
-    return BranchOrigin(Path(recording.path).name, recording.began, step) if recording.path else None
+    return BranchOrigin(Path(recording.path).name, recording.created, step) if recording.path else None
 
 
 def configure_branch(config: DriveConfig, origin: BranchOrigin | None, folder: Path | None) -> DriveConfig:

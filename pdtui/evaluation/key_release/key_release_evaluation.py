@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from pdtui.driving.control_loop import ControlLoop
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.driving.loop_builder import build_control_loop, send_drive_files
 from pdtui.evaluation.held_run import HeldRunPlan, HeldRunTrace, run_held_behavior
+from pdtui.evaluation.journal.run_journal import RunJournal
 from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.evaluation.protocol_settings import ProtocolSettings, RunTimes, plan_run_times
 
@@ -73,6 +75,7 @@ def evaluate_key_releases(
     *,
     held: int | None = None,
     workers: Workers = 1,
+    journal: Path | None = None,
     progress: StepProgress | None = None,
 ) -> KeyReleaseEvaluation:
     """Hold each behavior of a map, let it go, and watch for 300 control steps.
@@ -85,10 +88,11 @@ def evaluate_key_releases(
         seeds: The seeds.
         held: Control steps for which behaviors without a period are held; None for `HELD_STEPS`.
         workers: Number of worker processes, or a cluster.
+        journal: File that keeps the result of every run, and from which finished runs are taken.
         progress: Called with the number of runs done and of all runs.
 
     Raises:
-        PdtuiError: The robot, policy or map cannot be loaded.
+        PdtuiError: The robot, policy, map or journal cannot be loaded.
     """
     loop = build_control_loop(config)
     names = [name for name, one in loop.map.behaviors.items() if one.pid is None]
@@ -101,7 +105,8 @@ def evaluate_key_releases(
     plans += [HeldRunPlan("", seed, one) for seed, one in zip(seeds, longest, strict=True)]
     sent = send_drive_files(workers, config)
     with WorkerPool(f"evaluation of {config.robot}", workers, loop, build_control_loop, sent) as pool:
-        found = pool.map(run_held_behavior, plans, progress or (lambda _done, _all: None))
+        kept = RunJournal(journal, loop).of(run_held_behavior)
+        found = pool.map(run_held_behavior, plans, progress, kept)
     traces = {(plan.behavior, plan.seed): trace for plan, trace in zip(plans, found, strict=True)}
     attributes = [attribute.name for attribute in loop.robot.attributes]
     column = attributes.index("speed") if "speed" in attributes else None

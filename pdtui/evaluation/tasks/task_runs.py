@@ -66,13 +66,13 @@ class TaskRunResult:
         verdict: The verdict on the task.
         outcome: How the episode ended, or that it arrived; None if it lasted as long as planned.
         still: The verdict on the end of a long hold; None for a run without.
-        began: Whether the run came as far as the press, with what is done before done.
+        reached_press: Whether the run came as far as the press, with what is done before done.
     """
 
     verdict: TaskVerdict
     outcome: Outcome | None
     still: TaskVerdict | None = None
-    began: bool = True
+    reached_press: bool = True
 
 
 def list_task_runs(plan: EvaluationPlan) -> list[TaskRunKey]:
@@ -192,13 +192,13 @@ def run_task_episode(built: ControlLoop, episode: TaskEpisode) -> TaskRunResult:
     waited = _count_waiting_steps(records[press:], run.behavior)
     press += waited
     if len(rows) <= press + 1 or waited > _most_waiting_steps(built, run):
-        return TaskRunResult(TaskVerdict(False, 0.0, {}), outcome, began=not run.after)
+        return TaskRunResult(TaskVerdict(False, 0.0, {}), outcome, reached_press=not run.after)
     if run.after:
         walk = episode.plan.earlier[0][0]
         done = unwrap_angles(rows[walk + 1 : press + 1], attributes)
         first = _task_of(built, run.after).judge(TaskRunTrace(attributes, rows[: walk + 1], done))
         if not first.success:
-            return TaskRunResult(TaskVerdict(False, 0.0, {}), outcome, began=False)
+            return TaskRunResult(TaskVerdict(False, 0.0, {}), outcome, reached_press=False)
     after = unwrap_angles(rows[press + 1 : press + 1 + run.steps], attributes)
     outcome = outcome if len(rows) <= press + 1 + run.steps else None
     at_once = after[: task.steps]

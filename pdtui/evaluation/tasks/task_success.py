@@ -125,7 +125,7 @@ def _summarize(
     own = {
         run: one
         for run, one in results.items()
-        if (run.behavior, run.condition, run.after) == (behavior.name, condition, after) and one.began
+        if (run.behavior, run.condition, run.after) == (behavior.name, condition, after) and one.reached_press
     }
     task = plan.loop.robot.find_task(behavior.task)
     pressed = [one for run, one in own.items() if run.pressed and run.kind == "units"]

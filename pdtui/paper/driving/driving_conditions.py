@@ -40,7 +40,7 @@ from pdtui.paper.driving.key_effects import (
     measure_key_effects,
 )
 from pdtui.paper.driving.operator_memory import sample_judgment_errors
-from pdtui.paper.driving.score_journal import ScoreJournal
+from pdtui.paper.driving.score_journal import ScoreJournal, open_score_journal
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import robot_file_stem
 from pdtui.robots.robot import Robot
@@ -86,7 +86,7 @@ def evaluate_driving(
     read = [read_episode(path, robot) for path in sessions]
     if record is not None and (present := sorted(record.glob("*.rrd"))):
         raise SessionError(f"{present[0]}: already exists; drives are recorded into a new folder")
-    kept, missing = ScoreJournal(journal), dict(left_out or {})
+    kept, missing = open_score_journal(journal), dict(left_out or {})
     effects: dict[str, KeyEffects] = {}
     rows: list[DrivingRow] = []
     sent = {_name(config): send_drive_files(workers, config) for config in configs}

@@ -4,7 +4,8 @@ The velocity in the world turns with the trunk, so that the robot seems to do th
 
 A quaternion and its negative are the same heading, and not the same observation: a robot that has turned once
 round observes the negative of what it observed before. A policy that never did so in training falls at once.
-An offset therefore counts whole turns: it makes the same observation again only after two of them.
+An offset therefore counts whole turns: it makes the same observation again only after two of them. A robot
+that always observes the canonical one of both, that whose w is not negative, needs no such count.
 """
 
 from __future__ import annotations
@@ -17,12 +18,22 @@ from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 
 
-def quaternion_heading_edits(quaternion: int, velocity: int) -> tuple[ObservationEdit, ObservationEdit]:
+def make_canonical(observation: Floats, quaternion: int) -> None:
+    """Negate the quaternion w x y z at an index of an observation if its w is negative, in place."""
+    if observation[quaternion] < 0.0:
+        observation[quaternion : quaternion + 4] *= -1.0
+
+
+def quaternion_heading_edits(
+    quaternion: int, velocity: int, *, canonical: bool = False
+) -> tuple[ObservationEdit, ObservationEdit]:
     """Return the edits "heading" and "heading offset" of an observation that holds the trunk's quaternion.
 
     Args:
         quaternion: Index in the observation of the trunk's quaternion w x y z.
         velocity: Index of its velocity x y in the world.
+        canonical: Whether the robot observes the quaternion whose w is not negative, so that an edit makes
+            such an observation, too, and whole turns make no difference.
     """
 
     def turn(observation: Floats, angle: float) -> Floats:
@@ -32,16 +43,17 @@ def quaternion_heading_edits(quaternion: int, velocity: int) -> tuple[Observatio
         edited[quaternion : quaternion + 4] = (c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w)
         vx, vy = observation[velocity : velocity + 2].tolist()
         edited[velocity : velocity + 2] = _rotate(vx, vy, angle)
+        if canonical:
+            make_canonical(edited, quaternion)
         return edited
 
     def face(observation: Floats, heading: float) -> Floats:
         *_, yaw = roll_pitch_yaw(*observation[quaternion : quaternion + 4].tolist())
         edited = turn(observation, heading - yaw)
-        if edited[quaternion] < 0.0:  # however often the robot has turned
-            edited[quaternion : quaternion + 4] *= -1.0
+        make_canonical(edited, quaternion)  # however often the robot has turned
         return edited
 
-    return _name_edits(face, turn, 4.0 * math.pi)
+    return _name_edits(face, turn, (2.0 if canonical else 4.0) * math.pi)
 
 
 def yaw_heading_edits(

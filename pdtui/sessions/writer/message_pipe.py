@@ -73,7 +73,7 @@ class MessagePipe:
     def create_file(self) -> None:
         """Create the file, if that was not done yet."""
         with self._lock:
-            if not self.file.created:
+            if not self.file.on_disk:
                 self.file.create()
 
     def follow_renamed_file(self) -> str:

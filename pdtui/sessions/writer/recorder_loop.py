@@ -27,15 +27,15 @@ class RecordingState:
     """What the drive is told of its recording.
 
     Attributes:
-        path, created, began: as in `SessionRecorder`.
+        path, on_disk, created: as in `SessionRecorder`.
         notice: one line on what happened to the file; empty if nothing did.
         failure: why the recording had to end; None while it goes on.
         closed: whether it is complete.
     """
 
     path: Path
-    created: bool
-    began: str
+    on_disk: bool
+    created: str
     notice: str = ""
     failure: SessionError | None = None
     closed: bool = False
@@ -121,7 +121,9 @@ class _Recording:
         recorder = self._recorder
         self._ring.reader_value = recorder.bytes
         notice, recorder.notice = recorder.notice, ""
-        state = RecordingState(recorder.path, recorder.created, recorder.began, notice, self._failure, closed)
+        state = RecordingState(
+            recorder.path, recorder.on_disk, recorder.created, notice, self._failure, closed
+        )
         if state != self._sent:
             self._sent = state
             with suppress(OSError):  # the drive has ended

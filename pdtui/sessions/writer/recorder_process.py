@@ -139,14 +139,14 @@ class RemoteRecorder:
         return self._state.path
 
     @property
-    def created(self) -> bool:
+    def on_disk(self) -> bool:
         """Whether there is a file: not before the first control step."""
-        return self._state.created
+        return self._state.on_disk
 
     @property
-    def began(self) -> str:
+    def created(self) -> str:
         """Date and time at which the drive began, ISO 8601."""
-        return self._state.began
+        return self._state.created
 
     @property
     def bytes(self) -> int:
@@ -214,5 +214,5 @@ class RemoteRecorder:
             raise self._name_file(error) from error
 
     def _name_file(self, error: SessionError) -> SessionError:
-        place = f"; the recording up to then is in {self.path}" if self.created else ""
+        place = f"; the recording up to then is in {self.path}" if self.on_disk else ""
         return SessionError(f"{error}{place}")

@@ -69,9 +69,9 @@ class RerunRecording:
         return self._pipe.file.size
 
     @property
-    def created(self) -> bool:
+    def on_disk(self) -> bool:
         """Whether the file was created."""
-        return self._pipe.file.created
+        return self._pipe.file.on_disk
 
     def create_file(self) -> None:
         """Create the file, if that was not done yet; what was sent before is then written into it."""

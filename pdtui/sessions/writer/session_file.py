@@ -40,7 +40,7 @@ class SessionFile:
     Attributes:
         path: where the file is, or will be.
         size: number of bytes written.
-        created: whether the file was created.
+        on_disk: whether the file was created.
 
     Raises:
         SessionError: the file exists and is to be refused, or is being recorded.
@@ -53,7 +53,7 @@ class SessionFile:
         self._waiting = bytearray()
         self._unsynchronized = False
         self.size = 0
-        self.created = False
+        self.on_disk = False
         if os.path.lexists(path):
             if existing == "refuse" or not path.is_file():
                 raise SessionError(f"{path}: already exists; a drive is recorded into a new file")
@@ -66,7 +66,7 @@ class SessionFile:
             self.path = self.path.with_name(f"{self.path.stem}.new{self.path.suffix}")
         numbered = self._existing == "number" or self._replaced is not None
         self._descriptor, self.path = _create(self.path, numbered=numbered)
-        self.created = True
+        self.on_disk = True
         waiting, self._waiting = bytes(self._waiting), bytearray()
         self.size = 0
         self.write(waiting)

@@ -122,14 +122,14 @@ class SessionRecorder:
         return self._recording.size
 
     @property
-    def began(self) -> str:
+    def created(self) -> str:
         """Date and time at which the drive began, ISO 8601."""
         return self._created
 
     @property
-    def created(self) -> bool:
+    def on_disk(self) -> bool:
         """Whether there is a file: not before the first control step."""
-        return self._recording.created
+        return self._recording.on_disk
 
     def write(self, record: StepRecord) -> None:
         """Record one control step. The recorder keeps its arrays, which must not be changed.
@@ -221,7 +221,7 @@ class SessionRecorder:
             self._viewer_data.write()
         if steps[0] < _DESCRIBED_AGAIN <= steps[-1] + 1:
             self._describe_drive()  # a second copy, in case the first is damaged
-        if not self._recording.created:
+        if not self._recording.on_disk:
             self._flush_rows()  # so that the first steps are in what the new file is created with
             self._recording.create_file()
 

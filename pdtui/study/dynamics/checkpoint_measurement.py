@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from pdtui.core.attributes import Floats
-from pdtui.core.errors import PolicyError, RobotError, StudyError
+from pdtui.core.errors import PolicyError, RobotError
 from pdtui.core.outcome import count_failures
+from pdtui.core.processes.result_journal import ResultJournal
 from pdtui.core.units import format_unit
 from pdtui.dissection.attribute_movers import movable_attribute_columns
 from pdtui.driving.drive_config import DriveConfig
@@ -63,14 +64,16 @@ def measure_learning_dynamics(
         names = tuple(one.name for one in pool.robot.attributes)
         primitives = _find_final_primitives(pool, settings)
         units = tuple(format_unit(unit, pool.policy.layers) for unit in primitives.units)
-    journal = _MeasurementJournal(folder / _JOURNAL)
+    journal = ResultJournal(
+        folder / _JOURNAL, _encode_measurement, _decode_measurement, "the measurement of a checkpoint", "key"
+    )
     measured = []
     for number, path in enumerate(paths):
         key = json.dumps([robot, hash_file(path), hash_file(paths[-1]), repr(settings)])
-        one = journal.read(key)
+        one = journal.find(key)
         if one is None:
             one = _measure_checkpoint(robot, path, primitives, settings)
-            journal.write(key, one)
+            journal.keep(key, one)
         measured.append(one)
         if progress is not None:
             progress(number + 1, len(paths))
@@ -150,33 +153,11 @@ def _measure_strengths(
     }
 
 
-class _MeasurementJournal:
-    """Measurements by key, one JSON line each."""
+def _encode_measurement(measured: CheckpointMeasurement) -> dict[str, Any]:
+    return {"measured": asdict(measured)}
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._known: dict[str, CheckpointMeasurement] = {}
-        try:
-            content = path.read_bytes() if path.exists() else b""
-            whole = content[: content.rfind(b"\n") + 1]
-            if whole != content:  # a run that was killed left a part of a line
-                path.write_bytes(whole)
-            for line in whole.splitlines():
-                data: dict[str, Any] = json.loads(line)
-                measured: dict[str, Any] = data["measured"]
-                lists = {name: tuple(value) for name, value in measured.items() if isinstance(value, list)}
-                self._known[data["key"]] = CheckpointMeasurement(**{**measured, **lists})
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            raise StudyError(f"{path}: expected measurements of checkpoints: {error}") from error
 
-    def read(self, key: str) -> CheckpointMeasurement | None:
-        """Return what is known; None for nothing."""
-        return self._known.get(key)
-
-    def write(self, key: str, measured: CheckpointMeasurement) -> None:
-        """Add a measurement."""
-        try:
-            with self._path.open("a") as file:
-                file.write(json.dumps({"key": key, "measured": asdict(measured)}) + "\n")
-        except OSError as error:
-            raise StudyError(f"{self._path}: cannot be written: {error.strerror}") from error
+def _decode_measurement(fields: dict[str, Any]) -> CheckpointMeasurement:
+    measured: dict[str, Any] = fields["measured"]
+    lists = {name: tuple(value) for name, value in measured.items() if isinstance(value, list)}
+    return CheckpointMeasurement(**{**measured, **lists})

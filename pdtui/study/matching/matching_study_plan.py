@@ -43,6 +43,13 @@ class StudiedPolicy:
         return "imitated a shipped policy first" if self.imitation_rounds else "trained from random actions"
 
     @property
+    def training(self) -> str:
+        """What trained it, in a few words."""
+        algorithm = self.algorithm.upper()
+        origin = f"imitation, then {algorithm}" if self.imitation_rounds else algorithm
+        return f"{origin} (shipped)" if self.shipped else origin
+
+    @property
     def setting(self) -> str:
         """What policies of different seeds have in common."""
         return f"{self.robot}-{self.algorithm}-{self.activation}-{'x'.join(map(str, self.layers))}"

@@ -6,10 +6,18 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from rich.console import Group
 from rich.table import Table
 
 from pdtui.core.console.text_tables import new_table
 from pdtui.study.matching.matching_study_plan import StudiedPolicy
+from pdtui.study.matching.policy_scores import (
+    SCORE_SENTENCE,
+    describe_best_policies,
+    score_headers,
+    score_policies,
+    score_rows,
+)
 from pdtui.study.matching.study_data import MatchingStudyData
 from pdtui.study.matching.study_page import answer_in_one_sentence, variant_headers, variant_rows
 from pdtui.study.matching.study_statistics import MEASURES, StudyResult
@@ -27,8 +35,21 @@ class StudySummary:
         """One sentence."""
         return answer_in_one_sentence(self.data, self.result)
 
-    def table(self) -> Table:
-        """Return the table of the variants."""
+    def tables(self) -> Group:
+        """Return the table of the variants, and that of the scores where a robot has several policies."""
+        scores = score_policies(self.data)
+        if not scores:
+            return Group(self._variant_table())
+        # The page has the attributes, too, for which a terminal has no room.
+        headers = score_headers()
+        shown = [headers.index(name) for name in ("policy", "walking", "steering (halves)", "score")]
+        table = new_table("Walking and steering", *(headers[column] for column in shown))
+        for row in score_rows(scores):
+            table.add_row(*(row[column] for column in shown))
+        table.caption = f"{SCORE_SENTENCE} {describe_best_policies(scores).replace('`', '')}"
+        return Group(self._variant_table(), table)
+
+    def _variant_table(self) -> Table:
         plan = self.data.plan
         count = f"{len(self.result.figures)} of the {len(plan.policies)} policies wanted"
         table = new_table(f"Matching and steering: {count}", *variant_headers(plan.settings.best))
@@ -50,6 +71,10 @@ class StudySummary:
                 for name, means in result.variants.items()
             },
             **{name: asdict(getattr(result, name)) for name in references},
+            "scores": [
+                {**asdict(one), "policy": one.policy.name, "robot": one.policy.robot, "score": one.score}
+                for one in score_policies(self.data)
+            ],
             "figures": [
                 {**asdict(one), "variants": dict(zip(result.variants, one.variants.tolist(), strict=True))}
                 for one in result.figures

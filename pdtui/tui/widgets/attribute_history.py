@@ -17,7 +17,7 @@ class AttributeHistory:
     def __init__(self, length: int, columns: int) -> None:
         self._rows = np.full((length, columns), np.nan)
         self._ghost: Floats | None = None
-        self._ghost_began = -1
+        self._ghost_first = -1
         self.total = 0
         """Number of control steps so far."""
         self.until: int | None = None
@@ -30,10 +30,10 @@ class AttributeHistory:
         self.extend(snapshot.history, snapshot.step)
         self.until = None if snapshot.past is None else snapshot.step
         ghost = snapshot.ghost
-        began = -1 if ghost is None else ghost.first
-        if began != self._ghost_began:
+        first = -1 if ghost is None else ghost.first
+        if first != self._ghost_first:
             self.forget_ghost()
-            self._ghost_began = began
+            self._ghost_first = first
         if ghost is not None and ghost.latest is not None and ghost.history is not None:
             self.add_ghost(ghost.history, ghost.latest.step)
 

@@ -40,7 +40,7 @@ class PathView(SnapshotWidget):
     def forget(self) -> None:
         self.trail = PathTrail()
         self._ghost_path: Floats = np.empty((0, 2))
-        self._ghost_began = -1
+        self._ghost_first = -1
         self._heading = 0.0
         self._here = np.zeros(2)
 
@@ -64,9 +64,9 @@ class PathView(SnapshotWidget):
     def remember(self, snapshot: DriveSnapshot) -> None:
         self.trail.extend(snapshot.path, restarted=snapshot.restarted)
         ghost = snapshot.ghost
-        began = -1 if ghost is None else ghost.first
-        if began != self._ghost_began:
-            self._ghost_path, self._ghost_began = np.empty((0, 2)), began
+        first = -1 if ghost is None else ghost.first
+        if first != self._ghost_first:
+            self._ghost_path, self._ghost_first = np.empty((0, 2)), first
         if ghost is not None and ghost.path is not None:
             near = ghost.path[are_within_view(ghost.path)]
             self._ghost_path = np.concatenate([self._ghost_path, near])[-MOST_POINTS:]

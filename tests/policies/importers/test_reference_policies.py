@@ -20,8 +20,12 @@ from pdtui.policies.weights.policy_loading import load_policy
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_pool import RolloutPool
 from pdtui.probing.start_states import collect_start_states
+from pdtui.probing.unit_selection import choose_primitive_candidates
 from pdtui.robots import make_robot
 from pdtui.robots.ant import Ant
+from pdtui.spectra.episode_monitor import monitor_episodes
+from pdtui.spectra.matching import match_units
+from pdtui.spectra.matching_presets import find_matching_preset
 
 Reference = Callable[[str], Path]
 Draw = Callable[[int], NDArray[np.float32]]
@@ -191,3 +195,29 @@ def test_probing_sees_the_authors_brake_and_how_common_brakes_are(reference: Ref
     assert brakes[row, 1]
     assert not sweep.falls[row, 1].any()
     assert sweep.robust_effects(speed, -1.0)[row, 1] > 2.0
+
+
+@pytest.mark.slow
+def test_the_smallest_dose_does_not_single_out_the_authors_brake(reference: Reference) -> None:
+    """Many of the 512 units stop their Ant at ±2, where 0:156 does little: it brakes at ±8, as most do."""
+    policy = load_policy(reference("ant.npz"), import_options=ImportOptions("tanh"), spaces=ANT)
+    values = (-8.0, -4.0, -2.0, 2.0, 4.0, 8.0)
+    with RolloutPool(_PaddedAnt(), policy, 1) as pool:
+        speed = pool.robot.attribute_index("speed")
+        episodes = monitor_episodes(pool.robot, policy, [1000, 1001], 300)
+        matching = match_units(episodes, pool.robot.attributes, find_matching_preset("paper", []))
+        starts = collect_start_states(pool.robot, policy, 1102, 2, at=range(50, 101))
+        screen = EffectProbe(pool).measure_units(range(512), values, starts, steps=60)
+    candidates = choose_primitive_candidates(screen, screen, matching, [speed], values, 512)
+    braking = [one for one in candidates if one.sign < 0.0]
+    place = next(number for number, one in enumerate(braking, 1) if one.unit == 156)
+    halved = screen.robust_effects(speed, -1.0) > 0.5 * screen.unperturbed[:, speed].mean()
+    print(
+        f"0:156 is number {place} of {len(braking)} brakes, at {braking[place - 1].value:g}; first are "
+        f"{[(one.unit, one.value) for one in braking[:5]]}; units that take half of the speed, by output: "
+        f"{dict(zip(values, halved.sum(axis=0).tolist(), strict=True))}"
+    )
+    assert halved[156, [0, 5]].all()
+    assert not halved[156, 1:5].any()
+    assert halved[:, 2:4].any(axis=1).sum() >= 40
+    assert place > 100

@@ -11,6 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from pdtui.policies.weights.policy_network import PolicyNetwork
+
 MlpParameters = list[dict[str, jax.Array]]
 """One dictionary per layer: weight ``w``, shape (inputs, outputs), bias ``b`` and, for LayerNorm, ``scale``
 and ``shift``."""
@@ -40,7 +42,7 @@ def elu(x: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.maximum(x, 0.0) + np.expm1(np.minimum(x, 0.0))
 
 
-ACTIVATIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
+ARRAY_ACTIVATIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
     "tanh": (jnp.tanh, np.tanh),
     "relu": (relu, relu),
     "elu": (jax.nn.elu, elu),
@@ -48,8 +50,33 @@ ACTIVATIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
 """Activation functions of hidden layers by name, for arrays of JAX and of NumPy."""
 
 
-def apply_mlp(params: MlpParameters, x: Any, activation: Callable[[Any], Any]) -> Any:
-    """Apply the hidden layers with an activation function and the last layer without."""
+def network_to_mlp_parameters(network: PolicyNetwork) -> MlpParameters:
+    """Return the weights of the network's hidden layers and head; its normalizer is not among them."""
+    return [
+        {"w": jnp.asarray(layer.weight.detach().numpy().T), "b": jnp.asarray(layer.bias.detach().numpy())}
+        for layer in (*network.hidden, network.head)
+    ]
+
+
+def apply_mlp(
+    params: MlpParameters,
+    x: Any,
+    activation: Callable[[Any], Any],
+    intervene: Callable[[Any, int], Any] | None = None,
+) -> Any:
+    """Apply the hidden layers with an activation function and the last layer without.
+
+    Args:
+        params: The layers.
+        x: Inputs, shape (..., inputs).
+        activation: The activation function of the hidden layers.
+        intervene: Returns what the next layer gets instead of a layer's outputs, shape (..., units), and the
+            number of hidden units in the layers before it; None for the outputs themselves.
+    """
+    first = 0
     for layer in params[:-1]:
         x = activation(x @ layer["w"] + layer["b"])
+        if intervene is not None:
+            x = intervene(x, first)
+            first += x.shape[-1]
     return x @ params[-1]["w"] + params[-1]["b"]
