@@ -77,17 +77,9 @@ from pdtui.policies.weights.import_options import ImportOptions
     "a copy into ./maps instead.",
 )
 @click.option("--quick", is_flag=True, help="Take a quick look: fewer seeds and random draws.")
+@click.option("--without-controls", is_flag=True, help="Leave out substitutes and disturbed worlds.")
 @click.option(
-    "--without-controls",
-    is_flag=True,
-    help="Leave out random units and directions, pushes on the actions, and disturbed worlds.",
-)
-@click.option(
-    "--behavior",
-    "behaviors",
-    metavar="NAME",
-    multiple=True,
-    help="Measure only this behavior of the map; may be repeated.",
+    "--behavior", "behaviors", metavar="NAME", multiple=True, help="Only this one; may be repeated."
 )
 @integer_option("--hold", help="Control steps for which a behavior is held, at least 10 s; default: 1000.")
 @click.option(
