@@ -112,6 +112,18 @@ def test_evaluate_prints_the_agreed_json(map_path: Path) -> None:
     assert [one["kind"] for one in push["substitutes"]] == ["random units", "random directions", "actions"]
 
 
+def test_evaluate_measures_only_what_is_named(map_path: Path) -> None:
+    few = ("--seeds", "100", "--hold", 100, "--without-controls", "--json")
+    result = run("evaluate", "ant", "--map", map_path, *few, "--behavior", "push")
+    assert result.exit_code == 0, result.output
+    data = json.loads(result.output)
+    assert [(row["behavior"], row["condition"]) for row in data["behaviors"]] == [("push", "undisturbed")]
+    assert not data["behaviors"][0]["substitutes"]
+    unknown = run("evaluate", "ant", "--map", map_path, *few, "--behavior", "hop")
+    assert unknown.exit_code == 1
+    assert "no behavior 'hop'; available: push, " in unknown.output
+
+
 def test_evaluate_refuses_a_quick_look_at_anything_but_behaviors(map_path: Path) -> None:
     refused = run("evaluate", "ant", "--map", map_path, "--policy-only", "--quick")
     assert refused.exit_code == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -123,6 +124,38 @@ def test_cassie_ducks_and_walks_on() -> None:
     assert not drive.endings
     assert drive["height"][60:100].mean() - drive["height"][130:175].mean() > 0.07
     assert drive["forward"][-100:].mean() > 0.8
+
+
+def test_cassie_halts_and_stays_there() -> None:
+    drive = pdtui.drive("cassie", keys={100: "z"}, steps=700, seed=SEED)
+    assert not drive.endings
+    places = np.cumsum(np.stack([drive["vx"], drive["vy"]]) * 0.02, axis=1)
+    assert np.hypot(*(places[:, -1] - places[:, -251])) < 0.25
+
+
+def test_cassie_walks_on_tiptoe_and_on_its_soles_again() -> None:
+    drive = pdtui.drive("cassie", keys={100: "t", 350: "space"}, steps=550, seed=SEED)
+    assert not drive.endings
+    before = drive["height"][50:100].mean()
+    assert drive["height"][250:350].mean() > 1.1 * before
+    assert drive["forward"][250:350].mean() > 0.8
+    assert drive["height"][-50:].mean() < 1.02 * before
+
+
+def test_cassie_walks_on_crouched() -> None:
+    drive = pdtui.drive("cassie", keys={100: "k"}, steps=350, seed=SEED)
+    assert not drive.endings
+    assert drive["height"][250:].mean() < 0.62 * drive["height"][50:100].mean()
+    assert drive["forward"][250:].mean() > 0.5
+
+
+def test_cassie_flips_backward_and_walks_on() -> None:
+    drive = pdtui.drive("cassie", keys={120: "b"}, steps=420, seed=SEED)
+    assert not drive.endings
+    pitch, feet = np.unwrap(drive["pelvis pitch"]), (drive["left foot height"], drive["right foot height"])
+    assert pitch[120] - pitch.min() > math.radians(330)
+    assert np.minimum(*feet).max() > 0.8  # over its head
+    assert drive["forward"][-100:].mean() > 0.9
 
 
 @pytest.mark.slow

@@ -77,6 +77,10 @@ from pdtui.policies.weights.import_options import ImportOptions
     "a copy into ./maps instead.",
 )
 @click.option("--quick", is_flag=True, help="Take a quick look: fewer seeds and random draws.")
+@click.option("--without-controls", is_flag=True, help="Leave out substitutes and disturbed worlds.")
+@click.option(
+    "--behavior", "behaviors", metavar="NAME", multiple=True, help="Only this one; may be repeated."
+)
 @integer_option("--hold", help="Control steps for which a behavior is held, at least 10 s; default: 1000.")
 @click.option(
     "--strip",
@@ -123,6 +127,8 @@ def evaluate_command(
     start: str,
     update: bool,
     quick: bool,
+    without_controls: bool,
+    behaviors: tuple[str, ...],
     hold: int | None,
     strip: Path | None,
     watch: bool,
@@ -145,7 +151,14 @@ def evaluate_command(
             "--target": target,
             "--experiment": experiment,
         },
-        {"--update": update, "--quick": quick, "--strip": strip, "--watch": watch}
+        {
+            "--update": update,
+            "--quick": quick,
+            "--without-controls": without_controls,
+            "--behavior": behaviors,
+            "--strip": strip,
+            "--watch": watch,
+        }
         | ({} if let_go else {"--hold": hold})
         | ({} if let_go or experiment else {"--journal": journal}),
     )
@@ -203,9 +216,11 @@ def evaluate_command(
     elif let_go:
         print_key_releases(config, seeds, hold, workers, journal, as_json)
     else:
+        from pdtui.evaluation.evaluation_plan import keep_behaviors
         from pdtui.evaluation.protocol_settings import QUICK_SEEDS, choose_protocol
 
-        settings, drawn = choose_protocol(quick=quick, hold=hold), (strip, overwrite) if strip else None
+        settings = choose_protocol(quick=quick, hold=hold, controls=not without_controls)
+        config, drawn = keep_behaviors(config, behaviors), (strip, overwrite) if strip else None
         seeds = seeds[:QUICK_SEEDS] if quick else seeds
         print_behaviors(
             config,

@@ -10,8 +10,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from pdtui.core.attributes import Floats
+from pdtui.core.errors import MapError
 from pdtui.core.units import Stimulation, parse_unit
 from pdtui.driving.control_loop import ControlLoop
+from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.behavior_substitutes import (
     ActionShift,
     BehaviorSubstitute,
@@ -46,6 +48,24 @@ class RunKey(NamedTuple):
     condition: str = UNDISTURBED.name
     kind: SubstituteKind = "units"
     draw: int = 0
+
+
+def keep_behaviors(config: DriveConfig, names: Sequence[str]) -> DriveConfig:
+    """Return a configuration whose map has only the behaviors of these names; no name keeps all.
+
+    Raises:
+        MapError: The map has no such behavior.
+    """
+    known = config.stimulation_map.behaviors
+    for name in names:
+        if name not in known:
+            raise MapError(
+                f"{config.stimulation_map.source}: no behavior '{name}'; available: {', '.join(known)}"
+            )
+    if not names:
+        return config
+    kept = {name: behavior for name, behavior in known.items() if name in names}
+    return replace(config, stimulation_map=replace(config.stimulation_map, behaviors=kept))
 
 
 @dataclass(frozen=True)

@@ -68,9 +68,14 @@ QUICK_PROTOCOL = ProtocolSettings(draws=4, draw_seeds=2, condition_seeds=3)
 """A look rather than a judgment: with 6 seeds, no p-value is below 1/32."""
 
 
-def choose_protocol(*, quick: bool, hold: int | None) -> ProtocolSettings:
-    """Return the full or the quick protocol, held for as many control steps if it says so."""
+def choose_protocol(*, quick: bool, hold: int | None, controls: bool = True) -> ProtocolSettings:
+    """Return the full or the quick protocol, held for as many control steps if it says so.
+
+    Without controls, neither substitutes nor disturbed worlds are run.
+    """
     settings = QUICK_PROTOCOL if quick else ProtocolSettings()
+    if not controls:
+        settings = replace(settings, draws=0, condition_seeds=0)
     return settings if hold is None else replace(settings, hold_steps=hold)
 
 

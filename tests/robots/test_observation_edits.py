@@ -93,6 +93,35 @@ def test_edits_of_a_legged_robots_motion(name: str) -> None:
     np.testing.assert_allclose(higher, robot.observe(), atol=1e-6)
 
 
+@pytest.mark.parametrize(("name", "joint", "place"), [("anymal", "LF thigh", 1), ("cassie", "left knee", 3)])
+def test_edits_of_a_legged_robots_joints(name: str, joint: str, place: int) -> None:
+    robot, observation = _walked(name)
+    bent = _edit(robot, f"{joint} offset").apply(observation, -0.2)
+    robot.data.qpos[7 + place] -= 0.2
+    np.testing.assert_allclose(bent, robot.observe(), atol=1e-6)
+
+
+@pytest.mark.parametrize(("edit", "axis"), [("roll offset", 0), ("pitch offset", 1)])
+def test_edits_lean_a_legged_robot_as_leaning_it_does(edit: str, axis: int) -> None:
+    robot, observation = _walked("cassie")
+    leaning = _edit(robot, edit).apply(observation, 0.15)
+    w, x, y, z = robot.data.qpos[3:7].copy()
+    c, s = math.cos(0.075), math.sin(0.075)
+    turned = ((c * w - s * x, c * x + s * w, c * y + s * z, c * z - s * y),
+              (c * w - s * y, c * x - s * z, c * y + s * w, c * z + s * x))  # fmt: skip
+    robot.data.qpos[3:7] = turned[axis]
+    gravity = slice(7, 10)
+    np.testing.assert_allclose(leaning[gravity], robot.observe()[gravity], atol=1e-6)
+    assert leaning[10:] == pytest.approx(observation[10:])
+
+
+def test_a_gain_makes_a_legged_robot_see_its_drift_larger() -> None:
+    robot, observation = _walked("cassie")
+    more, up = _edit(robot, "sideways gain"), _edit(robot, "upward offset")
+    assert more.apply(observation, 2.0)[2] == pytest.approx(3.0 * observation[2])
+    assert up.apply(observation, 0.1)[3] - observation[3] == pytest.approx(0.2)  # velocities are doubled
+
+
 def test_edits_of_anymals_commands() -> None:
     robot, observation = _walked("anymal")
     asked = _edit(robot, "yaw rate command").apply(observation, -0.8)

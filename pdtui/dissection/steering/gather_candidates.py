@@ -34,7 +34,7 @@ from pdtui.spectra.matching import UnitDiscrepancies
 
 def fit_edit_directions(robot: Robot, policy: Policy, seed: int) -> dict[str, ObservationEditDirection]:
     """Return the direction in the first layer of each edit that a robot offers, at its smallest size."""
-    edits = robot.observation_edits
+    edits = [one for one in robot.observation_edits if one.dissected]
     observations = sample_walk_observations(robot, policy, seed) if edits else []
     return {
         one.name: fit_edit_direction(policy, observations, edits, {one.name: smallest_tried_edit_size(one)})
@@ -84,8 +84,9 @@ def gather_steering_candidates(
     for probe in probes:
         found += direction_candidates(probe, lengths)
         found += affine_candidates(probe, readings)
-    found += observation_edit_candidates(edits, factors)
-    found += edit_direction_candidates(edits, edit_directions, factors)
+    tried = [one for one in edits if one.dissected]
+    found += observation_edit_candidates(tried, factors)
+    found += edit_direction_candidates(tried, edit_directions, factors)
     drawn = rng.choice(sum(layers), size=min(settings.sources, sum(layers)), replace=False).tolist()
     found += unit_candidates(SteeringMethod.RANDOM_UNIT, None, drawn, values, layers)
     spreads = {probe.layer: probe.layer_spread for probe in probes}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,9 +19,11 @@ from pdtui.robots.legged.observations_and_rewards import (
 from pdtui.robots.observation_edits.observation_edit import (
     ObservationEdit,
     offset_observed_number,
+    scale_observed_number,
     set_observed_number,
 )
 
+_GRAVITY = slice(7, 10)
 _FIRST_COMMAND = 10
 _OBSERVED_COMMANDS = ("forward", "lateral", "yaw rate")
 
@@ -36,27 +39,82 @@ TRUNK_EDITS = (
 )
 
 
-def legged_observation_edits(description: LeggedRobotDescription) -> tuple[ObservationEdit, ...]:
-    """Return the edits of what a policy of a robot observes of its trunk and of its commands."""
+def _roll_trunk(observation: Floats, angle: float) -> Floats:
+    edited, (c, s) = observation.copy(), (math.cos(angle), math.sin(angle))
+    x, y, z = observation[_GRAVITY].tolist()
+    edited[_GRAVITY] = x, c * y + s * z, c * z - s * y
+    return edited
+
+
+def _pitch_trunk(observation: Floats, angle: float) -> Floats:
+    edited, (c, s) = observation.copy(), (math.cos(angle), math.sin(angle))
+    x, y, z = observation[_GRAVITY].tolist()
+    edited[_GRAVITY] = c * x - s * z, y, c * z + s * x
+    return edited
+
+
+BALANCE_EDITS = (
+    scale_observed_number(1, "forward gain", "its forward speed is larger by this share of it"),
+    scale_observed_number(2, "sideways gain", "its speed to the left is larger by this share of it"),
+    offset_observed_number(3, "upward offset", "m/s", "it moves up faster by this much", LINEAR_SCALE),
+    ObservationEdit("roll offset", "rad", "the trunk leans to the right by this much", _roll_trunk),
+    ObservationEdit("pitch offset", "rad", "the trunk leans forward by this much", _pitch_trunk),
+)
+
+
+def legged_observation_edits(
+    description: LeggedRobotDescription, joints: Sequence[str]
+) -> tuple[ObservationEdit, ...]:
+    """Return the edits of what a policy of a robot observes of its trunk, its commands and its joints.
+
+    Args:
+        description: The robot.
+        joints: Names of its joints, in their order.
+    """
     height = (
         TRUNK_EDITS[0] if description.scan is None else _scanned_height_edit(description, description.scan)
     )
     commands = _OBSERVED_COMMANDS[: description.observed_commands]
-    return (height, *TRUNK_EDITS[1:], *command_edits(commands))
+    further = [*BALANCE_EDITS, *_command_offset_edits(commands), *_joint_edits(description, joints)]
+    if description.scan is not None:
+        further.append(_ground_edit(description, description.scan))
+    helping = (replace(one, dissected=False) for one in further)
+    return (height, *TRUNK_EDITS[1:], *command_edits(commands), *helping)
+
+
+def _command_offset_edits(commands: Iterable[str]) -> Iterable[ObservationEdit]:
+    for index, (name, scale) in enumerate(zip(commands, COMMAND_SCALES.tolist(), strict=False)):
+        unit = "rad/s" if name == "yaw rate" else "m/s"
+        says = f"its {name} command is larger by this much"
+        yield offset_observed_number(
+            _FIRST_COMMAND + index, f"{name} command offset", unit, says, float(scale)
+        )
+
+
+def _joint_edits(description: LeggedRobotDescription, joints: Sequence[str]) -> Iterable[ObservationEdit]:
+    first = _FIRST_COMMAND + description.observed_commands
+    for index, joint in enumerate(joints):
+        says = "its angle is larger by this much"
+        yield offset_observed_number(first + index, f"{joint} offset", "rad", says)
 
 
 def _scanned_height_edit(description: LeggedRobotDescription, scan: HeightScan) -> ObservationEdit:
     """Return the edit "height offset" where the distance to points of the ground is observed as well."""
+    lower_ground, plain = _ground_edit(description, scan), TRUNK_EDITS[0]
+    return replace(
+        plain, apply=lambda observation, offset: lower_ground.apply(plain.apply(observation, offset), offset)
+    )
+
+
+def _ground_edit(description: LeggedRobotDescription, scan: HeightScan) -> ObservationEdit:
     first, largest = description.observations - scan.count**2, scan.scale * MAX_SCANNED
 
-    def lift(observation: Floats, offset: float) -> Floats:
+    def lower(observation: Floats, offset: float) -> Floats:
         edited = observation.copy()
-        edited[0] += offset
         edited[first:] = np.clip(edited[first:] + scan.scale * offset, -largest, largest)
         return edited
 
-    plain = TRUNK_EDITS[0]
-    return replace(plain, apply=lift)
+    return ObservationEdit("ground offset", "m", "the scanned ground is lower by this much", lower)
 
 
 def command_edits(commands: Iterable[str]) -> tuple[ObservationEdit, ...]:

@@ -80,7 +80,7 @@ class LeggedRobot(MujocoRobot):
         self.action_space = spaces.Box(-one.max_action, one.max_action, (joints,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (one.observations,), np.float64)
         self._reader = LeggedStateReader(self.model, one)
-        self.observation_edits = legged_observation_edits(one)
+        self.observation_edits = legged_observation_edits(one, self.joint_names())
         self._turn = "heading" if one.heading_gain else "yaw rate"
         self._command = np.array([self.commands.get(name, 0.0) for name in self.command_names])
         self._terrain_seed = np.zeros(2)

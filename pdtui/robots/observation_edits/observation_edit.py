@@ -20,6 +20,8 @@ class ObservationEdit:
         apply: Returns the edited observation, given the observation and the size; it copies.
         period: Size that makes no difference to the observation, 2π rad for an angle; 4π rad where the
             angle turns a quaternion, whose sign changes with every whole turn. 0 if there is none.
+        dissected: Whether a dissection tries it; false for edits that help others and steer little alone,
+            of which a robot may have many.
     """
 
     name: str
@@ -27,6 +29,7 @@ class ObservationEdit:
     says: str
     apply: Callable[[Floats, float], Floats]
     period: float = 0.0
+    dissected: bool = True
 
     def wrap_size(self, size: float) -> float:
         """Return the size nearest to 0 that gives the same observation."""
@@ -55,3 +58,14 @@ def offset_observed_number(
         return edited
 
     return ObservationEdit(name, unit, says, apply)
+
+
+def scale_observed_number(index: int, name: str, says: str) -> ObservationEdit:
+    """Return an edit that multiplies one number of the observation by 1 + size."""
+
+    def apply(observation: Floats, size: float) -> Floats:
+        edited = observation.copy()
+        edited[index] *= 1.0 + size
+        return edited
+
+    return ObservationEdit(name, "", says, apply)
