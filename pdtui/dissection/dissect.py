@@ -24,6 +24,7 @@ from pdtui.dissection.steering.linear_probes import fit_linear_probes
 from pdtui.dissection.steering.steering_comparison import compare_steering
 from pdtui.policies.runtime.live_network import policy_from_network
 from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.weights.import_options import NO_OPTIONS
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.probing.rollout_pool import RolloutPool
@@ -70,7 +71,9 @@ def dissect(config: DissectionConfig) -> Dissection:
         robot, network, journal = pool.robot, pool.policy, None
         if config.journal is not None:
             # What the outcome of a roll-out depends on besides its start and plan.
-            options = [dict(robot.build_options)] if robot.build_options else []
+            options: list[object] = [dict(robot.build_options)] if robot.build_options else []
+            if config.import_options != NO_OPTIONS:
+                options.append(config.import_options.identify())
             identity = json.dumps([robot.name, network.sha256, collect_versions(), *options])
             journal = stack.enter_context(RolloutJournal(config.journal, identity))
         prober = EffectProbe(pool, journal)

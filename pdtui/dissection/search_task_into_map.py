@@ -118,7 +118,11 @@ def search_task_into_map(
         if known is not None:
             known.check(robot.name, layers, pool.policy.sha256)
         begin = [] if known is None else _known_plans(known, task, pool)
-        kept = None if journal is None else open_verdict_journal(journal, pool.robot, pool.policy)
+        kept = (
+            None
+            if journal is None
+            else open_verdict_journal(journal, pool.robot, pool.policy, import_options)
+        )
         search = TaskSearch(pool, goal, seed, settings, begin, journal=kept)
         result = search.run(SharedTimeBudget(minutes).share(), progress)
         named, named_options = relative_policy_name(policy, import_options, output)

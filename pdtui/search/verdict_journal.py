@@ -9,6 +9,7 @@ from typing import Any
 
 from pdtui.core.processes.result_journal import JobJournal, ResultJournal
 from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.robots.robot import Robot
 from pdtui.robots.simulators.python_state import digest_values
 from pdtui.robots.task import TaskVerdict
@@ -20,16 +21,20 @@ TaskJob = tuple[str, tuple[StimulationWithDuration, ...], int, bool]
 VerdictJournal = JobJournal[TaskJob, list[TaskVerdict]]
 
 
-def open_verdict_journal(path: Path, robot: Robot, policy: Policy) -> VerdictJournal:
+def open_verdict_journal(
+    path: Path, robot: Robot, policy: Policy, import_options: ImportOptions
+) -> VerdictJournal:
     """Open a file of verdicts, one JSON object per line.
 
-    A verdict is determined by the robot with its options, the policy, the versions of everything that
-    computes, and the plans that are judged together.
+    A verdict is determined by the robot with its options, the weights and how they are read, the versions of
+    everything that computes, and the plans that are judged together.
 
     Raises:
         PdtuiError: The file cannot be read or written, or holds something else.
     """
-    identity = digest_values(robot.name, dict(robot.build_options), policy.sha256, collect_versions())
+    identity = digest_values(
+        robot.name, dict(robot.build_options), policy.sha256, import_options.identify(), collect_versions()
+    )
     results = ResultJournal(path, _encode, _decode, "the verdicts on some plans")
     return JobJournal(results, lambda job: f"{job[0]} {job[2]} {digest_values(identity, job):016x}")
 

@@ -13,8 +13,12 @@ import pytest
 from pdtui.core.errors import PdtuiError
 from pdtui.core.processes.process_start import start_process
 from pdtui.dissection.search_task_into_map import WrittenBehavior, search_task_into_map
+from pdtui.policies.runtime.policy import Policy
+from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.robots import RobotSpec
+from pdtui.robots.robot_registry import open_robot
 from pdtui.search.task_search_settings import QUICK_TASK_SEARCH
+from pdtui.search.verdict_journal import TaskJob, open_verdict_journal
 
 SETTINGS = replace(
     QUICK_TASK_SEARCH,
@@ -77,3 +81,20 @@ def test_a_file_that_is_no_journal_is_named_and_kept(tmp_path: Path) -> None:
     with pytest.raises(PdtuiError, match="notes.txt: line 1: expected the verdicts on some plans"):
         _pursue(tmp_path / "jump.toml", path)
     assert path.read_text() == "my notes\n"
+
+
+def test_verdicts_are_not_those_of_weights_that_are_read_otherwise(tmp_path: Path, policy: Policy) -> None:
+    path, statistics = tmp_path / "verdicts.jsonl", tmp_path / "statistics.npz"
+    job: TaskJob = ("stop", (), 1000, True)
+    statistics.write_bytes(b"one")
+    relu = ImportOptions(activation="relu", normalizer=str(statistics))
+    with open_robot("ant") as robot:
+        journal = open_verdict_journal(path, robot, policy, relu)
+        journal.results.keep(journal.key(job), [])
+        again = open_verdict_journal(path, robot, policy, relu)
+        assert again.results.find(again.key(job)) == []
+        tanh = open_verdict_journal(path, robot, policy, replace(relu, activation="tanh"))
+        assert tanh.results.find(tanh.key(job)) is None
+        statistics.write_bytes(b"other")
+        changed = open_verdict_journal(path, robot, policy, relu)
+        assert changed.results.find(changed.key(job)) is None

@@ -30,8 +30,9 @@ RunResult = HeldRunTrace | InterventionMeasurement | TaskRunResult
 class RunJournal:
     """Keeps what was found in each run of an evaluation.
 
-    A run is determined by the robot with its options, the weights and the map's text, the versions of
-    everything that computes, and its plan. What is asked for a second time is read instead of driven.
+    A run is determined by the robot with its options, the weights and how they are read, the map's text, the
+    versions of everything that computes, and its plan. What is asked for a second time is read instead of
+    driven.
 
     Args:
         path: The file; None keeps nothing.
@@ -45,7 +46,12 @@ class RunJournal:
         self._results: ResultJournal[Any] = ResultJournal(path, _encode, _decode, "the result of a run")
         robot, policy = loop.robot, loop.policy
         self._identity = digest_values(
-            robot.name, dict(robot.build_options), policy.sha256, loop.map.text, collect_versions()
+            robot.name,
+            dict(robot.build_options),
+            policy.sha256,
+            loop.map.import_options.identify(),
+            loop.map.text,
+            collect_versions(),
         )
 
     def of(self, function: Callable[[ControlLoop, Job], Result]) -> JobJournal[Job, Result]:

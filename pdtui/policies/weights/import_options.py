@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import astuple, dataclass
+from pathlib import Path
 from typing import Any
 
 from pdtui.core.errors import PolicyError
+from pdtui.policies.weights.weights_header import hash_file
 
 ACTIVATION_NAMES = ("tanh", "relu", "elu", "gelu", "silu", "leaky_relu", "selu", "sigmoid", "softplus")
 SQUASH_NAMES = ("none", "tanh", "clip")
@@ -41,6 +43,16 @@ class ImportOptions:
         """Return these options, completed by the others where these are empty."""
         pairs = zip(astuple(self), astuple(others), strict=True)
         return ImportOptions(*(own or other for own, other in pairs))
+
+    def identify(self) -> tuple[str, str, str]:
+        """Return what makes two readings of one weights file differ, with the hash of the normalizer's file.
+
+        Raises:
+            PolicyError: That file cannot be read.
+        """
+        statistics = Path(self.normalizer)
+        found = self.normalizer and statistics.is_file()
+        return self.activation, self.squash, hash_file(statistics) if found else self.normalizer
 
 
 NO_OPTIONS = ImportOptions()
