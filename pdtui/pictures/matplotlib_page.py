@@ -66,10 +66,6 @@ def open_figure_page(target: Path | BytesIO, height: float, title: str) -> Itera
         FigureCanvasAgg(figure)
         figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
         yield figure
-        # Saving a figure with a layout draws it twice, once for the layout alone.
-        if (layout := figure.get_layout_engine()) is not None:
-            layout.execute(figure)
-            figure.set_layout_engine("none")
         with (
             nullcontext(target) if isinstance(target, BytesIO) else replace_file(target, PictureError) as file
         ):

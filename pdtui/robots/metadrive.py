@@ -18,6 +18,13 @@ from pdtui.core.processes.worker_pool import WorkerProcess
 from pdtui.core.robot_links_and_state import Link, ManualControl, RobotState
 from pdtui.core.scenery import Traffic
 from pdtui.robots.environments.action_log import ActionLog
+from pdtui.robots.road.car_observation_edits import (
+    CAR_OBSERVATION_EDITS,
+    SPEED_OFFSET,
+    SPEED_SCALE,
+    WIDEST_LANE,
+    WIDEST_ROAD,
+)
 from pdtui.robots.road.car_tasks import CAR_GOALS, CAR_TASKS
 from pdtui.robots.road.metadrive_repairs import LIDAR_RANGE, OBSERVATIONS
 from pdtui.robots.road.road_scenes import SCENE_STARTS
@@ -26,8 +33,6 @@ from pdtui.robots.robot import ResetResult, Robot, StepResult
 from pdtui.robots.training_recipe import TrainingRecipe
 
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
-# Widest road and widest lane that MetaDrive divides distances by, m.
-_ROAD_WIDTH, _LANE_WIDTH = 18.0, 4.5
 # What `restore` is off by where the engine is kept: at most 1.2e-4 within 120 steps after one start on an
 # empty road. Other starts, and traffic, were not measured.
 _NEAR = 2e-4
@@ -55,6 +60,7 @@ class MetaDrive(Robot):
     starts = SCENE_STARTS
     goals = CAR_GOALS
     tasks = CAR_TASKS
+    observation_edits = CAR_OBSERVATION_EDITS
     # Terminals repeat a key that is held, which then outruns the steering's way back.
     manual_controls = (
         ManualControl("steering", 0, "sideways", step=0.1, return_rate=0.5),
@@ -94,10 +100,10 @@ class MetaDrive(Robot):
         },
     )
     attributes = (
-        Attribute("speed", "m/s", 3.6 / 81.0, offset=1.0 / 81.0),
-        Attribute("lane offset", "m", -1.0 / _LANE_WIDTH, offset=0.5),
-        Attribute("left distance", "m", 1.0 / _ROAD_WIDTH),
-        Attribute("right distance", "m", 1.0 / _ROAD_WIDTH),
+        Attribute("speed", "m/s", SPEED_SCALE, offset=SPEED_OFFSET),
+        Attribute("lane offset", "m", -1.0 / WIDEST_LANE, offset=0.5),
+        Attribute("left distance", "m", 1.0 / WIDEST_ROAD),
+        Attribute("right distance", "m", 1.0 / WIDEST_ROAD),
         Attribute("heading", "rad", -0.5, offset=0.5),
         Attribute("yaw rate", "rad/s"),
         Attribute("steering", "", 0.5, offset=0.5),

@@ -216,6 +216,10 @@ magnitudes = {{ "0:3" = 9.5, "1:7" = -9.5 }}
     known = Stimulation((3, 15), (9.5, -9.5))
     effort = replace(
         SMALL,
+        screen_steps=4,
+        refine_steps=4,
+        held_steps=4,
+        mover_steps=3,
         behavior_search=replace(
             SMALL.behavior_search, random_sets=1, single_units=0, children=8, promoted=8, elite=8
         ),

@@ -11,6 +11,7 @@ from pdtui.api import dissect
 from pdtui.core.errors import RobotError
 from pdtui.core.outcome import Outcome
 from pdtui.core.units import Stimulation
+from pdtui.dissection.dissection_result import Dissection
 from pdtui.probing.effect_probe import EffectProbe
 from pdtui.probing.rollout_journal import RolloutJournal
 from pdtui.probing.rollout_pool import RolloutPool
@@ -23,7 +24,9 @@ class InterruptedHereError(Exception):
     pass
 
 
-def test_an_interrupted_dissection_goes_on_without_loss(policy_file: Path, tmp_path: Path) -> None:
+def test_an_interrupted_dissection_goes_on_without_loss(
+    policy_file: Path, dissection: Dissection, tmp_path: Path
+) -> None:
     def interrupt(stage: str, done: int, of: int) -> None:
         if stage == "refine the best" and done > of // 2:
             raise InterruptedHereError
@@ -34,7 +37,7 @@ def test_an_interrupted_dissection_goes_on_without_loss(policy_file: Path, tmp_p
         quick(journal=journal, progress=interrupt)
     with RolloutJournal(journal, "") as left:
         assert len(left) > 16 * len(SMALL.screen_values) * SMALL.screen_starts
-    resumed, straight = quick(journal=journal), quick()
+    resumed, straight = quick(journal=journal), dissection
     assert resumed.behaviors == straight.behaviors
     assert resumed.controllers == straight.controllers
     assert (resumed.rollouts, resumed.control_steps) == (straight.rollouts, straight.control_steps)

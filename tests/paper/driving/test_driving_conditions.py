@@ -10,9 +10,10 @@ import pytest
 from pdtui.core.errors import MapError, PdtuiError
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.paper.driving.driving_conditions import evaluate_driving
-from pdtui.paper.driving.key_effects import driving_behaviors
+from pdtui.paper.driving.key_effects import TASKS, driving_behaviors
 from pdtui.paper.driving_experiment import POLICIES, list_compared
-from pdtui.stimulation.map_reader import parse_map
+from pdtui.stimulation.map_library import find_map
+from pdtui.stimulation.map_reader import load_map, parse_map
 
 MAP = """
 schema = 1
@@ -61,3 +62,8 @@ def test_what_the_operator_needs_is_named() -> None:
         driving_behaviors(OWN.stimulation_map)
     with pytest.raises(PdtuiError, match="test-0 to test-19, found 'traffic'"):
         evaluate_driving([OWN], scenes=["test-1", "traffic"])
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_every_shipped_policy_has_the_keys_that_the_operator_needs(policy: str) -> None:
+    assert tuple(driving_behaviors(load_map(find_map(policy)))) == TASKS
