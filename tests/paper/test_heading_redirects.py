@@ -14,7 +14,7 @@ from pdtui.paper.heading_redirects import measure_heading_redirects
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map
 
-SEED = 1601
+SEED = 1800
 
 
 def test_cassie_is_redirected_to_either_side_and_back() -> None:
