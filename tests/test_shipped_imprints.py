@@ -126,7 +126,7 @@ def test_cassie_ducks_and_walks_on() -> None:
     assert drive["forward"][-100:].mean() > 0.8
 
 
-def test_cassie_halts_and_stays_there() -> None:
+def test_cassie_stays_in_place() -> None:
     drive = pdtui.drive("cassie", keys={100: "z"}, steps=700, seed=SEED)
     assert not drive.endings
     places = np.cumsum(np.stack([drive["vx"], drive["vy"]]) * 0.02, axis=1)

@@ -216,11 +216,11 @@ def evaluate_command(
     elif let_go:
         print_key_releases(config, seeds, hold, workers, journal, as_json)
     else:
-        from pdtui.evaluation.evaluation_plan import keep_behaviors
+        from pdtui.evaluation.evaluation_plan import select_behaviors
         from pdtui.evaluation.protocol_settings import QUICK_SEEDS, choose_protocol
 
         settings = choose_protocol(quick=quick, hold=hold, controls=not without_controls)
-        config, drawn = keep_behaviors(config, behaviors), (strip, overwrite) if strip else None
+        config, drawn = select_behaviors(config, behaviors), (strip, overwrite) if strip else None
         seeds = seeds[:QUICK_SEEDS] if quick else seeds
         print_behaviors(
             config,

@@ -50,7 +50,7 @@ class RunKey(NamedTuple):
     draw: int = 0
 
 
-def keep_behaviors(config: DriveConfig, names: Sequence[str]) -> DriveConfig:
+def select_behaviors(config: DriveConfig, names: Sequence[str]) -> DriveConfig:
     """Return a configuration whose map has only the behaviors of these names; no name keeps all.
 
     Raises:

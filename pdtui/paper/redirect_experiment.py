@@ -13,7 +13,7 @@ def run_redirect_experiment(request: ExperimentRequest) -> ExperimentReport:
     Raises:
         PdtuiError: as `measure_heading_redirects`.
     """
-    from pdtui.paper.heading_redirects import heading_redirect_table, measure_heading_redirects
+    from pdtui.paper.heading_redirect_measurement import heading_redirect_table, measure_heading_redirects
 
     (config,) = request.configs
     result = measure_heading_redirects(config, request.seeds, progress=request.progress)

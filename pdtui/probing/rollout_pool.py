@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from pdtui.core.closable import Closable
 from pdtui.core.cluster.ray_cluster import RayCluster, Workers
-from pdtui.core.processes.result_journal import JobJournal
+from pdtui.core.processes.result_journal import KeyedResultJournal
 from pdtui.core.processes.worker_pool import StepProgress, WorkerPool
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.runtime.policy_compatibility import check_policy_fit
@@ -176,7 +176,7 @@ class RolloutPool(Closable):
         function: Callable[[Robot, Policy, WorkItem], WorkResult],
         items: Sequence[WorkItem],
         progress: StepProgress | None = None,
-        journal: JobJournal[WorkItem, WorkResult] | None = None,
+        journal: KeyedResultJournal[WorkItem, WorkResult] | None = None,
     ) -> list[WorkResult]:
         """Call a function with robot, policy and each item, and return the results in order.
 

@@ -14,7 +14,7 @@ from pdtui.core.attributes import Floats
 from pdtui.core.outcome import Outcome, fall_info
 from pdtui.core.robot_links_and_state import Foot
 from pdtui.robots.geometry import roll_pitch_yaw
-from pdtui.robots.observation_edits.heading_edit import make_canonical, quaternion_heading_edits
+from pdtui.robots.observation_edits.heading_edit import canonicalize_quaternion, quaternion_heading_edits
 from pdtui.robots.observation_edits.observation_edit import offset_observed_number
 from pdtui.robots.robot import RewardlessStepResult
 from pdtui.robots.simulators.joint_and_trunk_attributes import TRUNK_ATTRIBUTES, torque_attributes
@@ -76,7 +76,7 @@ class Ant(MujocoRobot, AntEnv):
     def observe(self) -> Floats:
         observation = np.asarray(self._get_obs())
         if self._canonical:
-            make_canonical(observation, _QUATERNION)
+            canonicalize_quaternion(observation, _QUATERNION)
         return observation
 
     def step(self, action: NDArray[np.float32]) -> tuple[Floats, Any, bool, bool, dict[str, Any]]:

@@ -21,7 +21,7 @@ from pdtui.search.onsets.onset_search import search_onset
 from pdtui.search.stimulation_sampler import CROSSED, StimulationSampler
 from pdtui.search.task_rollout import StimulationWithDuration, judge_stimulations
 from pdtui.search.task_search_settings import TaskSearchSettings
-from pdtui.search.verdict_journal import TaskJob, VerdictJournal
+from pdtui.search.verdict_journal import PlanJudgingJob, VerdictJournal
 from pdtui.stimulation.seed_ranges import JUDGING_SEEDS, require_search_seeds
 
 _SEEDS_APART = 1000
@@ -240,7 +240,7 @@ class TaskSearch:
         return rows
 
 
-def judge_task_plans(robot: Robot, policy: Policy, job: TaskJob) -> list[TaskVerdict]:
+def judge_task_plans(robot: Robot, policy: Policy, job: PlanJudgingJob) -> list[TaskVerdict]:
     """Judge plans in a worker process; tasks hold functions, so they travel by name."""
     name, plans, seed, one_by_one = job
     return judge_stimulations(robot, policy, robot.find_task(name), plans, seed, one_by_one)

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from pdtui.core.processes.result_journal import JobJournal, ResultJournal
+from pdtui.core.processes.result_journal import KeyedResultJournal, ResultJournal
 from pdtui.policies.runtime.policy import Policy
 from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.robots.robot import Robot
@@ -16,9 +16,9 @@ from pdtui.robots.task import TaskVerdict
 from pdtui.search.task_rollout import StimulationWithDuration
 from pdtui.sessions.environment_versions import collect_versions
 
-TaskJob = tuple[str, tuple[StimulationWithDuration, ...], int, bool]
+PlanJudgingJob = tuple[str, tuple[StimulationWithDuration, ...], int, bool]
 """Name of the task, plans, seed of the walk before them, and whether they run one by one."""
-VerdictJournal = JobJournal[TaskJob, list[TaskVerdict]]
+VerdictJournal = KeyedResultJournal[PlanJudgingJob, list[TaskVerdict]]
 
 
 def open_verdict_journal(
@@ -36,7 +36,7 @@ def open_verdict_journal(
         robot.name, dict(robot.build_options), policy.sha256, import_options.identify(), collect_versions()
     )
     results = ResultJournal(path, _encode, _decode, "the verdicts on some plans")
-    return JobJournal(results, lambda job: f"{job[0]} {job[2]} {digest_values(identity, job):016x}")
+    return KeyedResultJournal(results, lambda job: f"{job[0]} {job[2]} {digest_values(identity, job):016x}")
 
 
 def _encode(verdicts: list[TaskVerdict]) -> dict[str, Any]:

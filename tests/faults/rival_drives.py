@@ -14,7 +14,7 @@ from pathlib import Path
 
 from pdtui.sessions.session_integrity import examine_session
 from pdtui.sessions.session_reader import read_session
-from tests.faults import rival_process
+from tests.faults import timed_command_server
 from tests.faults.fault_bench import ROOT, FaultBench
 from tests.faults.fault_tally import FalseReport, FaultTally, StepsLost
 
@@ -47,7 +47,7 @@ class _Rivals:
         self._bench = bench
         self._children = [
             subprocess.Popen(
-                [sys.executable, "-m", rival_process.__name__],
+                [sys.executable, "-m", timed_command_server.__name__],
                 env=bench.environment,
                 cwd=ROOT,
                 text=True,

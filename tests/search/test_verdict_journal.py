@@ -18,7 +18,7 @@ from pdtui.policies.weights.import_options import ImportOptions
 from pdtui.robots import RobotSpec
 from pdtui.robots.robot_registry import open_robot
 from pdtui.search.task_search_settings import QUICK_TASK_SEARCH
-from pdtui.search.verdict_journal import TaskJob, open_verdict_journal
+from pdtui.search.verdict_journal import PlanJudgingJob, open_verdict_journal
 
 SETTINGS = replace(
     QUICK_TASK_SEARCH,
@@ -85,7 +85,7 @@ def test_a_file_that_is_no_journal_is_named_and_kept(tmp_path: Path) -> None:
 
 def test_verdicts_are_not_those_of_weights_that_are_read_otherwise(tmp_path: Path, policy: Policy) -> None:
     path, statistics = tmp_path / "verdicts.jsonl", tmp_path / "statistics.npz"
-    job: TaskJob = ("stop", (), 1000, True)
+    job: PlanJudgingJob = ("stop", (), 1000, True)
     statistics.write_bytes(b"one")
     relu = ImportOptions(activation="relu", normalizer=str(statistics))
     with open_robot("ant") as robot:

@@ -99,7 +99,7 @@ class ResultJournal(Generic[Result]):
 
 
 @dataclass(frozen=True)
-class JobJournal(Generic[Job, Result]):
+class KeyedResultJournal(Generic[Job, Result]):
     """A journal of jobs whose keys follow from the jobs.
 
     Attributes:
@@ -114,7 +114,7 @@ class JobJournal(Generic[Job, Result]):
 def map_missing(
     as_completed: Callable[[Sequence[Job]], Iterator[tuple[int, Result]]],
     jobs: Sequence[Job],
-    journal: JobJournal[Job, Result] | None = None,
+    journal: KeyedResultJournal[Job, Result] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Result]:
     """Run the jobs whose results a journal does not hold, add these to it, and return all in order.

@@ -21,7 +21,7 @@ from pdtui.core.cluster.ray_cluster import RayCluster, Workers
 from pdtui.core.errors import WorkerError, format_error_in_one_line
 from pdtui.core.processes.call_answer import CallAnswer, answer_call, take_answer
 from pdtui.core.processes.process_start import start_process
-from pdtui.core.processes.result_journal import Job, JobJournal, Result, map_missing
+from pdtui.core.processes.result_journal import Job, KeyedResultJournal, Result, map_missing
 
 State = TypeVar("State")
 StepProgress = Callable[[int, int], None]
@@ -115,7 +115,7 @@ class WorkerPool(Closable, Generic[State]):
         function: Callable[[State, Job], Result],
         jobs: Sequence[Job],
         progress: StepProgress | None = None,
-        journal: JobJournal[Job, Result] | None = None,
+        journal: KeyedResultJournal[Job, Result] | None = None,
     ) -> list[Result]:
         """Run all jobs and return their results in the order of the jobs; `WorkerError` if a worker dies.
 

@@ -10,7 +10,7 @@ from typing import Any
 from pdtui.core.outcome import Outcome
 from pdtui.core.processes.result_journal import (
     Job,
-    JobJournal,
+    KeyedResultJournal,
     Result,
     ResultJournal,
     decode_array,
@@ -54,9 +54,9 @@ class RunJournal:
             collect_versions(),
         )
 
-    def of(self, function: Callable[[ControlLoop, Job], Result]) -> JobJournal[Job, Result]:
+    def of(self, function: Callable[[ControlLoop, Job], Result]) -> KeyedResultJournal[Job, Result]:
         """Return the journal of the runs that a function does."""
-        return JobJournal(
+        return KeyedResultJournal(
             self._results, lambda job: f"{function.__name__} {digest_values(self._identity, job):016x}"
         )
 

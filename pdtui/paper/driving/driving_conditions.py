@@ -32,6 +32,7 @@ from pdtui.paper.driving.driving_results import (
     compare_involvement,
     summarize_row,
 )
+from pdtui.paper.driving.driving_score_journal import DrivingScoreJournal, open_driving_score_journal
 from pdtui.paper.driving.key_effects import (
     MEASURING_SEEDS,
     STRAIGHT,
@@ -40,7 +41,6 @@ from pdtui.paper.driving.key_effects import (
     measure_key_effects,
 )
 from pdtui.paper.driving.operator_memory import sample_judgment_errors
-from pdtui.paper.driving.score_journal import ScoreJournal, open_score_journal
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import robot_file_stem
 from pdtui.robots.robot import Robot
@@ -86,7 +86,7 @@ def evaluate_driving(
     read = [read_episode(path, robot) for path in sessions]
     if record is not None and (present := sorted(record.glob("*.rrd"))):
         raise SessionError(f"{present[0]}: already exists; drives are recorded into a new folder")
-    kept, missing = open_score_journal(journal), dict(left_out or {})
+    kept, missing = open_driving_score_journal(journal), dict(left_out or {})
     effects: dict[str, KeyEffects] = {}
     rows: list[DrivingRow] = []
     sent = {_name(config): send_drive_files(workers, config) for config in configs}
@@ -189,7 +189,7 @@ def _run_jobs(
     pool: WorkerPool[_Car],
     jobs: Sequence[_DriveJob],
     sent: Mapping[str, DriveConfig],
-    kept: ScoreJournal,
+    kept: DrivingScoreJournal,
     progress: StepProgress | None,
 ) -> dict[str, DrivingScore]:
     scores = {job.key: score for job in jobs if (score := kept.find(job.key)) is not None}

@@ -18,7 +18,7 @@ from pdtui.robots.geometry import roll_pitch_yaw
 from pdtui.robots.observation_edits.observation_edit import ObservationEdit
 
 
-def make_canonical(observation: Floats, quaternion: int) -> None:
+def canonicalize_quaternion(observation: Floats, quaternion: int) -> None:
     """Negate the quaternion w x y z at an index of an observation if its w is negative, in place."""
     if observation[quaternion] < 0.0:
         observation[quaternion : quaternion + 4] *= -1.0
@@ -44,13 +44,13 @@ def quaternion_heading_edits(
         vx, vy = observation[velocity : velocity + 2].tolist()
         edited[velocity : velocity + 2] = _rotate(vx, vy, angle)
         if canonical:
-            make_canonical(edited, quaternion)
+            canonicalize_quaternion(edited, quaternion)
         return edited
 
     def face(observation: Floats, heading: float) -> Floats:
         *_, yaw = roll_pitch_yaw(*observation[quaternion : quaternion + 4].tolist())
         edited = turn(observation, heading - yaw)
-        make_canonical(edited, quaternion)  # however often the robot has turned
+        canonicalize_quaternion(edited, quaternion)  # however often the robot has turned
         return edited
 
     return _name_edits(face, turn, (2.0 if canonical else 4.0) * math.pi)

@@ -13,12 +13,12 @@ from pdtui.core.console.text_tables import format_mean_with_interval, format_p_v
 from pdtui.core.errors import StudyError
 from pdtui.pictures.rerun_report_file import rows_to_markdown
 from pdtui.pictures.studies.compared_means import ComparedMean, ComparisonPanel, draw_compared_means
-from pdtui.study.matching.policy_scores import (
+from pdtui.study.matching.steerability_scores import (
     SCORE_SENTENCE,
-    describe_best_policies,
+    describe_best_and_shipped,
     score_headers,
-    score_policies,
     score_rows,
+    score_steerability,
 )
 from pdtui.study.matching.study_data import MatchingStudyData, PolicyFacts
 from pdtui.study.matching.study_statistics import MEASURES, PolicyMeans, StudyAnswer, StudyResult, TestedMean
@@ -105,7 +105,7 @@ def compose_study_page(data: MatchingStudyData, result: StudyResult) -> str:
     one = len(left_out) == 1
     more = "One more was trained, but does" if one else f"{len(left_out)} more were trained, but do"
     dropped = f" {more} not walk by the rule of the plan." if left_out else ""
-    scores = score_policies(data)
+    scores = score_steerability(data)
     best, settings = plan.settings.best, plan.settings
     listed = ["policy", "net speed", "return", "episodes failed", "units", "roll-outs", "in the study"]
     return _TEMPLATE.read_text().format(
@@ -125,7 +125,7 @@ def compose_study_page(data: MatchingStudyData, result: StudyResult) -> str:
         settings=_group_table(data, result, lambda one: one.setting),
         policies=rows_to_markdown(listed, [_policy_row(one) for one in data.policies]),
         score_sentence=SCORE_SENTENCE,
-        best_policies=describe_best_policies(scores) or "No robot has several policies.",
+        best_policies=describe_best_and_shipped(scores) or "No robot has several policies.",
         scores=rows_to_markdown(score_headers(), score_rows(scores)),
         value=f"{max(settings.values):g}",
         choosing=settings.choosing_seed,

@@ -11,12 +11,12 @@ from rich.table import Table
 
 from pdtui.core.console.text_tables import new_table
 from pdtui.study.matching.matching_study_plan import StudiedPolicy
-from pdtui.study.matching.policy_scores import (
+from pdtui.study.matching.steerability_scores import (
     SCORE_SENTENCE,
-    describe_best_policies,
+    describe_best_and_shipped,
     score_headers,
-    score_policies,
     score_rows,
+    score_steerability,
 )
 from pdtui.study.matching.study_data import MatchingStudyData
 from pdtui.study.matching.study_page import answer_in_one_sentence, variant_headers, variant_rows
@@ -37,7 +37,7 @@ class StudySummary:
 
     def tables(self) -> Group:
         """Return the table of the variants, and that of the scores where a robot has several policies."""
-        scores = score_policies(self.data)
+        scores = score_steerability(self.data)
         if not scores:
             return Group(self._variant_table())
         # The page has the attributes, too, for which a terminal has no room.
@@ -46,7 +46,7 @@ class StudySummary:
         table = new_table("Walking and steering", *(headers[column] for column in shown))
         for row in score_rows(scores):
             table.add_row(*(row[column] for column in shown))
-        table.caption = f"{SCORE_SENTENCE} {describe_best_policies(scores).replace('`', '')}"
+        table.caption = f"{SCORE_SENTENCE} {describe_best_and_shipped(scores).replace('`', '')}"
         return Group(self._variant_table(), table)
 
     def _variant_table(self) -> Table:
@@ -73,7 +73,7 @@ class StudySummary:
             **{name: asdict(getattr(result, name)) for name in references},
             "scores": [
                 {**asdict(one), "policy": one.policy.name, "robot": one.policy.robot, "score": one.score}
-                for one in score_policies(self.data)
+                for one in score_steerability(self.data)
             ],
             "figures": [
                 {**asdict(one), "variants": dict(zip(result.variants, one.variants.tolist(), strict=True))}

@@ -11,7 +11,7 @@ import pytest
 
 from pdtui.core.errors import PdtuiError
 from pdtui.core.processes.result_journal import (
-    JobJournal,
+    KeyedResultJournal,
     ResultJournal,
     decode_array,
     encode_array,
@@ -40,7 +40,7 @@ def test_only_what_is_missing_is_run_and_the_order_is_that_of_the_jobs(tmp_path:
     told: list[tuple[int, int]] = []
     path = tmp_path / "new" / "roots.jsonl"
     for jobs in ((2, 3), (3, 5, 2, 7)):
-        journal = JobJournal(_open(path), _key)
+        journal = KeyedResultJournal(_open(path), _key)
         found = map_missing(run, jobs, journal, lambda done, of: told.append((done, of)))
         assert found == [job**0.5 for job in jobs]
     assert ran == [3, 2, 7, 5]

@@ -20,7 +20,7 @@ from pdtui.paper.driving.driving_results import (
     driving_table,
     summarize_row,
 )
-from pdtui.paper.driving.score_journal import open_score_journal
+from pdtui.paper.driving.driving_score_journal import open_driving_score_journal
 
 OUTCOMES = [
     Outcome(word) for word in ("arrived", "arrived", "left the road", "out of time", "arrived", "crashed")
@@ -110,16 +110,16 @@ def test_the_table_says_what_was_driven_and_what_was_not() -> None:
 
 def test_a_journal_returns_what_it_kept_and_survives_an_interruption(tmp_path: Path) -> None:
     path = tmp_path / "drives.jsonl"
-    journal = open_score_journal(path)
+    journal = open_driving_score_journal(path)
     for number in range(3):
         journal.keep(f"drive {number}", KEYS[0][number])
     with path.open("a") as file:
         file.write('{"drive": "drive 3", "scene": "te')
-    again = open_score_journal(path)
+    again = open_driving_score_journal(path)
     assert [again.find(f"drive {number}") for number in range(4)] == [*KEYS[0][:3], None]
     again.keep("drive 3", KEYS[0][3])
-    assert open_score_journal(path).find("drive 3") == KEYS[0][3]
+    assert open_driving_score_journal(path).find("drive 3") == KEYS[0][3]
     path.write_text("no score\n" + path.read_text())
     with pytest.raises(PdtuiError, match="line 1: expected the score of a drive"):
-        open_score_journal(path)
-    assert open_score_journal(None).find("drive 0") is None
+        open_driving_score_journal(path)
+    assert open_driving_score_journal(None).find("drive 0") is None

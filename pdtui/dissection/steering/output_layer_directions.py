@@ -43,7 +43,7 @@ def find_output_direction(policy: Policy, changes: Mapping[int, float], outputs:
     return direction
 
 
-def find_output_coordinates(policy: Policy, values: Sequence[float]) -> tuple[Floats, Floats]:
+def solve_coordinates_for_outputs(policy: Policy, values: Sequence[float]) -> tuple[Floats, Floats]:
     """Return where in the last hidden layer the network puts out these values.
 
     With W = RᵀUᵀ and orthonormal U, the outputs Wh + b are the wanted y where Uᵀh = R⁻ᵀ(y − b). An

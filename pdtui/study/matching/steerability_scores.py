@@ -26,7 +26,7 @@ SCORE_SENTENCE = (
 
 
 @dataclass(frozen=True)
-class PolicyScore:
+class SteerabilityScore:
     """The score of one policy.
 
     Attributes:
@@ -50,7 +50,7 @@ class PolicyScore:
         return self.walking * self.steering
 
 
-def score_policies(data: MatchingStudyData) -> tuple[PolicyScore, ...]:
+def score_steerability(data: MatchingStudyData) -> tuple[SteerabilityScore, ...]:
     """Return the scores of the policies of robots with several, the best of each robot first.
 
     Only units drawn at random can be chosen: every policy has the same number of them, whatever matches.
@@ -60,7 +60,7 @@ def score_policies(data: MatchingStudyData) -> tuple[PolicyScore, ...]:
     for one in data.policies:
         if one.name in recipes:
             robots[recipes[one.name].robot].append(one)
-    scores: list[PolicyScore] = []
+    scores: list[SteerabilityScore] = []
     for facts in robots.values():
         if len(facts) < 2:
             continue
@@ -78,15 +78,15 @@ def _steered(measured: Iterable[MeasuredUnits], policy: str) -> list[MeasuredUni
 
 def _score_policy(
     recipe: StudiedPolicy, facts: PolicyFacts, fastest: float, measured: Sequence[MeasuredUnits]
-) -> PolicyScore:
+) -> SteerabilityScore:
     share = max(facts.net_speed, 0.0) / fastest if fastest > 0.0 else 0.0
     walking = (1.0 - facts.failures) * share
     if not measured:
-        return PolicyScore(recipe, walking, {}, (float("nan"), float("nan")), 0.0)
+        return SteerabilityScore(recipe, walking, {}, (float("nan"), float("nan")), 0.0)
     found = {one.attribute: _steering(one) for one in measured}
     both, first, second = np.mean(list(found.values()), axis=0).tolist()
     attributes = {name: found[name][0] for name in STEERED_ATTRIBUTES if name in found}
-    return PolicyScore(recipe, walking, attributes, (first, second), both)
+    return SteerabilityScore(recipe, walking, attributes, (first, second), both)
 
 
 def _steering(one: MeasuredUnits) -> tuple[float, float, float]:
@@ -106,7 +106,7 @@ def score_headers() -> list[str]:
     return ["policy", "trained by", "walking", *STEERED_ATTRIBUTES, "steering (halves)", "score"]
 
 
-def score_rows(scores: Iterable[PolicyScore]) -> list[tuple[str, ...]]:
+def score_rows(scores: Iterable[SteerabilityScore]) -> list[tuple[str, ...]]:
     """Return one row of text for each policy."""
     return [
         (
@@ -124,15 +124,15 @@ def score_rows(scores: Iterable[PolicyScore]) -> list[tuple[str, ...]]:
     ]
 
 
-def describe_best_policies(scores: Sequence[PolicyScore]) -> str:
+def describe_best_and_shipped(scores: Sequence[SteerabilityScore]) -> str:
     """Return, in one sentence for each robot, the place of its shipped policy among those scored."""
-    robots: dict[str, list[PolicyScore]] = defaultdict(list)
+    robots: dict[str, list[SteerabilityScore]] = defaultdict(list)
     for one in scores:
         robots[one.policy.robot].append(one)
     return " ".join(_describe_best(robot, of_robot) for robot, of_robot in robots.items())
 
 
-def _describe_best(robot: str, scores: Sequence[PolicyScore]) -> str:
+def _describe_best(robot: str, scores: Sequence[SteerabilityScore]) -> str:
     best = scores[0]
     said = f"Of {len(scores)} policies of `{robot}`, `{best.policy.name}` scores best, {best.score:.2f}"
     place = next((number for number, one in enumerate(scores, 1) if one.policy.shipped), None)

@@ -10,10 +10,10 @@ from pdtui.core.outcome import Outcome
 from pdtui.core.processes.result_journal import ResultJournal
 from pdtui.paper.driving.driving_episode import DrivingScore
 
-ScoreJournal = ResultJournal[DrivingScore]
+DrivingScoreJournal = ResultJournal[DrivingScore]
 
 
-def open_score_journal(path: Path | None) -> ScoreJournal:
+def open_driving_score_journal(path: Path | None) -> DrivingScoreJournal:
     """Open a file of scores, one JSON object per line; None keeps nothing.
 
     Raises:

@@ -9,7 +9,10 @@ from torch import nn
 import pdtui
 from pdtui.core.errors import PolicyError
 from pdtui.core.units import Stimulation
-from pdtui.dissection.steering.output_directions import find_output_coordinates, find_output_direction
+from pdtui.dissection.steering.output_layer_directions import (
+    find_output_direction,
+    solve_coordinates_for_outputs,
+)
 from pdtui.policies.runtime.policy import Policy
 from pdtui.robots import make_robot
 from pdtui.stimulation.interventions.unit_edits import AddToUnits, SetCoordinates
@@ -52,7 +55,7 @@ def test_coordinates_set_what_the_network_puts_out() -> None:
     policy, robot = pdtui.load_policy("cassie"), make_robot("cassie")
     observation, _ = robot.reset(seed=1600)
     wanted = np.linspace(-1.5, 1.5, ACTIONS)
-    vectors, coordinates = find_output_coordinates(policy, wanted.tolist())
+    vectors, coordinates = solve_coordinates_for_outputs(policy, wanted.tolist())
     np.testing.assert_allclose(load_map(find_map("cassie")).vectors["outputs"].rows, vectors, atol=1e-5)
     units = np.arange(policy.units - policy.layers[-1], policy.units)
     edit = SetCoordinates(units, vectors.astype(np.float32), coordinates)

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from pdtui.cli import main
 from pdtui.core.errors import MapError
 from pdtui.driving.drive_config import DriveConfig
-from pdtui.paper.heading_redirects import measure_heading_redirects
+from pdtui.paper.heading_redirect_measurement import measure_heading_redirects
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map
 

@@ -28,7 +28,7 @@ ALLOWED = 0.3
 
 
 @dataclass(frozen=True)
-class HeadingRedirect:
+class HeadingRedirectDrive:
     """One drive: a right angle to one side, then back.
 
     Attributes:
@@ -48,19 +48,19 @@ class HeadingRedirect:
 
 
 @dataclass(frozen=True)
-class HeadingRedirectResult:
+class HeadingRedirectMeasurement:
     """The drives of one behavior that holds a heading."""
 
     robot: str
     policy: str
     behavior: str
     seeds: tuple[int, ...]
-    drives: tuple[HeadingRedirect, ...]
+    drives: tuple[HeadingRedirectDrive, ...]
 
 
 def measure_heading_redirects(
     config: DriveConfig, seeds: Sequence[int], *, progress: StepProgress | None = None
-) -> HeadingRedirectResult:
+) -> HeadingRedirectMeasurement:
     """Redirect the robot to the left and back, and to the right and back, once each per seed.
 
     The first behavior of the map that holds a yaw is pressed before control step 100, with a target that is a
@@ -71,17 +71,19 @@ def measure_heading_redirects(
         PdtuiError: The robot, policy or map cannot be loaded.
     """
     behavior, built = find_pid_behaviors(config, "yaw")[0].name, build_control_loop(config)
-    found: list[HeadingRedirect] = []
+    found: list[HeadingRedirectDrive] = []
     for seed in seeds:
         for side, sign in (("left", 1.0), ("right", -1.0)):
             loop = ControlLoop(built.robot, built.policy, built.map, seed)
             found.append(_redirect(loop, behavior, seed, side, sign))
             if progress is not None:
                 progress(len(found), 2 * len(seeds))
-    return HeadingRedirectResult(built.robot.name, built.policy.name, behavior, tuple(seeds), tuple(found))
+    return HeadingRedirectMeasurement(
+        built.robot.name, built.policy.name, behavior, tuple(seeds), tuple(found)
+    )
 
 
-def _redirect(loop: ControlLoop, behavior: str, seed: int, side: str, sign: float) -> HeadingRedirect:
+def _redirect(loop: ControlLoop, behavior: str, seed: int, side: str, sign: float) -> HeadingRedirectDrive:
     column, before = loop.robot.attribute_index("yaw"), 0.0
 
     def events_before(step: int) -> list[DriveEvent]:
@@ -101,10 +103,10 @@ def _redirect(loop: ControlLoop, behavior: str, seed: int, side: str, sign: floa
         errors.append(abs(float(wrap_angles(yaws[end - JUDGED : end] - target).mean())))
     lasted = len(records) == steps and not records[-1].ended
     done = lasted and max(errors) <= ALLOWED
-    return HeadingRedirect(seed, side, errors[0], errors[1], records[-1].outcome, done)
+    return HeadingRedirectDrive(seed, side, errors[0], errors[1], records[-1].outcome, done)
 
 
-def heading_redirect_table(result: HeadingRedirectResult) -> Table:
+def heading_redirect_table(result: HeadingRedirectMeasurement) -> Table:
     """Return a table with one row per side."""
     table = new_table(
         f"{result.robot}, policy {result.policy}: '{result.behavior}', {format_seed_range(result.seeds)}",

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pdtui.study.matching.policy_scores import describe_best_policies, score_policies, score_rows
+from pdtui.study.matching.steerability_scores import describe_best_and_shipped, score_rows, score_steerability
 from pdtui.study.matching.study_data import (
     ROLES,
     SHIPPED_STUDY_DATA,
@@ -69,7 +69,7 @@ def data() -> MatchingStudyData:
 
 
 def test_a_unit_is_chosen_on_one_start_and_judged_on_others(data: MatchingStudyData) -> None:
-    scores = {one.policy.name: one for one in score_policies(data)}
+    scores = {one.policy.name: one for one in score_steerability(data)}
     first = scores[NAMES[0]]
     assert first.walking == pytest.approx(0.75 * 3.0 / 4.0)
     # Up: (0.5 - 0.1) / 2; down: 1.2, of which 1 counts. A matched unit cannot be chosen.
@@ -82,23 +82,23 @@ def test_a_unit_is_chosen_on_one_start_and_judged_on_others(data: MatchingStudyD
 
 
 def test_scores_are_in_order_and_say_which_is_shipped(data: MatchingStudyData) -> None:
-    scores = score_policies(data)
+    scores = score_steerability(data)
     assert [one.policy.name for one in scores] == NAMES
     shipped = [replace(one, policy=replace(one.policy, shipped=one.policy.seed == 1001)) for one in scores]
-    assert describe_best_policies(shipped) == (
+    assert describe_best_and_shipped(shipped) == (
         f"Of 3 policies of `walker`, `{NAMES[0]}` scores best, 0.34; the shipped one is number 2, with 0.15."
     )
     assert score_rows(shipped)[1][1] == "PPO (shipped)"
     assert score_rows(shipped)[2][-2:] == ("–", "0.00")
-    assert "the shipped one was not measured" in describe_best_policies(scores)
+    assert "the shipped one was not measured" in describe_best_and_shipped(scores)
 
 
 def test_a_robot_with_one_policy_is_not_scored(data: MatchingStudyData) -> None:
-    assert score_policies(replace(data, policies=data.policies[:1])) == ()
+    assert score_steerability(replace(data, policies=data.policies[:1])) == ()
 
 
 def test_the_shipped_data_score_policies_of_three_robots() -> None:
-    scores = score_policies(read_study_data(SHIPPED_STUDY_DATA))
+    scores = score_steerability(read_study_data(SHIPPED_STUDY_DATA))
     assert {one.policy.robot for one in scores} == {"walker", "ant", "bipedal_walker"}
     assert sum(one.policy.shipped for one in scores) == 3
     assert all(0.0 <= one.score <= 1.0 for one in scores)
