@@ -22,9 +22,9 @@ from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.evaluation.target_tracking import find_pid_behaviors
 
 PRESSED, HELD, JUDGED = 100, 400, 100
-"""Control steps before the key is pressed, for which each heading is held, and at its end that count."""
+"""Control steps until the key is pressed, for each heading, and at the end of each heading that are judged."""
 ALLOWED = 0.3
-"""Largest mean deviation that counts as heading there, rad."""
+"""Largest mean deviation from a heading at which it counts as held, rad."""
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ EXPERIMENTS = find_experiments()
 
 
 def experiment_options(command: click.Command) -> click.Command:
-    """Add the options of the experiments to a command; one that it has already serves both."""
+    """Add the options of the experiments to a command; an option that it already has serves both."""
     takers: dict[click.Option, list[str]] = {}
     for name, experiment in EXPERIMENTS.items():
         for option in experiment.options:

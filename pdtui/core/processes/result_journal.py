@@ -159,4 +159,4 @@ def _to_number(value: Any) -> Any:
     """Return a number of NumPy as one of Python."""
     if isinstance(value, np.generic):
         return value.item()
-    raise TypeError(f"no number: {value!r}")
+    raise TypeError(f"not a number: {value!r}")

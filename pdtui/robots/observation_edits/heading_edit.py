@@ -5,7 +5,7 @@ The velocity in the world turns with the trunk, so that the robot seems to do th
 A quaternion and its negative are the same heading, and not the same observation: a robot that has turned once
 round observes the negative of what it observed before. A policy that never did so in training falls at once.
 An offset therefore counts whole turns: it makes the same observation again only after two of them. A robot
-that always observes the canonical one of both, that whose w is not negative, needs no such count.
+that always observes the canonical one of the two, whose w is not negative, needs no such count.
 """
 
 from __future__ import annotations
