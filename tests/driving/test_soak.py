@@ -14,7 +14,8 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="r
 
 
 def test_random_input_leaves_a_session_that_repeats(map_path: Path, tmp_path: Path) -> None:
-    done = soak(tmp_path, map_path, 1500, random.Random(1), count=1)
+    # When a page takes the keys depends on timing: of 1500 presses, 44 to 81 did something to the drive.
+    done = soak(tmp_path, map_path, 3000, random.Random(1), count=1)
     assert done.replay.identical
     assert done.events > 50
     assert done.resizes > 5
