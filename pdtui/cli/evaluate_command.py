@@ -79,7 +79,7 @@ from pdtui.policies.weights.import_options import ImportOptions
 @click.option("--quick", is_flag=True, help="Take a quick look: fewer seeds and random draws.")
 @click.option("--without-controls", is_flag=True, help="Leave out substitutes and disturbed worlds.")
 @click.option(
-    "--behavior", "behaviors", metavar="NAME", multiple=True, help="Measure only this behavior; may be repeated."
+    "--behavior", "behaviors", metavar="NAME", multiple=True, help="Measure only this one; may be repeated."
 )
 @integer_option("--hold", help="Control steps for which a behavior is held, at least 10 s; default: 1000.")
 @click.option(

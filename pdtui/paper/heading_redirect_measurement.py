@@ -22,7 +22,7 @@ from pdtui.evaluation.paired_statistics import share_interval
 from pdtui.evaluation.target_tracking import find_pid_behaviors
 
 PRESSED, HELD, JUDGED = 100, 400, 100
-"""Control steps until the key is pressed, for each heading, and at the end of each heading that are judged."""
+"""Control steps until the key is pressed, for each heading, and those at its end that are judged."""
 ALLOWED = 0.3
 """Largest mean deviation from a heading at which it counts as held, rad."""
 
