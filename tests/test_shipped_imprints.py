@@ -11,6 +11,7 @@ import pytest
 import pdtui
 from pdtui.driving.drive_config import DriveConfig
 from pdtui.evaluation.key_release.key_release_evaluation import evaluate_key_releases
+from pdtui.robots.task import find_longest_run
 from pdtui.stimulation.map_library import find_map
 from pdtui.stimulation.map_reader import load_map
 
@@ -147,6 +148,19 @@ def test_cassie_walks_on_crouched() -> None:
     assert not drive.endings
     assert drive["height"][250:].mean() < 0.62 * drive["height"][50:100].mean()
     assert drive["forward"][250:].mean() > 0.5
+
+
+def test_cassie_jumps_and_walks_on() -> None:
+    drive = pdtui.drive("cassie", keys={120: "i"}, steps=420, seed=SEED)
+    assert not drive.endings
+    feet = np.minimum(drive["left foot height"], drive["right foot height"])
+    airborne = (drive["left contact"] == 0.0) & (drive["right contact"] == 0.0)
+    assert feet[40:120].max() < 0.1  # its start drops it
+    assert feet[120:].max() > 0.2
+    assert find_longest_run(airborne[40:120]) * 0.02 < 0.1
+    assert find_longest_run(airborne[120:]) * 0.02 >= 0.3
+    assert np.abs(drive["pelvis pitch"][120:]).max() < math.radians(45)
+    assert drive["forward"][-100:].mean() > 0.9
 
 
 def test_cassie_flips_backward_and_walks_on() -> None:
