@@ -84,11 +84,14 @@ def legged_observation_edits(
 
 def _command_offset_edits(commands: Iterable[str]) -> Iterable[ObservationEdit]:
     for index, (name, scale) in enumerate(zip(commands, COMMAND_SCALES.tolist(), strict=False)):
-        unit = "rad/s" if name == "yaw rate" else "m/s"
         says = f"its {name} command is larger by this much"
         yield offset_observed_number(
-            _FIRST_COMMAND + index, f"{name} command offset", unit, says, float(scale)
+            _FIRST_COMMAND + index, f"{name} command offset", _command_unit(name), says, float(scale)
         )
+
+
+def _command_unit(name: str) -> str:
+    return "rad/s" if name == "yaw rate" else "m/s"
 
 
 def _joint_edits(description: LeggedRobotDescription, joints: Sequence[str]) -> Iterable[ObservationEdit]:
@@ -123,7 +126,7 @@ def command_edits(commands: Iterable[str]) -> tuple[ObservationEdit, ...]:
         set_observed_number(
             _FIRST_COMMAND + index,
             f"{name} command",
-            "rad/s" if name == "yaw rate" else "m/s",
+            _command_unit(name),
             f"its {name} command has this value",
             float(COMMAND_SCALES[index]),
         )
